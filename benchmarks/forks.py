@@ -100,6 +100,8 @@ def _predictions(chosen: int) -> list[Result]:
     random, durations, same = np.random.default_rng(FIRST_SEED), [], 0
     cold_s, prepared_s = _first(random, 0.0), _first(random, PREPARED_S)
     world = World.from_file(KUKA)
+    world.prepare_forks()
+    time.sleep(PREPARED_S)
     for _ in range(300):
         world.step()
     for _ in range(chosen):

@@ -160,6 +160,23 @@ def test_messages_of_a_node_in_cpp_are_counted(ros: Any, tmp_path: Path) -> None
         wait_until(lambda: recorder.published() == {"/two_links/tf": 1}, "it is counted", 30.0)
 
 
+def test_messages_are_counted_after_more_bytes_than_32_bits_count(
+    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after some minutes of a camera; a node that does not allow it is left out."""
+    dispatch: Any = Marshaller.dispatch
+    monkeypatch.setitem(dispatch, int, dispatch[int])  # which is put back after the test
+    publisher = rospy.Publisher("/much", Float64, queue_size=10, latch=True)
+    publisher.publish(7.0)
+    publisher.impl.message_data_sent += 1 << 33
+    with Recorder(tmp_path / "a.bag", ["/much"]) as recorder:
+        wait_until(publisher.get_num_connections, "the recorder connects")
+        assert recorder.published() == {}
+        allow_large_integers()
+        wait_until(lambda: recorder.published() == {"/much": 1}, "it is counted", 30.0)
+    publisher.unregister()
+
+
 def test_the_bag_before_is_replaced_and_nothing_else_is_left(ros: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.bag"
     for topic in ("/first", "/second"):

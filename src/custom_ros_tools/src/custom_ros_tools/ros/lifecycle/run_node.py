@@ -28,7 +28,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.rospy_internals import keep_accepting
 
 from .master_watch import MasterWatch
-from .timed_master import address_fault
+from .timed_master import address_fault, allow_large_integers
 
 T = TypeVar("T")
 
@@ -50,6 +50,7 @@ MAX_FILES = 8192
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
     """Makes this process a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
     keep_accepting()
+    allow_large_integers()
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
     _attach_logging({"custom_ros_tools", *loggers})

@@ -1,12 +1,13 @@
-"""Calls to the ROS master with a time limit, a check of this node's address, and a port for another master."""
+"""XML-RPC: calls to the ROS master with a time limit, large integers, this node's address, a port for a master."""
 
 import http.client
 import os
 import random
 import socket
+from collections.abc import Callable
 from typing import Any
 from xml.parsers.expat import ExpatError
-from xmlrpc.client import Error, ServerProxy, Transport
+from xmlrpc.client import MAXINT, MININT, Error, Marshaller, ServerProxy, Transport
 
 import rosgraph
 
@@ -40,6 +41,21 @@ def timed_master(uri: str | None = None) -> Any:
     Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
     """
     return ServerProxy(uri or rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
+
+
+def allow_large_integers() -> None:
+    """Has this process send integers of more than 32 bits as `i8`, which Python reads, instead of an error.
+
+    rospy counts bytes in such integers: a node that has sent more than 2 GB could not answer `getBusStats` any more,
+    by which recorders learn how many messages it has sent.
+    """
+
+    def dump(_: Marshaller, value: int, write: Callable[[str], object]) -> None:
+        kind = "int" if MININT <= value <= MAXINT else "i8"
+        write(f"<value><{kind}>{value:d}</{kind}></value>\n")
+
+    dispatch: Any = Marshaller.dispatch
+    dispatch[int] = dump
 
 
 def address_fault() -> str | None:

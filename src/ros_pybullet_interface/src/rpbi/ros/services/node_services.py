@@ -37,6 +37,8 @@ from ros_pybullet_interface.srv import (
     SetSensorRateRequest,
     StepN,
     StepNRequest,
+    StepWithInputs,
+    StepWithInputsRequest,
 )
 from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
 from ros_pybullet_interface.srv import SetGravity as SetGravityService
@@ -63,7 +65,7 @@ from rpbi.world.saved.state import WorldState
 
 from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
-from .prediction import Predictor, predict
+from .prediction import Predictor, planned_input, predict
 
 log = logging.getLogger(__name__)
 
@@ -131,6 +133,23 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
     except InterfaceError as error:
         clock = node.simulation.world.clock
         return False, str(error), clock.tick, to_ros_time(clock.stamp_ns)
+
+
+def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tuple[bool, str, int, genpy.Time]:
+    """Advances by many ticks as `rpbi/step_n` does, with inputs at ticks, for controllers in step with the world."""
+    waiting = sorted(map(planned_input, request.inputs), key=lambda each: each.tick)
+    if waiting and waiting[-1].tick >= max(request.steps, 1):
+        raise InterfaceError(f"{waiting[-1].slot}: expected a tick below {request.steps}, got {waiting[-1].tick}")
+    done = 0
+    while True:
+        while waiting and waiting[0].tick <= done:
+            _, slot, value = waiting.pop(0)
+            node.simulation.world.put(slot, value)
+        until = waiting[0].tick if waiting else request.steps
+        answer = _step_n(node, StepNRequest(until - done))
+        done = until
+        if done == request.steps or not answer[0]:
+            return answer
 
 
 def _reset(node: NodeContext, _: Any) -> Answer:
@@ -335,6 +354,7 @@ NODE_SERVICES = (
     Service("rpbi/stop", Trigger, _stop),
     Service("rpbi/step", Trigger, _step),
     Service("rpbi/step_n", StepN, _step_n),
+    Service("rpbi/step_with_inputs", StepWithInputs, _step_with_inputs),
     Service("rpbi/reset", Trigger, _reset),
     Service("rpbi/save", SetString, _save),
     Service("rpbi/restore", SetString, _restore),

@@ -7,7 +7,8 @@ import threading
 from typing import Any
 
 import genpy
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Quaternion
+from geometry_msgs.msg import Pose as PoseMessage
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.plugins import check_trusted
@@ -29,6 +30,8 @@ MAX_ROWS = 100_000
 """Largest number of rows of motion in an answer, of all bodies and candidates; more are rejected."""
 EVERY = 10
 """Ticks between two rows of motion by default."""
+POSE_NAMES = ("x", "y", "z", "qx", "qy", "qz", "qw")
+"""Names of the values of an input that is a pose in the world."""
 NICENESS = 5
 """Niceness of the processes that predict, so that the running world is not late."""
 
@@ -92,7 +95,7 @@ class Predictor:
 def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.Time, list[PredictionMessage]]:
     """Predicts what would happen from the present state with each of some candidates; the world goes on."""
     job = _job(node, request)
-    candidates = [[_planned(each) for each in candidate.inputs] for candidate in request.candidates]
+    candidates = [[planned_input(each) for each in candidate.inputs] for candidate in request.candidates]
     tick, stamp_ns, predictions = node.predictor.predict(candidates, job)
     joints = {name: _joint_names(node.simulation.world.bodies.get(name)) for name in job.watch}
     messages = [_message(each, joints) for each in predictions]
@@ -118,10 +121,18 @@ def _job(node: Any, request: PredictRequest) -> PredictionJob:
     return PredictionJob(request.ticks, tuple(request.watch), every, request.cost or None)
 
 
-def _planned(message: PlannedInputMessage) -> PlannedInput:
+def planned_input(message: PlannedInputMessage) -> PlannedInput:
+    """Returns an input as a world takes it.
+
+    Raises:
+        InterfaceError: If there is not one value for each name.
+    """
     names, values = message.names, tuple(message.values)
     if names and len(names) != len(values):
         raise InterfaceError(f"{message.input}: expected a value for each of {len(names)} names, got {len(values)}")
+    if tuple(names) == POSE_NAMES:
+        x, y, z, *quat = values
+        return PlannedInput(message.tick, message.input, {"position": (x, y, z), "quat_xyzw": tuple(quat)})
     return PlannedInput(message.tick, message.input, dict(zip(names, values, strict=True)) if names else values)
 
 
@@ -133,7 +144,7 @@ def _message(prediction: Prediction, joints: dict[str, list[str]]) -> Prediction
     bodies = [
         PredictedBody(
             name=name,
-            poses=[Pose(Point(*row[:3]), Quaternion(*row[3:])) for row in poses.tolist()],
+            poses=[PoseMessage(Point(*row[:3]), Quaternion(*row[3:])) for row in poses.tolist()],
             joint_names=joints.get(name, []),
             joints=prediction.joints[name].ravel().tolist() if name in prediction.joints else [],
             contacts=prediction.contacts[name].tolist(),

@@ -1,0 +1,92 @@
+"""The command `score`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+from tqdm import tqdm
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.errors import UnknownNameError
+from rpbi_examples.scenes import SCENES
+
+
+def score(
+    scene: Annotated[str, Argument("SCENE")],
+    *,
+    seeds: Annotated[str, Argument("A-B")] = "1-100",
+    json: Annotated[Path | None, Argument("FILE", parse=Path, files="*.json")] = None,
+    out: Annotated[Path, Argument("FOLDER", parse=Path, files="*")] = Path("out/score"),
+    jobs: Annotated[int | None, Argument("N", parse=int)] = None,
+) -> int:
+    """Runs an example from many random starts, as fast as possible, and tells how often it succeeds.
+
+        ./rpbi score cup --seeds 1-100 --json cup.json
+
+    It needs no ROS master. Success is judged by the state of the simulation. A seed leads to the same episode on any
+    computer, and in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed episodes
+    are in FOLDER/SCENE_failures.png; see docs/examples.md.
+
+    Usage:
+        ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--jobs N]
+
+    Args:
+        SCENE: cup, wiping, handover, talos, factory or dual_arm; or module:Class of your own
+        seeds: the seeds, such as 1-100 or 17; 1-100 without it
+        json: file of the results, a row for each seed
+        out: folder of the pictures; out/score without it
+        jobs: episodes at once, each in a process of its own; the number of processors without it
+    """
+    if ":" not in scene and scene not in SCENES:
+        raise UnknownNameError("scene", scene, list(SCENES))
+    numbers = _numbers(seeds)
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"--jobs: expected at least 1, got {jobs}")
+    from rpbi_examples.scenes.score import run_seeds, summary, write_failures, write_json  # needs Gymnasium
+
+    SCENES.find(scene)  # here, where what is missing is named
+    results = []
+    with tqdm(
+        total=len(numbers), unit=" episodes", leave=False, mininterval=0.1 if sys.stderr.isatty() else 10.0
+    ) as bar:
+        for each in run_seeds(scene, numbers, min(jobs or os.cpu_count() or 1, len(numbers))):
+            results.append(each)
+            bar.update()
+    found = summary(scene, results)
+    _print(found["rows"])
+    print(f"{scene}: {found['success']} of {found['of']}")
+    if json:
+        write_json(json, found)
+    pictures = out / f"{scene.replace(':', '.')}_failures.png"
+    if write_failures(pictures, results):
+        print(f"ends of failed episodes: {pictures}")
+    return 0
+
+
+def _numbers(text: str) -> range:
+    first, _, last = text.partition("-")
+    try:
+        numbers = range(int(first), int(last or first) + 1)
+    except ValueError:
+        numbers = range(0)
+    if not numbers:
+        raise UsageError(f"--seeds: expected seeds such as 1-100, or one, got '{text}'")
+    return numbers
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    """Prints the rows as a table, without hashes."""
+    hidden = {"reason", "state_hash", "success", "done", "of"}
+    names = [name for name in rows[0] if name not in hidden]
+    lines = [[*(f"{row[name]:g}" for name in names), _verdict(row)] for row in rows]
+    widths = [max(map(len, column)) for column in zip(names, *(line[:-1] for line in lines))]
+    for line in [[*names, "result"], *lines]:
+        print("  ".join(f"{each:>{width}}" for each, width in zip(line, widths)) + f"  {line[-1]}")
+
+
+def _verdict(row: dict[str, Any]) -> str:
+    parts = "" if row["of"] == 1 else f" {row['done']} of {row['of']}"
+    return f"{'ok' if row['success'] else 'failed'}{parts}{': ' if row['reason'] else ''}{row['reason']}"

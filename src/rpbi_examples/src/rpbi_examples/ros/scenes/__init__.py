@@ -1,0 +1,1 @@
+"""Scenes that act in the simulator of a ROS master."""

@@ -1,0 +1,59 @@
+"""`scene_node.py`: a scene acts in the simulator, with one seed after the other."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import numpy as np
+import rospy
+from pydantic import Field
+
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Text
+from rpbi_examples.scenes import SCENES
+from rpbi_examples.scenes.scene import SceneResult, run_scene
+
+from .stage import SimulatorStage
+
+NODE = "scene"
+
+
+class SceneNodeConfig(ConfigModel):
+    """Parameters of the node."""
+
+    scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
+    seed: Count = Field(1, description="Seed of the first episode; each has the next one.")
+    episodes: Count = Field(0, description="Number of episodes; 0: until it is stopped.")
+    real_time_factor: NonNegative = Field(1.0, description="Simulated seconds a second; 0: as fast as possible.")
+
+
+def _run() -> None:
+    config = private_parameters(SceneNodeConfig)
+    kind = SCENES.find(config.scene)
+    stage = SimulatorStage(kind.watch, kind.cycle_ticks, config.real_time_factor)
+    succeeded = 0
+    for number, seed in enumerate(count(config.seed), 1):
+        scene = kind(np.random.default_rng(seed))
+        rospy.loginfo("seed %d", seed)
+        stage.begin(scene)
+        result = run_scene(scene, stage)
+        succeeded += result.success
+        _report(seed, result, stage.state_hash())
+        if number == config.episodes:
+            rospy.loginfo("%d of %d episodes succeeded", succeeded, number)
+            rospy.signal_shutdown("all episodes are done")
+            break
+
+
+def _report(seed: int, result: SceneResult, state_hash: str) -> None:
+    figures = ", ".join(f"{name}: {value:g}" for name, value in result.figures.items())
+    verdict = "succeeded" if result.success else "failed"
+    reason = f": {result.reason}" if result.reason else ""
+    say = rospy.loginfo if result.success else rospy.logwarn
+    say("seed %d %s after %.1f s%s; %s; state %s", seed, verdict, result.time_s, reason, figures, state_hash)
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NODE, _run, loggers=("rpbi_examples",))

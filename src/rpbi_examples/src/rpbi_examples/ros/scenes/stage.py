@@ -1,0 +1,137 @@
+"""A scene's view of the simulator: topics tell what is there, services act."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import rospy
+from cob_srvs.srv import SetString
+from custom_srvs.srv import SetTransform
+from geometry_msgs.msg import Point, Vector3, Wrench, WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.services import get_srv_handler
+from custom_ros_tools.ros.transform_messages import transform_message
+from robot_model.geometry import Pose, Vector
+from ros_pybullet_interface.msg import Contacts, PlannedInput
+from ros_pybullet_interface.srv import ApplyWrench, GetStateHash, StepWithInputs, SwitchControllers
+from rpbi.ros.services.prediction import POSE_NAMES
+from rpbi.ros.tick_listener import TickListener
+from rpbi_examples.scenes.scene import Deed, Place, Put, Scene, Seen, SeenWrench, Shove, Stage, Switch, Touch, Watch
+
+PATIENCE_S = 20.0
+"""Longest wait for the messages of a tick, of wall time [s]."""
+LATE_S = 0.1
+"""Time that is made up for after a delay [s]."""
+
+
+class SimulatorStage(Stage):
+    """Steps the simulator, and waits for what the scene sees of it.
+
+    Since the world waits for the scene, an episode goes as that of the same seed in another process, on any computer.
+
+    Args:
+        watch: What scenes see.
+        ticks: Ticks of a cycle.
+        real_time_factor: Largest number of simulated seconds a second; 0 is as fast as possible.
+    """
+
+    def __init__(self, watch: Watch, ticks: int, real_time_factor: float) -> None:
+        self._watch, self._ticks, self._factor = watch, ticks, real_time_factor
+        self._services: dict[str, Any] = {}
+        self._inputs: list[PlannedInput] = []
+        self._due_s = 0.0
+        self._scene: Scene | None = None
+        topics: dict[str, type] = {f"rpbi/{name}/joint_states": JointState for name in watch.robots}
+        topics |= {f"rpbi/{name}/base_state": Odometry for name in watch.bodies}
+        topics |= {f"rpbi/{name}/ft_sensor": WrenchStamped for name in watch.wrenches}
+        topics |= {f"rpbi/{name}/contacts": Contacts for name in watch.contacts}
+        self._listener = TickListener(topics)
+        before, after = (self._step(ticks).stamp.to_sec() for ticks in (0, 1))
+        self._dt_s = round(after - before, 9)
+
+    def begin(self, scene: Scene) -> None:
+        """Brings the world to the start of an episode."""
+        self._ask("rpbi/reset", Trigger)
+        self._scene, self._due_s = scene, time.monotonic()
+        scene.prepare()
+        for deed in scene.take_deeds():
+            self.do(deed)
+
+    def do(self, deed: Deed) -> None:
+        if isinstance(deed, Put):
+            if isinstance(deed.value, Pose):
+                names, values = POSE_NAMES, (*deed.value.position, *deed.value.quat_xyzw)
+            else:
+                names, values = tuple(deed.value), tuple(deed.value.values())
+            self._inputs.append(PlannedInput(0, deed.slot, names, values))
+        elif isinstance(deed, Place):
+            self._ask(f"rpbi/{deed.name}/set_pose", SetTransform, transform_message(*deed.pose))
+        elif isinstance(deed, Shove):
+            force = Wrench(force=Vector3(*deed.force))
+            self._ask("rpbi/apply_wrench", ApplyWrench, deed.target, force, Point(), "", deed.duration_s)
+        elif isinstance(deed, Switch):
+            self._ask(f"rpbi/{deed.robot}/switch_controllers", SwitchControllers, deed.start, deed.stop)
+        else:
+            self._ask("rpbi/remove_pybullet_object", SetString, deed.name)
+
+    def cycle(self) -> None:
+        answer = self._step(self._ticks)
+        assert self._scene is not None
+        try:
+            found = self._listener.wait_for_tick(answer.stamp, PATIENCE_S)
+        except TimeoutError as error:
+            raise InterfaceError(str(error)) from None
+        self._scene.look(self._seen(answer.tick * self._dt_s, found))
+        if self._factor:
+            self._due_s = max(self._due_s + self._ticks * self._dt_s / self._factor, time.monotonic() - LATE_S)
+            time.sleep(max(0.0, self._due_s - time.monotonic()))
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException("ROS shuts down")
+
+    def state_hash(self) -> str:
+        """Returns the hash of the world's state."""
+        return str(self._ask("rpbi/get_state_hash", GetStateHash).state_hash)
+
+    def _step(self, ticks: int) -> Any:
+        inputs, self._inputs = self._inputs, []
+        return self._ask("rpbi/step_with_inputs", StepWithInputs, ticks, inputs)
+
+    def _ask(self, name: str, kind: type, *arguments: Any) -> Any:
+        if name not in self._services:
+            self._services[name] = get_srv_handler(name, kind, persistent=True)
+        answer = self._services[name](*arguments)
+        if not answer.success:
+            raise InterfaceError(f"{name}: {answer.message}")
+        return answer
+
+    def _seen(self, time_s: float, found: Mapping[str, Any]) -> Seen:
+        watch = self._watch
+        joints = {name: found[f"rpbi/{name}/joint_states"] for name in watch.robots}
+        wrenches = {name: found[f"rpbi/{name}/ft_sensor"].wrench for name in watch.wrenches}
+        return Seen(
+            time_s,
+            {name: dict(zip(state.name, state.position)) for name, state in joints.items()},
+            {name: _pose(found[f"rpbi/{name}/base_state"].pose.pose) for name in watch.bodies},
+            {name: SeenWrench(_vector(each.force), _vector(each.torque)) for name, each in wrenches.items()},
+            {name: tuple(map(_touch, found[f"rpbi/{name}/contacts"].points)) for name in watch.contacts},
+        )
+
+
+def _pose(message: Any) -> Pose:
+    turn = message.orientation
+    return Pose(_vector(message.position), (turn.x, turn.y, turn.z, turn.w))
+
+
+def _vector(message: Any) -> Vector:
+    return message.x, message.y, message.z
+
+
+def _touch(point: Any) -> Touch:
+    place, normal = _vector(point.position), _vector(point.normal)
+    return Touch(point.other_body, point.other_link, place, normal, point.normal_force)

@@ -1,0 +1,24 @@
+"""Scenes: tasks that robots do in a world, with a score. A new one is a class in a file of its own and a line here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from custom_ros_tools.plugins.table import PluginTable
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+SCENES: PluginTable[Scene] = PluginTable(
+    "scene",
+    "rpbi_examples.scenes.scene:Scene",
+    {
+        "cup": "rpbi_examples.scenes.cup:Cup",
+        "wiping": "rpbi_examples.scenes.wiping:Wiping",
+        "handover": "rpbi_examples.scenes.handover:Handover",
+        "talos": "rpbi_examples.scenes.talos:Talos",
+        "factory": "rpbi_examples.scenes.factory:Factory",
+        "dual_arm": "rpbi_examples.scenes.dual_arm:DualArm",
+    },
+)
+"""All scenes; each is imported when it is looked up, since some need an extra."""

@@ -1,0 +1,97 @@
+"""An arm that leads one of its links along lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from custom_ros_tools.transforms import finite_vector
+from ik_ros.problem import IKProblem
+from ik_ros.solvers.kdl import KdlConfig, KdlSolver
+from robot_model.geometry import Pose, minus, plus, quaternion_of, quaternion_product, rotation_between, scaled
+
+from .scene import Scene, SceneFailedError
+
+
+class Arm:
+    """Leads a link of a robot by the targets of its joints, from where the last target was.
+
+    Args:
+        scene: The scene that it acts in.
+        robot: The robot's name in the world.
+        urdf: Its URDF.
+        base_link: Link from which the chain begins.
+        link: The link that is led.
+        base: Pose of the base link in the world.
+        slot: Input of the targets; by default that of the robot.
+
+    Attributes:
+        target: The last pose that the link was sent to, in the world.
+    """
+
+    def __init__(
+        self, scene: Scene, robot: str, urdf: str, base_link: str, link: str, base: Pose = Pose(), slot: str = ""
+    ) -> None:
+        self._scene, self._robot, self._slot, self._base = scene, robot, slot or f"{robot}/target", base
+        config = {"urdf_filename": urdf, "base_link": base_link, "tip_link": link}
+        self._solver = KdlSolver(KdlConfig.parse(config, f"arm of {robot}"))
+        self.joint_names = self._solver.joint_names
+        joints = scene.seen.joints[robot]
+        self._positions = [joints[name] for name in self.joint_names]
+        self.target = self.pose()
+
+    def pose(self) -> Pose:
+        """Returns where the link is in the world."""
+        joints = self._scene.seen.joints[self._robot]
+        return self._base @ self._solver.chain.pose([joints[name] for name in self.joint_names])
+
+    def send(self, pose: Pose) -> None:
+        """Sends the link to a pose in the world, near the last one.
+
+        Raises:
+            SceneFailedError: If it is out of reach.
+        """
+        start = dict(zip(self.joint_names, self._positions))
+        found = self._solver.solve(IKProblem(self._base.inverse() @ pose, start=start))
+        if not found.success:
+            place = ", ".join(f"{each:.3f}" for each in pose.position)
+            raise SceneFailedError(f"{self._robot}: ({place}) m is out of reach: {found.message}")
+        self._positions = list(found.positions)
+        self.target = pose
+        self._scene.put(self._slot, dict(zip(self.joint_names, self._positions)))
+
+    def go(self, pose: Pose, duration_s: float) -> Iterator[None]:
+        """Goes along a line to a pose in the world, from rest to rest; used as `yield from arm.go(...)`."""
+        start, begin_s = self.target, self._scene.seen.time_s
+        while (share := (self._scene.seen.time_s - begin_s) / duration_s) < 1.0:
+            self.send(between(start, pose, smooth(share)))
+            yield
+        self.send(pose)
+        yield
+
+    def move_joints(self, positions: Sequence[float], duration_s: float) -> Iterator[None]:
+        """Moves the joints of the arm to positions [rad or m], from rest to rest."""
+        goal = finite_vector(positions, len(self.joint_names), "positions").tolist()
+        start, begin_s = list(self._positions), self._scene.seen.time_s
+        share = 0.0
+        while share < 1.0:
+            share = min((self._scene.seen.time_s - begin_s) / duration_s, 1.0)
+            self._positions = [a + smooth(share) * (b - a) for a, b in zip(start, goal)]
+            self._scene.put(self._slot, dict(zip(self.joint_names, self._positions)))
+            yield
+        self.target = self._base @ self._solver.chain.pose(self._positions)
+
+
+def smooth(share: float) -> float:
+    """Returns the share of a way after a share of its time: a polynomial of degree 5, from rest to rest.
+
+    T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5(7), 1985.
+    """
+    share = min(max(share, 0.0), 1.0)
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+
+def between(start: Pose, end: Pose, share: float) -> Pose:
+    """Returns the pose at a share of the way, on a line and by the shortest turn."""
+    position = plus(start.position, scaled(share, minus(end.position, start.position)))
+    turn = quaternion_of(scaled(share, rotation_between(start.quat_xyzw, end.quat_xyzw)))
+    return Pose(position, quaternion_product(turn, start.quat_xyzw))

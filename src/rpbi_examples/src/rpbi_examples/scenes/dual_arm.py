@@ -1,0 +1,131 @@
+"""Two arms press a box between their flanges, carry it to another place and set it down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_model.geometry import (
+    Pose,
+    Vector,
+    angle_between,
+    dot,
+    norm,
+    minus,
+    plus,
+    quaternion_product,
+    rotated,
+    scaled,
+)
+
+from .arm import between, smooth
+from .scene import Scene, Watch
+
+HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
+"""Half the way between the faces that are pressed, height of the table, half the height of the box."""
+STIFFNESS = 3000.0
+"""Stiffness of the hands, as in configs/dual_arm/iiwa.yaml [N/m]."""
+FORCE_N = 60.0
+"""Force with which both hands press: the internal force, which moves nothing."""
+LIFT_M = 0.2
+SPEED = 0.12
+"""Mean speed of the box [m/s]."""
+NEAR_M, NEAR_RAD = 0.02, math.radians(5.0)
+"""Error within which the box is at its goal."""
+MAX_TILT_DEG = 3.0
+FLANGES = {
+    "left": (1.0, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))),
+    "right": (-1.0, (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))),
+}
+"""By arm: the side of the box, along its y axis, and the orientation of the flange in the box: z points at the box."""
+
+
+class DualArm(Scene):
+    """Two iiwas carry a box together: they share its weight and press it with a constant internal force."""
+
+    world = "{rpbi_examples}/configs/dual_arm/config.yaml"
+    watch = Watch(robots=("left", "right"), bodies=("box",), contacts=("box",))
+
+    def __init__(self, random: np.random.Generator) -> None:
+        super().__init__(random)
+        self.goal = _on_table(random)
+        self._tilt_deg, self._is_carrying = 0.0, False
+        self._forces: list[float] = []
+
+    def prepare(self) -> None:
+        """Puts the box somewhere on the table."""
+        self.place("box", _on_table(self.random))
+
+    def act(self) -> Iterator[None]:
+        """Approaches, presses, lifts, carries, lowers and lets go."""
+        start = self.seen.poses["box"]
+        for share in np.linspace(0.0, 1.0, 75):
+            self._hold(start, 0.12 - 0.10 * smooth(share))
+            yield
+        for share in np.linspace(0.0, 1.0, 50):
+            self._hold(start, 0.02 * (1.0 - share) - share * FORCE_N / STIFFNESS)
+            yield
+        self._is_carrying = True
+        above, end = (pose._replace(position=plus(pose.position, (0.0, 0.0, LIFT_M))) for pose in (start, self.goal))
+        for first, second in ((start, above), (above, end), (end, self.goal)):
+            yield from self._carry(first, second)
+        self._is_carrying = False
+        for share in np.linspace(0.0, 1.0, 75):
+            self._hold(self.goal, -(1.0 - share) * FORCE_N / STIFFNESS + 0.12 * smooth(share))
+            yield
+
+    def note(self) -> None:
+        """Notes the tilt of the box, and the forces on it while it is carried."""
+        up = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 0.0, 1.0))
+        self._tilt_deg = max(self._tilt_deg, math.degrees(math.acos(min(up[2], 1.0))))
+        if self._is_carrying:
+            self._forces.append(min(self._pressure(robot) for robot in FLANGES))
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the box stands at its goal and never tilted, and nobody holds it."""
+        off_m, off_rad = self._error()
+        touched = {touch.other for touch in self.seen.contacts["box"]}
+        return off_m < NEAR_M and off_rad < NEAR_RAD and self._tilt_deg < MAX_TILT_DEG and touched == {"table"}
+
+    def figures(self) -> dict[str, float]:
+        """Returns the error, the largest tilt, and the least and the largest internal force."""
+        off_m, off_rad = self._error()
+        forces = self._forces or [0.0]
+        return {
+            "error [mm]": 1e3 * off_m,
+            "turned by [deg]": math.degrees(off_rad),
+            "largest tilt [deg]": self._tilt_deg,
+            "least force [N]": min(forces),
+            "largest force [N]": max(forces),
+        }
+
+    def _hold(self, box: Pose, gap_m: float) -> None:
+        """Sends both flanges to their sides of the box, with a gap; a negative one presses."""
+        for robot, (side, turn) in FLANGES.items():
+            place = (0.0, side * (HALF_WIDTH_M + gap_m), 0.0)
+            self.put(f"{robot}/hold/target", box @ Pose(place, turn))
+
+    def _carry(self, start: Pose, end: Pose) -> Iterator[None]:
+        """Moves the box along a line; where it is too low, both hands go higher."""
+        count = max(round(norm(minus(end.position, start.position)) / SPEED / 0.02), 25)
+        for share in np.linspace(0.0, 1.0, count):
+            self._hold(between(start, end, smooth(share)), -FORCE_N / STIFFNESS)
+            yield
+
+    def _pressure(self, robot: str) -> float:
+        """Returns the force of an arm on the box, along the way between both flanges [N]."""
+        axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
+        touches = [touch for touch in self.seen.contacts["box"] if touch.other == robot]
+        return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in touches))
+
+    def _error(self) -> tuple[float, float]:
+        box = self.seen.poses["box"]
+        return norm(minus(box.position, self.goal.position)), angle_between(box.quat_xyzw, self.goal.quat_xyzw)
+
+
+def _on_table(random: np.random.Generator) -> Pose:
+    """Returns a random pose of the box on the table."""
+    x, y, yaw = random.uniform((0.55, -0.12, -0.25), (0.68, 0.12, 0.25)).tolist()
+    return Pose((x, y, TABLE_M + HALF_HEIGHT_M), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))

@@ -1,0 +1,267 @@
+"""The base class of scenes, which see a world and act in it without knowing whether it is in this process."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from custom_ros_tools.errors import InterfaceError
+from robot_model.geometry import ZERO, Pose, Vector
+
+
+class Watch(NamedTuple):
+    """What a scene sees of its world.
+
+    Attributes:
+        robots: Robots whose joints it sees.
+        bodies: Bodies whose poses it sees; in their YAML, `base_state_hz` is that of the cycles.
+        wrenches: Force-torque sensors, as `ROBOT/JOINT`.
+        contacts: Bodies whose contact forces it sees; in their YAML, `contacts: {hz: ...}` is that of the cycles.
+    """
+
+    robots: tuple[str, ...]
+    bodies: tuple[str, ...] = ()
+    wrenches: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
+
+
+class SeenWrench(NamedTuple):
+    """Force [N] and torque [N m]."""
+
+    force: Vector = ZERO
+    torque: Vector = ZERO
+
+
+class Touch(NamedTuple):
+    """A contact point of a body.
+
+    Attributes:
+        other: The body that it touches.
+        other_link: Link of the other body.
+        position: Where [m].
+        normal: Unit vector towards the body.
+        normal_force: Force along it [N].
+    """
+
+    other: str
+    other_link: str
+    position: Vector
+    normal: Vector
+    normal_force: float
+
+
+class Seen(NamedTuple):
+    """What a scene sees at the end of a cycle.
+
+    Attributes:
+        time_s: Time since the start of the scene [s].
+        joints: Positions of joints [rad or m] by name, by robot.
+        poses: Poses of the bodies' URDF frames in the world.
+        wrenches: By force-torque sensor, in the axes of the joint's child link.
+        contacts: By body.
+    """
+
+    time_s: float = 0.0
+    joints: Mapping[str, Mapping[str, float]] = {}
+    poses: Mapping[str, Pose] = {}
+    wrenches: Mapping[str, SeenWrench] = {}
+    contacts: Mapping[str, tuple[Touch, ...]] = {}
+
+
+class Put(NamedTuple):
+    """Passes a value to an input before the next tick, see `World.put`: joints and numbers, or a pose."""
+
+    slot: str
+    value: Mapping[str, float] | Pose
+
+
+class Place(NamedTuple):
+    """Puts a body somewhere at once, at rest."""
+
+    name: str
+    pose: Pose
+
+
+class Shove(NamedTuple):
+    """A force [N] in the axes of the world on the origin of a link, `NAME` or `NAME/LINK`, for a time [s]."""
+
+    target: str
+    force: Vector
+    duration_s: float
+
+
+class Switch(NamedTuple):
+    """Stops and starts controllers of a robot, all at one tick."""
+
+    robot: str
+    start: tuple[str, ...]
+    stop: tuple[str, ...]
+
+
+class Vanish(NamedTuple):
+    """Removes a body."""
+
+    name: str
+
+
+Deed = Put | Place | Shove | Switch | Vanish
+"""Something that a scene does to its world."""
+
+
+class SceneFailedError(InterfaceError):
+    """The robots cannot go on, for instance since a target is out of reach; the episode ends as failed."""
+
+
+class Scene(ABC):
+    """What robots do in a world, how it starts, and whether it has worked.
+
+    The world goes on in cycles: the scene sees, acts, and a cycle of ticks follows. All that is random comes from
+    `random`, so that a seed leads to the same episode anywhere.
+
+    Args:
+        random: Random numbers of the episode.
+
+    Attributes:
+        world: Main YAML file of the world.
+        watch: What it sees.
+        cycle_ticks: Ticks of a cycle.
+        longest_s: Time after which an episode ends [s].
+        seen: The newest view of the world, before the first cycle an empty one.
+    """
+
+    world: ClassVar[str]
+    watch: ClassVar[Watch]
+    cycle_ticks: ClassVar[int] = 20
+    longest_s: ClassVar[float] = 30.0
+
+    def __init__(self, random: np.random.Generator) -> None:
+        self.random = random
+        self.seen = Seen()
+        self._deeds: list[Deed] = []
+
+    # --- What a subclass has
+
+    def prepare(self) -> None:  # noqa: B027 (some scenes start as their files say)
+        """Prepares an episode before the first tick, for instance by `place`."""
+
+    @abstractmethod
+    def act(self) -> Iterator[None]:
+        """Acts; each `yield` waits for the next cycle. The scene has seen the world once before.
+
+        Raises:
+            SceneFailedError: If the robots cannot go on.
+        """
+
+    def note(self) -> None:  # noqa: B027 (some scenes look at the end alone)
+        """Notes what happened in a cycle, for figures and success."""
+
+    @abstractmethod
+    def has_succeeded(self) -> bool:
+        """Returns whether it has worked, by what is seen now and was noted."""
+
+    def figures(self) -> dict[str, float]:
+        """Returns numbers that tell how well it worked, by name with unit, such as `error [mm]`."""
+        return {}
+
+    def score(self) -> tuple[int, int]:
+        """Returns how many of how many parts of the task are done; by default the task is one."""
+        return int(self.has_succeeded()), 1
+
+    # --- What it does to the world
+
+    def put(self, slot: str, value: Mapping[str, float] | Pose) -> None:
+        """Passes a value to an input, such as `kuka_lwr/target`, see `Put`."""
+        self._deeds.append(Put(slot, value))
+
+    def place(self, name: str, pose: Pose) -> None:
+        """Puts a body somewhere at once, at rest."""
+        self._deeds.append(Place(name, pose))
+
+    def shove(self, target: str, force: Vector, duration_s: float) -> None:
+        """Has a force [N] act on a link for a time, see `Shove`."""
+        self._deeds.append(Shove(target, force, duration_s))
+
+    def switch(self, robot: str, start: tuple[str, ...] = (), stop: tuple[str, ...] = ()) -> None:
+        """Stops and starts controllers of a robot, all at one tick."""
+        self._deeds.append(Switch(robot, start, stop))
+
+    def vanish(self, name: str) -> None:
+        """Removes a body."""
+        self._deeds.append(Vanish(name))
+
+    def look(self, seen: Seen) -> None:
+        """Sees the world at the end of a cycle."""
+        self.seen = seen
+        self.note()
+
+    def take_deeds(self) -> list[Deed]:
+        """Returns what it did since the last call, in this order."""
+        deeds, self._deeds = self._deeds, []
+        return deeds
+
+    def wait(self, duration_s: float) -> Iterator[None]:
+        """Waits; used as `yield from self.wait(0.5)`."""
+        end_s = self.seen.time_s + duration_s
+        while self.seen.time_s < end_s - 1e-9:
+            yield
+
+
+class Stage(ABC):
+    """Where a scene takes place: a world in this process, or the simulator of a ROS master."""
+
+    @abstractmethod
+    def do(self, deed: Deed) -> None:
+        """Does something to the world, before its next tick.
+
+        Raises:
+            InterfaceError, UnknownNameError or ValueError: If the world refuses it.
+        """
+
+    @abstractmethod
+    def cycle(self) -> None:
+        """Has a cycle of ticks pass, and has the scene look at what is there then."""
+
+
+class SceneResult(NamedTuple):
+    """How an episode ended.
+
+    Attributes:
+        success: Whether it has worked.
+        done: Number of parts of the task that are done.
+        of: Number of all parts.
+        time_s: How long it took [s].
+        figures: Numbers that tell how well it worked.
+        reason: Why the robots could not go on; empty if they could.
+    """
+
+    success: bool
+    done: int
+    of: int
+    time_s: float
+    figures: dict[str, float]
+    reason: str = ""
+
+
+def run_scene(scene: Scene, stage: Stage) -> SceneResult:
+    """Runs an episode of a scene that was prepared, until it has acted or its time is over."""
+    reason = ""
+
+    def cycle() -> None:
+        for deed in scene.take_deeds():
+            stage.do(deed)
+        stage.cycle()
+
+    cycle()
+    try:
+        for _ in scene.act():
+            cycle()
+            if scene.seen.time_s >= scene.longest_s:
+                reason = f"not done after {scene.longest_s:g} s"
+                break
+    except SceneFailedError as error:
+        reason = str(error)
+    success = scene.has_succeeded() and not reason
+    return SceneResult(success, *scene.score(), scene.seen.time_s, scene.figures(), reason)

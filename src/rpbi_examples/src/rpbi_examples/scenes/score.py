@@ -1,0 +1,141 @@
+"""Runs a scene with many seeds, in processes of their own, and tells how often it worked."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi.gym.env import WorldEnv
+
+from .scene import SceneResult
+from .task import make_env, run_episode
+
+COLUMNS, MAX_PICTURES = 4, 24
+"""Columns and largest number of pictures of failures."""
+PICTURE_PX = (320, 240)
+
+
+class SeedResult(NamedTuple):
+    """The episode of a seed.
+
+    Attributes:
+        seed: The seed.
+        result: How it ended.
+        state_hash: Hash of the world's state at its end.
+        picture: What the camera then saw, if it failed: uint8, shape (height, width, 3).
+    """
+
+    seed: int
+    result: SceneResult
+    state_hash: str
+    picture: np.ndarray | None
+
+    def row(self) -> dict[str, Any]:
+        """Returns it as plain data."""
+        result = self.result
+        figures = {name: round(float(value), 4) for name, value in result.figures.items()}
+        return {
+            "seed": self.seed,
+            "success": result.success,
+            "done": result.done,
+            "of": result.of,
+            "time_s": round(result.time_s, 3),
+            **figures,
+            "reason": result.reason,
+            "state_hash": self.state_hash,
+        }
+
+
+def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Iterator[SeedResult]:
+    """Runs a scene with some seeds, and yields the results as they come.
+
+    Args:
+        scene: A name of `SCENES`, or `module:Class`.
+        seeds: The seeds.
+        jobs: Number of processes.
+
+    Raises:
+        InterfaceError: If a process has ended.
+    """
+    if jobs == 1:
+        _open(scene)
+        yield from map(_run, seeds)
+        _close()
+        return
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of small matrices would contend for the processors
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, initializer=_open, initargs=(scene,)) as pool:
+        running = [pool.submit(_run, seed) for seed in seeds]
+        try:
+            for done in as_completed(running):
+                yield done.result()
+        except BrokenProcessPool:
+            raise InterfaceError("a process that ran the scene has ended: its memory may have run out") from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+_env: WorldEnv | None = None
+"""The environment of this process."""
+
+
+def _open(scene: str) -> None:
+    global _env
+    _env = make_env(scene, "rgb_array")
+
+
+def _close() -> None:
+    assert _env is not None
+    _env.close()
+
+
+def _run(seed: int) -> SeedResult:
+    assert _env is not None
+    result = run_episode(_env, seed)
+    return SeedResult(seed, result, _env.world.state_hash(), None if result.success else _env.render())
+
+
+def summary(scene: str, results: Sequence[SeedResult]) -> dict[str, Any]:
+    """Returns the score of a scene as plain data: what is done, of how much, and a row for each seed."""
+    rows = [each.row() for each in sorted(results, key=lambda each: each.seed)]
+    return {
+        "scene": scene,
+        "success": sum(row["done"] for row in rows),
+        "of": sum(row["of"] for row in rows),
+        "seeds": len(rows),
+        "rows": rows,
+    }
+
+
+def write_json(path: Path, found: dict[str, Any]) -> None:
+    """Writes a summary."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def write_failures(path: Path, results: Sequence[SeedResult]) -> bool:
+    """Writes a picture of the ends of failed episodes; returns whether there are any."""
+    failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None][:MAX_PICTURES]
+    if not failed:
+        path.unlink(missing_ok=True)
+        return False
+    width, height = PICTURE_PX
+    sheet = Image.new("RGB", (width * min(COLUMNS, len(failed)), height * -(-len(failed) // COLUMNS)))
+    draw = ImageDraw.Draw(sheet)
+    for index, each in enumerate(failed):
+        corner = (index % COLUMNS * width, index // COLUMNS * height)
+        sheet.paste(Image.fromarray(each.picture).resize(PICTURE_PX), corner)
+        draw.text((corner[0] + 6, corner[1] + 4), f"seed {each.seed}: {each.result.reason or 'failed'}", "red")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    sheet.save(path)
+    return True

@@ -1,0 +1,170 @@
+"""Scenes as tasks of environments, and as episodes in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Fraction, Position, Text
+from robot_model.geometry import Pose
+from rpbi.gym.actions import ActionPart, JointAction
+from rpbi.gym.env import WorldEnv
+from rpbi.gym.parts import ObservationPart, pose_part, robot_of
+from rpbi.gym.task import WorldTask, WorldTaskConfig
+from rpbi.world import World
+
+from . import SCENES
+from .scene import Deed, Place, Put, Scene, SceneResult, Seen, Shove, Stage, Switch, Touch, Watch, SeenWrench, run_scene
+
+TASK = "rpbi_examples.scenes.task:SceneTask"
+
+
+class SceneTaskConfig(WorldTaskConfig):
+    """Options of the task of a scene."""
+
+    scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
+    low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the box that bodies are seen in.")
+    high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
+    speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
+
+
+class SceneTask(WorldTask):
+    """Does what a scene is about: actions move the joints of its robots, or are None, for a scene that acts itself."""
+
+    Config = SceneTaskConfig
+
+    def __init__(self, world: World, config: SceneTaskConfig) -> None:
+        super().__init__(world, config)
+        self._kind: type[Scene] = SCENES.find(config.scene)
+        self.scene = self._kind(np.random.default_rng(0))
+        """The scene of this episode."""
+        self.seed: int | None = None
+        """Seed of scenes from now on; without one, their random numbers are those of the environment."""
+        self._start_tick = 0
+
+    def actions(self) -> Sequence[ActionPart]:
+        """Returns motions of all joints of its robots."""
+        speed, period_s = self.config.speed, self.period_s
+        return [JointAction(self.world, robot, (), speed, period_s) for robot in self._kind.watch.robots]
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Adds the poses of its bodies."""
+        yield from super().parts()
+        for name in self._kind.watch.bodies:
+            yield pose_part(self.world, name, self.config.low, self.config.high)
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Prepares an episode of the scene."""
+        self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
+        self._start_tick = self.world.clock.tick
+        self.scene.prepare()
+        self._do_all()
+        self.scene.seen = self._see()
+        super().reset(random)
+
+    def act(self, action: np.ndarray | None) -> None:
+        """Moves joints; None leaves that to the scene."""
+        if action is not None:
+            super().act(action)
+
+    def reward(self) -> float:
+        """Returns the share of the task that was done in the last action."""
+        before, _ = self.scene.score()
+        self.scene.look(self._see())
+        self._do_all()
+        done, of = self.scene.score()
+        return (done - before) / of
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the scene has worked."""
+        return self.scene.has_succeeded()
+
+    def _see(self) -> Seen:
+        time_s = (self.world.clock.tick - self._start_tick) * self.world.clock.dt_s
+        return see(self.world, self._kind.watch, time_s)
+
+    def _do_all(self) -> None:
+        for deed in self.scene.take_deeds():
+            do(self.world, deed)
+
+
+class EnvStage(Stage):
+    """An environment in which a scene acts.
+
+    Args:
+        env: The environment of a `SceneTask`.
+    """
+
+    def __init__(self, env: WorldEnv) -> None:
+        self._env = env
+
+    def do(self, deed: Deed) -> None:
+        do(self._env.world, deed)
+
+    def cycle(self) -> None:
+        self._env.step(None)
+
+
+def make_env(scene: str, render_mode: str | None = None) -> WorldEnv:
+    """Makes the environment of a scene: a name of `SCENES`, or `module:Class`.
+
+    Raises:
+        UnknownNameError: If there is no such scene.
+        MissingDependency: If it needs an extra.
+    """
+    kind = SCENES.find(scene)
+    task = {"type": TASK, "scene": scene, "action_ticks": kind.cycle_ticks}
+    return WorldEnv(kind.world, task, render_mode=render_mode)
+
+
+def run_episode(env: WorldEnv, seed: int) -> SceneResult:
+    """Runs an episode of a scene in its environment; it is that of the same seed in the scene's launch file."""
+    assert isinstance(env.task, SceneTask)
+    env.task.seed = seed
+    env.reset(seed=seed)
+    return run_scene(env.task.scene, EnvStage(env))
+
+
+def see(world: World, watch: Watch, time_s: float) -> Seen:
+    """Returns what a scene sees of a world."""
+    tick = world.clock.tick
+    joints = {}
+    for name in watch.robots:
+        robot = robot_of(world, name)
+        names = {joint.index: joint.name for joint in robot.model.moving}
+        joints[name] = {names[index]: position for index, position in robot.joint_positions().items()}
+    wrenches = {}
+    for name in watch.wrenches:
+        sensors = robot_of(world, name.partition("/")[0]).force_torque_sensors
+        sample = next(sensor for sensor in sensors if sensor.name == name).read(tick)
+        wrenches[name] = SeenWrench(sample.force, sample.torque) if sample else SeenWrench()
+    contacts = {
+        name: tuple(
+            Touch(point.other_body, point.other_link, point.position, point.normal, point.normal_force)
+            for point in world.contacts.sample(world.bodies[name], tick).points
+        )
+        for name in watch.contacts
+    }
+    poses = {name: world.bodies[name].base_pose() for name in watch.bodies if name in world.bodies}
+    return Seen(time_s, joints, {name: Pose(*pose) for name, pose in poses.items()}, wrenches, contacts)
+
+
+def do(world: World, deed: Deed) -> None:
+    """Does something to a world, before its next tick.
+
+    Raises:
+        InterfaceError, UnknownNameError or ValueError: If the world refuses it.
+    """
+    if isinstance(deed, Put):
+        world.put(deed.slot, deed.value)
+    elif isinstance(deed, Place):
+        world.act(deed.name, "teleport", deed.pose)
+    elif isinstance(deed, Shove):
+        name, _, link = deed.target.partition("/")
+        world.act(name, "push", {"force": deed.force, "link": link, "duration_s": deed.duration_s})
+    elif isinstance(deed, Switch):
+        world.act(deed.robot, "switch_controllers", {"start": deed.start, "stop": deed.stop})
+    else:
+        world.remove(deed.name)
