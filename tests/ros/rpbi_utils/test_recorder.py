@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import Marshaller
 
 import pytest
 import rosbag
@@ -20,6 +21,7 @@ from rosgraph_msgs.msg import Clock
 from second_master import SecondMaster
 from std_msgs.msg import Float64, Int64
 
+from custom_ros_tools.ros.lifecycle.timed_master import allow_large_integers
 from rpbi_utils import Recorder, bag_to_dataframes
 from rpbi_utils.bags.errors import RecordingError
 

@@ -19,7 +19,8 @@ from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 from worlds import iiwa
 
-from ros_pybullet_interface.srv import GetStateHash, ListObjects, StepN
+from ros_pybullet_interface.msg import PlannedInput
+from ros_pybullet_interface.srv import GetStateHash, ListObjects, StepN, StepWithInputs
 from rpbi.ros.tick_listener import TickListener
 
 DOCS = Path(__file__).resolve().parents[4] / "docs" / "time.md"
@@ -62,6 +63,36 @@ def test_every_tick_is_told_and_counted(ros, stopped):
     wait_until(lambda: joint_states.stamps_ns[-1] == answer.stamp.to_nsec(), "the last tick arrives")
     told = [stamp for stamp in joint_states.stamps_ns if stamp > before.stamp.to_nsec()]
     assert told == [before.stamp.to_nsec() + 1_000_000 * (index + 1) for index in range(500)]
+
+
+def test_inputs_act_before_their_ticks(ros, stopped):
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    joint_states.wait_for(1)
+    joint = ["lbr_iiwa_joint_1"]
+    there, back = (PlannedInput(tick, "iiwa/target", joint, [goal]) for tick, goal in ((0, 0.3), (300, -0.3)))
+    answer = ros.call("/rpbi/step_with_inputs", StepWithInputs, 600, [back, there])
+    assert answer.success, answer.message
+    wait_until(lambda: joint_states.stamps_ns[-1] == answer.stamp.to_nsec(), "the last tick arrives")
+    positions = [message.position[0] for message in joint_states.messages[-600:]]
+    assert positions[299] == pytest.approx(0.3, abs=1e-3) and positions[301] < 0.3 - 1e-3
+    assert positions[-1] == pytest.approx(-0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "planned, expected",
+    [
+        (PlannedInput(5, "iiwa/target", ["lbr_iiwa_joint_1"], [0.0]), "iiwa/target: expected a tick below 5, got 5"),
+        (PlannedInput(0, "iiwa/aim", [], []), "unknown input 'iiwa/aim'"),
+        (PlannedInput(0, "iiwa/target", ["elbow"], [0.0]), "elbow"),
+        (PlannedInput(0, "iiwa/target", ["lbr_iiwa_joint_1"], []), "expected a value for each of 1 names, got 0"),
+        (PlannedInput(0, "iiwa/target", ["lbr_iiwa_joint_1"], [float("nan")]), "finite"),
+    ],
+)
+def test_inputs_that_are_refused_are_named_and_nothing_moves(ros, stopped, planned, expected):
+    before = ros.call("/rpbi/get_state_hash", GetStateHash)
+    answer = ros.call("/rpbi/step_with_inputs", StepWithInputs, 5, [planned])
+    assert not answer.success and expected in answer.message
+    assert ros.call("/rpbi/get_state_hash", GetStateHash).state_hash == before.state_hash
 
 
 def test_many_steps_end_where_single_steps_do(ros, tmp_path):

@@ -44,8 +44,13 @@ class Arm:
         joints = self._scene.seen.joints[self._robot]
         return self._base @ self._solver.chain.pose([joints[name] for name in self.joint_names])
 
-    def send(self, pose: Pose) -> None:
-        """Sends the link to a pose in the world, near the last one.
+    @property
+    def positions(self) -> list[float]:
+        """The last positions that the joints were sent to [rad or m]."""
+        return list(self._positions)
+
+    def positions_at(self, pose: Pose) -> list[float]:
+        """Returns positions of the joints for a pose in the world, near the last ones [rad or m].
 
         Raises:
             SceneFailedError: If it is out of reach.
@@ -55,7 +60,15 @@ class Arm:
         if not found.success:
             place = ", ".join(f"{each:.3f}" for each in pose.position)
             raise SceneFailedError(f"{self._robot}: ({place}) m is out of reach: {found.message}")
-        self._positions = list(found.positions)
+        return list(found.positions)
+
+    def send(self, pose: Pose) -> None:
+        """Sends the link to a pose in the world, near the last one.
+
+        Raises:
+            SceneFailedError: If it is out of reach.
+        """
+        self._positions = self.positions_at(pose)
         self.target = pose
         self._scene.put(self._slot, dict(zip(self.joint_names, self._positions)))
 

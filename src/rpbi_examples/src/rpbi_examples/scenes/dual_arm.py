@@ -12,26 +12,28 @@ from robot_model.geometry import (
     Vector,
     angle_between,
     dot,
-    norm,
     minus,
+    norm,
     plus,
-    quaternion_product,
     rotated,
-    scaled,
 )
 
 from .arm import between, smooth
-from .scene import Scene, Watch
+from .scene import Scene, Touch, Watch
 
 HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
 """Half the way between the faces that are pressed, height of the table, half the height of the box."""
 STIFFNESS = 3000.0
 """Stiffness of the hands, as in configs/dual_arm/iiwa.yaml [N/m]."""
-FORCE_N = 60.0
-"""Force with which both hands press: the internal force, which moves nothing."""
+FORCE_N, MAX_CHANGE = 80.0, 0.3
+"""Force with which both hands press, the internal force, which moves nothing; and its largest change, as a share,
+over 95 % of the way."""
+MASSES_KG = (1.0, 3.0)
 LIFT_M = 0.2
-SPEED = 0.12
+SPEED = 0.1
 """Mean speed of the box [m/s]."""
+SHORTEST_S, CYCLE_S = 1.5, 0.02
+"""Least time of a motion, and time of a cycle [s]."""
 NEAR_M, NEAR_RAD = 0.02, math.radians(5.0)
 """Error within which the box is at its goal."""
 MAX_TILT_DEG = 3.0
@@ -53,10 +55,12 @@ class DualArm(Scene):
         self.goal = _on_table(random)
         self._tilt_deg, self._is_carrying = 0.0, False
         self._forces: list[float] = []
+        self._shares: list[float] = []
 
     def prepare(self) -> None:
-        """Puts the box somewhere on the table."""
+        """Puts a box of some mass somewhere on the table."""
         self.place("box", _on_table(self.random))
+        self.change("box", mass=float(self.random.uniform(*MASSES_KG)))
 
     def act(self) -> Iterator[None]:
         """Approaches, presses, lifts, carries, lowers and lets go."""
@@ -82,23 +86,28 @@ class DualArm(Scene):
         self._tilt_deg = max(self._tilt_deg, math.degrees(math.acos(min(up[2], 1.0))))
         if self._is_carrying:
             self._forces.append(min(self._pressure(robot) for robot in FLANGES))
+            left, right = (sum(touch.force[2] for touch in self._touches(robot)) for robot in FLANGES)
+            self._shares.append(left / max(left + right, 1.0))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the box stands at its goal and never tilted, and nobody holds it."""
+        """Returns whether the box stands at its goal alone, never tilted, and was pressed with a constant force."""
         off_m, off_rad = self._error()
         touched = {touch.other for touch in self.seen.contacts["box"]}
-        return off_m < NEAR_M and off_rad < NEAR_RAD and self._tilt_deg < MAX_TILT_DEG and touched == {"table"}
+        is_there = off_m < NEAR_M and off_rad < NEAR_RAD and touched == {"table"}
+        is_held = np.quantile(np.abs(np.array(self._forces or [0.0]) - FORCE_N), 0.95) < MAX_CHANGE * FORCE_N
+        return bool(is_there and is_held) and self._tilt_deg < MAX_TILT_DEG
 
     def figures(self) -> dict[str, float]:
-        """Returns the error, the largest tilt, and the least and the largest internal force."""
+        """Returns the error, the largest tilt, the internal force, and who carries."""
         off_m, off_rad = self._error()
-        forces = self._forces or [0.0]
+        low, high = np.quantile(self._forces or [0.0], (0.025, 0.975))
         return {
             "error [mm]": 1e3 * off_m,
             "turned by [deg]": math.degrees(off_rad),
             "largest tilt [deg]": self._tilt_deg,
-            "least force [N]": min(forces),
-            "largest force [N]": max(forces),
+            "force from [N]": float(low),
+            "to [N]": float(high),
+            "left carries [%]": 100.0 * float(np.mean(self._shares or [0.0])),
         }
 
     def _hold(self, box: Pose, gap_m: float) -> None:
@@ -108,8 +117,8 @@ class DualArm(Scene):
             self.put(f"{robot}/hold/target", box @ Pose(place, turn))
 
     def _carry(self, start: Pose, end: Pose) -> Iterator[None]:
-        """Moves the box along a line; where it is too low, both hands go higher."""
-        count = max(round(norm(minus(end.position, start.position)) / SPEED / 0.02), 25)
+        """Moves the box along a line."""
+        count = round(max(norm(minus(end.position, start.position)) / SPEED, SHORTEST_S) / CYCLE_S)
         for share in np.linspace(0.0, 1.0, count):
             self._hold(between(start, end, smooth(share)), -FORCE_N / STIFFNESS)
             yield
@@ -117,8 +126,10 @@ class DualArm(Scene):
     def _pressure(self, robot: str) -> float:
         """Returns the force of an arm on the box, along the way between both flanges [N]."""
         axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
-        touches = [touch for touch in self.seen.contacts["box"] if touch.other == robot]
-        return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in touches))
+        return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in self._touches(robot)))
+
+    def _touches(self, robot: str) -> list[Touch]:
+        return [touch for touch in self.seen.contacts["box"] if touch.other == robot]
 
     def _error(self) -> tuple[float, float]:
         box = self.seen.poses["box"]
@@ -127,5 +138,5 @@ class DualArm(Scene):
 
 def _on_table(random: np.random.Generator) -> Pose:
     """Returns a random pose of the box on the table."""
-    x, y, yaw = random.uniform((0.55, -0.12, -0.25), (0.68, 0.12, 0.25)).tolist()
+    x, y, yaw = random.uniform((0.5, -0.08, -0.25), (0.6, 0.08, 0.25)).tolist()
     return Pose((x, y, TABLE_M + HALF_HEIGHT_M), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))

@@ -20,12 +20,14 @@ class Watch(NamedTuple):
         bodies: Bodies whose poses it sees; in their YAML, `base_state_hz` is that of the cycles.
         wrenches: Force-torque sensors, as `ROBOT/JOINT`.
         contacts: Bodies whose contact forces it sees; in their YAML, `contacts: {hz: ...}` is that of the cycles.
+        tags: Detectors of AprilTags, as their `topic`; in their YAML, `hz` is that of the cycles, without latency.
     """
 
     robots: tuple[str, ...]
     bodies: tuple[str, ...] = ()
     wrenches: tuple[str, ...] = ()
     contacts: tuple[str, ...] = ()
+    tags: tuple[str, ...] = ()
 
 
 class SeenWrench(NamedTuple):
@@ -44,6 +46,7 @@ class Touch(NamedTuple):
         position: Where [m].
         normal: Unit vector towards the body.
         normal_force: Force along it [N].
+        force: The whole force on the body, with friction [N].
     """
 
     other: str
@@ -51,6 +54,7 @@ class Touch(NamedTuple):
     position: Vector
     normal: Vector
     normal_force: float
+    force: Vector = ZERO
 
 
 class Seen(NamedTuple):
@@ -62,6 +66,7 @@ class Seen(NamedTuple):
         poses: Poses of the bodies' URDF frames in the world.
         wrenches: By force-torque sensor, in the axes of the joint's child link.
         contacts: By body.
+        tags: Poses in the world of the AprilTags that detectors see, by number; z points out of the tag.
     """
 
     time_s: float = 0.0
@@ -69,6 +74,7 @@ class Seen(NamedTuple):
     poses: Mapping[str, Pose] = {}
     wrenches: Mapping[str, SeenWrench] = {}
     contacts: Mapping[str, tuple[Touch, ...]] = {}
+    tags: Mapping[int, Pose] = {}
 
 
 class Put(NamedTuple):
@@ -93,6 +99,13 @@ class Shove(NamedTuple):
     duration_s: float
 
 
+class Change(NamedTuple):
+    """Changes dynamics of a body or a link, `NAME` or `NAME/LINK`, by keys of `changeDynamics` such as `mass`."""
+
+    target: str
+    values: Mapping[str, float]
+
+
 class Switch(NamedTuple):
     """Stops and starts controllers of a robot, all at one tick."""
 
@@ -101,13 +114,20 @@ class Switch(NamedTuple):
     stop: tuple[str, ...]
 
 
+class Tune(NamedTuple):
+    """Changes keys of a controller, `ROBOT/CONTROLLER`, as its service `set_gains` does."""
+
+    target: str
+    values: Mapping[str, float | Vector]
+
+
 class Vanish(NamedTuple):
     """Removes a body."""
 
     name: str
 
 
-Deed = Put | Place | Shove | Switch | Vanish
+Deed = Put | Place | Shove | Change | Switch | Tune | Vanish
 """Something that a scene does to its world."""
 
 
@@ -184,9 +204,17 @@ class Scene(ABC):
         """Has a force [N] act on a link for a time, see `Shove`."""
         self._deeds.append(Shove(target, force, duration_s))
 
+    def change(self, target: str, **values: float) -> None:
+        """Changes dynamics of a body or a link, such as `mass` [kg] or `lateralFriction`, see `Change`."""
+        self._deeds.append(Change(target, values))
+
     def switch(self, robot: str, start: tuple[str, ...] = (), stop: tuple[str, ...] = ()) -> None:
         """Stops and starts controllers of a robot, all at one tick."""
         self._deeds.append(Switch(robot, start, stop))
+
+    def tune(self, target: str, **values: float | Vector) -> None:
+        """Changes keys of a controller, such as `force` [N]; an active one begins again where the robot is."""
+        self._deeds.append(Tune(target, values))
 
     def vanish(self, name: str) -> None:
         """Removes a body."""

@@ -13,10 +13,27 @@ from rpbi.gym.actions import ActionPart, JointAction
 from rpbi.gym.env import WorldEnv
 from rpbi.gym.parts import ObservationPart, pose_part, robot_of
 from rpbi.gym.task import WorldTask, WorldTaskConfig
+from rpbi.sensors.tracking.april_tags import AprilTagsSensor
 from rpbi.world import World
 
 from . import SCENES
-from .scene import Deed, Place, Put, Scene, SceneResult, Seen, Shove, Stage, Switch, Touch, Watch, SeenWrench, run_scene
+from .scene import (
+    Change,
+    Deed,
+    Place,
+    Put,
+    Scene,
+    SceneResult,
+    Seen,
+    SeenWrench,
+    Shove,
+    Stage,
+    Switch,
+    Touch,
+    Tune,
+    Watch,
+    run_scene,
+)
 
 TASK = "rpbi_examples.scenes.task:SceneTask"
 
@@ -142,13 +159,23 @@ def see(world: World, watch: Watch, time_s: float) -> Seen:
         wrenches[name] = SeenWrench(sample.force, sample.torque) if sample else SeenWrench()
     contacts = {
         name: tuple(
-            Touch(point.other_body, point.other_link, point.position, point.normal, point.normal_force)
+            Touch(point.other_body, point.other_link, point.position, point.normal, point.normal_force, point.force)
             for point in world.contacts.sample(world.bodies[name], tick).points
         )
         for name in watch.contacts
     }
     poses = {name: world.bodies[name].base_pose() for name in watch.bodies if name in world.bodies}
-    return Seen(time_s, joints, {name: Pose(*pose) for name, pose in poses.items()}, wrenches, contacts)
+    tags = dict(_tags(world, watch)) if watch.tags else {}
+    return Seen(time_s, joints, {name: Pose(*pose) for name, pose in poses.items()}, wrenches, contacts, tags)
+
+
+def _tags(world: World, watch: Watch) -> Iterator[tuple[int, Pose]]:
+    """Yields the numbers and the poses in the world of the tags that detectors see."""
+    for sensor in (sensor for name in world.bodies for sensor in world.sensors_of(name)):
+        if isinstance(sensor, AprilTagsSensor) and sensor.topic in watch.tags:
+            sample, camera = sensor.read(world.clock.tick), world.cameras[sensor.config.camera].pose
+            for tag in sample.tags if sample and camera else ():
+                yield tag.id, Pose(*camera) @ Pose(*tag.pose)
 
 
 def do(world: World, deed: Deed) -> None:
@@ -164,7 +191,14 @@ def do(world: World, deed: Deed) -> None:
     elif isinstance(deed, Shove):
         name, _, link = deed.target.partition("/")
         world.act(name, "push", {"force": deed.force, "link": link, "duration_s": deed.duration_s})
+    elif isinstance(deed, Change):
+        world.change_dynamics(deed.target, deed.values)
     elif isinstance(deed, Switch):
         world.act(deed.robot, "switch_controllers", {"start": deed.start, "stop": deed.stop})
+    elif isinstance(deed, Tune):
+        robot, _, name = deed.target.partition("/")
+        config = robot_of(world, robot).controllers.config(name)
+        changed = type(config).parse({**config.model_dump(exclude_unset=True), **deed.values}, deed.target)
+        world.act(robot, "set_controller_gains", {"name": name, "config": changed})
     else:
         world.remove(deed.name)

@@ -67,9 +67,9 @@ def score(
 
 
 def _numbers(text: str) -> range:
-    first, _, last = text.partition("-")
+    ends = text.split("-")
     try:
-        numbers = range(int(first), int(last or first) + 1)
+        numbers = range(int(ends[0]), int(ends[-1]) + 1) if len(ends) <= 2 else range(0)
     except ValueError:
         numbers = range(0)
     if not numbers:

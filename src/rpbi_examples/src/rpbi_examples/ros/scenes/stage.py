@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
 from typing import Any
 
 import rospy
+from apriltag_ros.msg import AprilTagDetectionArray
 from cob_srvs.srv import SetString
 from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Point, Vector3, Wrench, WrenchStamped
@@ -16,16 +18,32 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.services import get_srv_handler
-from custom_ros_tools.ros.transform_messages import transform_message
-from robot_model.geometry import Pose, Vector
+from custom_ros_tools.ros.tf_interface import TfInterface
+from custom_ros_tools.ros.transform_messages import as_pose, transform_message
+from robot_model.geometry import Pose, Vector, plus, scaled
 from ros_pybullet_interface.msg import Contacts, PlannedInput
-from ros_pybullet_interface.srv import ApplyWrench, GetStateHash, StepWithInputs, SwitchControllers
+from ros_pybullet_interface.srv import ApplyWrench, ChangeDynamics, GetStateHash, StepWithInputs, SwitchControllers
 from rpbi.ros.services.prediction import POSE_NAMES
 from rpbi.ros.tick_listener import TickListener
-from rpbi_examples.scenes.scene import Deed, Place, Put, Scene, Seen, SeenWrench, Shove, Stage, Switch, Touch, Watch
+from rpbi_examples.scenes.scene import (
+    Change,
+    Deed,
+    Place,
+    Put,
+    Scene,
+    Seen,
+    SeenWrench,
+    Shove,
+    Stage,
+    Switch,
+    Touch,
+    Tune,
+    Watch,
+)
 
 PATIENCE_S = 20.0
 """Longest wait for the messages of a tick, of wall time [s]."""
+WORLD = "rpbi/world"
 LATE_S = 0.1
 """Time that is made up for after a delay [s]."""
 
@@ -51,7 +69,10 @@ class SimulatorStage(Stage):
         topics |= {f"rpbi/{name}/base_state": Odometry for name in watch.bodies}
         topics |= {f"rpbi/{name}/ft_sensor": WrenchStamped for name in watch.wrenches}
         topics |= {f"rpbi/{name}/contacts": Contacts for name in watch.contacts}
+        topics |= {topic: AprilTagDetectionArray for topic in watch.tags}
         self._listener = TickListener(topics)
+        self._tf = TfInterface() if watch.tags else None
+        self._cameras: dict[str, Pose] = {}
         before, after = (self._step(ticks).stamp.to_sec() for ticks in (0, 1))
         self._dt_s = round(after - before, 9)
 
@@ -75,8 +96,12 @@ class SimulatorStage(Stage):
         elif isinstance(deed, Shove):
             force = Wrench(force=Vector3(*deed.force))
             self._ask("rpbi/apply_wrench", ApplyWrench, deed.target, force, Point(), "", deed.duration_s)
+        elif isinstance(deed, Change):
+            self._ask("rpbi/change_dynamics", ChangeDynamics, deed.target, json.dumps(deed.values))
         elif isinstance(deed, Switch):
             self._ask(f"rpbi/{deed.robot}/switch_controllers", SwitchControllers, deed.start, deed.stop)
+        elif isinstance(deed, Tune):
+            self._ask(f"rpbi/{deed.target}/set_gains", SetString, json.dumps(deed.values))
         else:
             self._ask("rpbi/remove_pybullet_object", SetString, deed.name)
 
@@ -120,7 +145,22 @@ class SimulatorStage(Stage):
             {name: _pose(found[f"rpbi/{name}/base_state"].pose.pose) for name in watch.bodies},
             {name: SeenWrench(_vector(each.force), _vector(each.torque)) for name, each in wrenches.items()},
             {name: tuple(map(_touch, found[f"rpbi/{name}/contacts"].points)) for name in watch.contacts},
+            {
+                detection.id[0]: self._camera(found[topic].header.frame_id) @ _pose(detection.pose.pose.pose)
+                for topic in watch.tags
+                for detection in found[topic].detections
+            },
         )
+
+    def _camera(self, frame: str) -> Pose:
+        """Returns where a camera, which stands still, is in the world."""
+        if frame not in self._cameras:
+            assert self._tf is not None
+            message = self._tf.wait_for_tf_msg(WORLD, frame, PATIENCE_S)
+            if message is None:
+                raise InterfaceError(f"no TF of the camera from '{WORLD}' to '{frame}' within {PATIENCE_S:g} s")
+            self._cameras[frame] = _pose(as_pose(message.transform))
+        return self._cameras[frame]
 
 
 def _pose(message: Any) -> Pose:
@@ -134,4 +174,7 @@ def _vector(message: Any) -> Vector:
 
 def _touch(point: Any) -> Touch:
     place, normal = _vector(point.position), _vector(point.normal)
-    return Touch(point.other_body, point.other_link, place, normal, point.normal_force)
+    first = scaled(point.friction_force_1, _vector(point.friction_direction_1))
+    second = scaled(point.friction_force_2, _vector(point.friction_direction_2))
+    force = plus(scaled(point.normal_force, normal), plus(first, second))
+    return Touch(point.other_body, point.other_link, place, normal, point.normal_force, force)
