@@ -29,7 +29,7 @@ def terminal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminal]:
 @pytest.mark.parametrize(
     ("typed", "line"),
     [
-        ("./rpbi la\t", "./rpbi launch"),
+        ("./rpbi lau\t", "./rpbi launch"),
         (f"{ROOT}/rpbi che\t", f"{ROOT}/rpbi check"),
         ("./rpbi launch gras\t", "./rpbi launch grasp_example"),
         ("./rpbi launch grasp_example real\t0", "./rpbi launch grasp_example real_time_factor:=0"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot_model.geometry import Pose, minus, norm, plus
-from rpbi_examples.scenes.arm import Arm
-from rpbi_examples.scenes.scene import Scene, Watch
+from rpbi_examples.scenes.parts.arm import LedArm
+from rpbi_examples.scenes.scene import Scene, Watched
 
 WAY = (0.0, 0.1, 0.05)
 TOLERANCE_M = 0.005
@@ -16,11 +16,11 @@ class Writing(Scene):
     """Leads the tip along a line of random length."""
 
     world = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
-    watch = Watch(robots=("kuka_lwr",))
+    watch = Watched(robots=("kuka_lwr",))
     longest_s = 5.0
 
     def act(self) -> Iterator[None]:
-        self._arm = Arm(self, "kuka_lwr", "{rpbi_examples}/robots/kuka_lwr.urdf", "base", "end_effector_ball")
+        self._arm = LedArm(self, "kuka_lwr", "{rpbi_examples}/robots/kuka_lwr.urdf", "base", "end_effector_ball")
         length = self.random.uniform(0.5, 1.0)
         goal = plus(self._arm.target.position, tuple(length * each for each in WAY))
         self._goal = Pose(goal, self._arm.target.quat_xyzw)

@@ -40,7 +40,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
         ValueError: If there is no such file, or the package is unknown.
     """
     _refuse_long(name)
-    path = _resolve_package(name)
+    path = resolve_package(name)
     folders = [*search_paths, *pybullet_data()]
     if not file.startswith("~"):
         folders.insert(0, str(Path(file).resolve().parent))
@@ -88,7 +88,7 @@ def find_folder(name: str, file: str) -> str:
         if not (folders := pybullet_data()):
             raise ValueError(str(MissingDependency("pybullet_data", "./rpbi setup")))
         return folders[0]
-    folder = _resolve_package(name)
+    folder = resolve_package(name)
     if not folder.is_absolute() and not file.startswith("~"):
         folder = Path(file).resolve().parent / folder
     if not folder.is_dir():
@@ -108,7 +108,12 @@ def _refuse_long(path: str) -> None:
         raise ValueError(f"expected a path of at most {LONGEST_PATH} bytes, got {shortened(path)}")
 
 
-def _resolve_package(name: str) -> Path:
+def resolve_package(name: str) -> Path:
+    """Returns the path that `{package}/path` or `package://package/path` stands for; other paths stay as they are.
+
+    Raises:
+        ValueError: If there is no such package, or the extra `assets` is not installed.
+    """
     for prefix in (f"{{{ASSETS}}}/", f"package://{ASSETS}/"):
         if name.startswith(prefix):
             return _assets() / name.removeprefix(prefix)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.render.camera import looking_at
 from rpbi.render.frame import Camera, Frame
-from rpbi.render.messages import Scene
+from rpbi.render.messages import DrawnScene
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import Renderer, open_renderer
 
@@ -67,7 +67,7 @@ class CameraImages:
         known = Camera.of(sensor.config, sensor.topic_name)
         self._renderer.make_room(known.intrinsics)
         body_ids = {name: body.body_id for name, body in world.bodies.items()}
-        return self._mirror.frame(self._renderer, Scene(sample, body_ids), known, STREAMS)
+        return self._mirror.frame(self._renderer, DrawnScene(sample, body_ids), known, STREAMS)
 
     def close(self) -> None:
         """Disconnects from PyBullet and deletes the files that it made."""

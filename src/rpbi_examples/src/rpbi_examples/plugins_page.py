@@ -16,6 +16,7 @@ from rpbi.control.controllers import CONTROLLERS
 from rpbi.gym.tasks import TASKS as GYM_TASKS
 from rpbi.reference.markdown import WRITTEN_BY, code, page, table
 from rpbi.sensors import SENSOR_TYPES
+from rpbi_examples.scenes import SCENES
 from safe_robot.checks import CHECKS
 
 TABLES: tuple[tuple[str, PluginTable, str], ...] = (
@@ -25,6 +26,7 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
     ("Solvers", SOLVERS, "[solvers](ik_solvers.md)"),
     ("Tasks", TASKS, "[tasks](ik_tasks.md)"),
     ("Tasks of environments", GYM_TASKS, "[environments](gym.md)"),
+    ("Scenes", SCENES, "[examples](examples.md)"),
     ("Devices", DEVICES, "[devices](devices.md)"),
     ("Haptic devices", HAPTIC_DEVICES, "[haptics](haptics.md)"),
     ("Mappings", MAPPINGS, "[teleoperation](teleoperation.md)"),

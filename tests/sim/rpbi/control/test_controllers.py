@@ -13,12 +13,13 @@ import pytest
 from worlds import FLOOR, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
+from robot_model.geometry import rotation_between
 from rpbi.control.controllers import Controller
 from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.controllers.controller import SetPoints
 from rpbi.control.controllers.manager import ControllerSwitch, ControllerUpdate
 from rpbi.control.joint_command import JointCommand
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, Twist
 from rpbi.world import World
 from rpbi.world.actions import TimedGoal
 from rpbi.world.saved.command_log import RecordedCommand
@@ -88,6 +89,17 @@ class Follows(Controller):
 
     def compute(self, state, targets, tick):
         return SetPoints(self._start + 0.2 * (tick + 1 - self._tick) * self.arm.dt_s)
+
+
+class SeesItsBase(Controller):
+    """Notes pose and twist of its base, and leaves its joints alone."""
+
+    def start(self, state, tick):
+        self.seen = []
+
+    def compute(self, state, targets, tick):
+        self.seen.append((state.base, state.base_twist))
+        return np.zeros(len(self.arm.chosen))
 
 
 @pytest.fixture
@@ -395,6 +407,31 @@ def test_a_session_with_controllers_is_the_same_again(build):
             apply_command(second, waiting.pop(0))
         second.step()
     assert second.state_hash() == first.state_hash()
+
+
+def test_a_controller_sees_how_a_floating_base_moves(build):
+    thrown = {"linearVelocity": [0.5, 0.0, 2.0], "angularVelocity": [0.0, 1.0, 0.5]}
+    world = build(
+        lwr(
+            loadURDF={"useFixedBase": False, "basePosition": [0.0, 0.0, 3.0]},
+            resetBaseVelocity=thrown,
+            controllers={"look": wrong("SeesItsBase")},
+        )
+    )
+    run(world, 200)
+    seen = world.bodies["lwr"].controllers.of("look").seen
+    (before, _), (base, twist), (after, _) = seen[-3:]
+    way = (np.array(after.position) - before.position) / 0.002
+    assert twist.linear == pytest.approx(way, abs=2e-3)  # between two steps of gravity and rounded positions
+    spin = np.array(rotation_between(before.quat_xyzw, after.quat_xyzw)) / 0.002
+    assert twist.angular == pytest.approx(spin, abs=2e-2)
+    assert np.linalg.norm(twist.linear) > 0.3 and np.linalg.norm(twist.angular) > 0.3
+
+
+def test_a_fixed_base_has_no_twist(build):
+    world = build(lwr(controllers={"look": wrong("SeesItsBase")}))
+    run(world, 3)
+    assert {twist for _, twist in world.bodies["lwr"].controllers.of("look").seen} == {Twist()}
 
 
 def test_the_controller_of_the_page_works(build, tmp_path, monkeypatch):

@@ -18,10 +18,11 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import UnknownNameError
 from robot_model.geometry import Pose
 from rpbi_examples.ros.console import score as command
-from rpbi_examples.scenes.arm import between, smooth
+from rpbi_examples.scenes.parts.arm import between, smooth
 from rpbi_examples.scenes.score import run_seeds, summary, write_failures
 from rpbi_examples.scenes.task import make_env, run_episode
 
+CONSOLE = Path(__file__).resolve().parents[4] / "src/custom_ros_tools/nodes/console"
 SCENE = "writing_scene:Writing"
 
 
@@ -32,19 +33,13 @@ def env():
     found.close()
 
 
-ELSEWHERE = """
-from pathlib import Path
-from rpbi_examples.ros.console.score import score
-score("writing_scene:Writing", seeds="5-6", jobs=2, json=Path("found.json"))
-"""
-
-
 def test_a_seed_leads_to_the_same_episode_in_any_order_and_process(env, tmp_path, monkeypatch):
     first = run_episode(env, 5), env.world.state_hash()
     run_episode(env, 6)
     assert (run_episode(env, 5), env.world.state_hash()) == first
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(Path(writing_scene.__file__).parent), *sys.path)))
-    subprocess.run([sys.executable, "-c", ELSEWHERE], cwd=tmp_path, check=True, capture_output=True)
+    options = ["--seeds", "5-6", "--jobs", "2", "--json", "found.json"]
+    subprocess.run([sys.executable, str(CONSOLE), "score", SCENE, *options], cwd=tmp_path, check=True)
     row, _ = json.loads((tmp_path / "found.json").read_text())["rows"]
     assert (row["state_hash"], row["time_s"]) == (first[1], first[0].time_s)
 

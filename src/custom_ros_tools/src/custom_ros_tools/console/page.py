@@ -34,7 +34,7 @@ source ~/rpbi/tools/completion.bash
 `{PROGRAM} shell` has it already. It works for every checkout, called as `{PROGRAM}`, `rpbi` or by its path.
 
 ```
-$ {PROGRAM} la<Tab> bas<Tab>_ku<Tab> real<Tab>0.5
+$ {PROGRAM} lau<Tab> bas<Tab>_ku<Tab> real<Tab>0.5
 $ {PROGRAM} launch basic_example_kuka_lwr real_time_factor:=0.5
 ```
 """

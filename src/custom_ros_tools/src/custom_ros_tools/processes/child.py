@@ -1,10 +1,12 @@
-"""Child processes that end when their parent does, even if that is killed."""
+"""Child processes: they end when their parent does, even if that is killed, and can be killed with their own."""
 
+import contextlib
 import fcntl
 import os
 import signal
 import subprocess
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 
@@ -37,3 +39,22 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
         os.close(reading)
     process.stdin = open(writing, "wb", buffering=0)
     return process
+
+
+def kill_with_children(process: subprocess.Popen) -> None:
+    """Kills a process and its children, each of which leads a process group, as `roslaunch` and its nodes do."""
+    for pid in (process.pid, *_children(process.pid)):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(pid, signal.SIGKILL)
+    process.wait()
+
+
+def _children(parent: int) -> list[int]:
+    """Returns the ids of a process's children; see proc_pid_stat(5)."""
+    children = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has just ended
+            _, ppid, *_ = path.read_text().rpartition(")")[2].split()
+            if int(ppid) == parent:
+                children.append(int(path.parent.name))
+    return children

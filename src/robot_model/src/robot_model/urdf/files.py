@@ -7,6 +7,7 @@ from pathlib import Path
 from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from custom_ros_tools.processes.temporary import temporary_folder
+from robot_model.asset_files import resolve_package
 
 PACKAGE = "package://"
 
@@ -76,10 +77,10 @@ def mesh_file(mesh: str, source: Path) -> Path:
     """
     mesh = _with_two_slashes(mesh)
     try:
-        file = source.parent / replace_package(mesh)
+        file = source.parent / resolve_package(mesh)
         problems = [] if file.is_file() else [Problem(str(source), mesh, f"no such file: {file}")]
-    except ConfigError as error:
-        problems = [Problem(str(source), mesh, problem.message) for problem in error.problems]
+    except ValueError as error:
+        problems = [Problem(str(source), mesh, str(error))]
     if not problems:
         return file
     found = _near(mesh, source)

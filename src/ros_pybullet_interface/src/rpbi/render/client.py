@@ -19,9 +19,9 @@ from .messages import (
     CameraAdded,
     CameraRemoved,
     Demanded,
+    DrawnScene,
     Ready,
     Report,
-    Scene,
     SceneAccepted,
     SetUp,
     Shown,
@@ -79,7 +79,7 @@ class RenderClient:
         self._started_s = 0.0
         self._start_at_s = 0.0
         self._failures = 0
-        self._last: dict[str, Scene] = {}
+        self._last: dict[str, DrawnScene] = {}
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
             Ready: self._on_ready,
@@ -154,7 +154,7 @@ class RenderClient:
 
     def send(self, sample: SceneSample) -> None:
         """Has a scene drawn, or a newer one in its place if the renderer is not ready for it in time."""
-        self._waiting[sample.name] = Scene(sample, dict(self._body_ids()))
+        self._waiting[sample.name] = DrawnScene(sample, dict(self._body_ids()))
         self._send_waiting(sample.name)
 
     def serve_late(self) -> None:
@@ -250,7 +250,7 @@ class RenderClient:
         self.wanted = frozenset()
         self._demands: dict[str, Demand] = {}
         self._unread = LoadLogReader(self._log)
-        self._waiting: dict[str, Scene] = {}
+        self._waiting: dict[str, DrawnScene] = {}
         self._under_way: set[str] = set()
         self._served: dict[str, int] = {}
         self._shown_ns: dict[str, int] = {}

@@ -34,7 +34,7 @@ class WorldChanged(NamedTuple):
     entries: tuple[LogEntry, ...]
 
 
-class Scene(NamedTuple):
+class DrawnScene(NamedTuple):
     """To the renderer: a tick to draw.
 
     Attributes:

@@ -17,7 +17,7 @@ from rpbi.world.load_log import LogEntry, apply
 
 from .camera import depth_in_metres
 from .frame import Camera, Frame
-from .messages import Scene
+from .messages import DrawnScene
 from .renderers import Renderer
 
 log = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ class Mirror:
             if not state.nodes:
                 self.pose(state)
 
-    def frame(self, renderer: Renderer, scene: Scene, camera: Camera, streams: Collection[str]) -> Frame:
+    def frame(self, renderer: Renderer, scene: DrawnScene, camera: Camera, streams: Collection[str]) -> Frame:
         """Returns the frame of a camera for a scene.
 
         Args:

@@ -14,9 +14,9 @@ from .messages import (
     CameraAdded,
     CameraRemoved,
     Demanded,
+    DrawnScene,
     Ready,
     Report,
-    Scene,
     SceneAccepted,
     SetUp,
     Shown,
@@ -55,7 +55,7 @@ class RenderProcess:
             CameraAdded: lambda message: self._add(message.camera),
             CameraRemoved: lambda message: self._remove(message.name),
             WorldChanged: self._change_world,
-            Scene: self._show,
+            DrawnScene: self._show,
         }
 
     def run(self) -> None:
@@ -109,7 +109,7 @@ class RenderProcess:
         for entry in message.entries:
             self._mirror.apply(entry)
 
-    def _show(self, scene: Scene) -> None:
+    def _show(self, scene: DrawnScene) -> None:
         """Draws a scene, as far as anybody looks at it."""
         sample = scene.sample
         self._channel.send(SceneAccepted(sample.name))

@@ -1,10 +1,17 @@
 """Environments of Gymnasium with the robots of the examples; importing this registers their names."""
 
 from rpbi.gym.env import register
+from rpbi_examples.scenes import SCENES
 
 FOLDER = "{rpbi_examples}/configs/gym"
 ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in ("reach", "push", "lift", "wipe", "peg")}
 """Folder of each environment's files by its id."""
 
+SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0": name for name in SCENES}
+"""Scene of each environment that is one, by its id; see docs/examples.md."""
+
 for _id, _folder in ENVIRONMENTS.items():
     register(_id, f"{FOLDER}/{_folder}/world.yaml", f"{FOLDER}/{_folder}/task.yaml")
+for _id, _scene in SCENE_ENVIRONMENTS.items():
+    _task = {"type": "rpbi_examples.scenes.task:SceneTask", "scene": _scene, "action_ticks": 20, "max_actions": 1500}
+    register(_id, f"{{rpbi_examples}}/configs/{_scene}/config.yaml", _task)

@@ -18,8 +18,8 @@ from robot_model.geometry import (
     rotated,
 )
 
-from .arm import between, smooth
-from .scene import Scene, Touch, Watch
+from .parts.arm import between, smooth
+from .scene import Scene, Touch, Watched
 
 HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
 """Half the way between the faces that are pressed, height of the table, half the height of the box."""
@@ -48,7 +48,7 @@ class DualArm(Scene):
     """Two iiwas carry a box together: they share its weight and press it with a constant internal force."""
 
     world = "{rpbi_examples}/configs/dual_arm/config.yaml"
-    watch = Watch(robots=("left", "right"), bodies=("box",), contacts=("box",))
+    watch = Watched(robots=("left", "right"), bodies=("box",), contacts=("box",))
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)

@@ -9,10 +9,13 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from custom_ros_tools.errors import InterfaceError
-from robot_model.geometry import ZERO, Pose, Vector
+from robot_model.geometry import ZERO, Pose, Vector, normalized
+
+TAG_DIGITS = 6
+"""Digits of poses of tags after the point [m]; detectors have noise of far more."""
 
 
-class Watch(NamedTuple):
+class Watched(NamedTuple):
     """What a scene sees of its world.
 
     Attributes:
@@ -84,7 +87,7 @@ class Put(NamedTuple):
     value: Mapping[str, float] | Pose
 
 
-class Place(NamedTuple):
+class Teleport(NamedTuple):
     """Puts a body somewhere at once, at rest."""
 
     name: str
@@ -127,7 +130,7 @@ class Vanish(NamedTuple):
     name: str
 
 
-Deed = Put | Place | Shove | Change | Switch | Tune | Vanish
+Deed = Put | Teleport | Shove | Change | Switch | Tune | Vanish
 """Something that a scene does to its world."""
 
 
@@ -153,7 +156,7 @@ class Scene(ABC):
     """
 
     world: ClassVar[str]
-    watch: ClassVar[Watch]
+    watch: ClassVar[Watched]
     cycle_ticks: ClassVar[int] = 20
     longest_s: ClassVar[float] = 30.0
 
@@ -198,7 +201,7 @@ class Scene(ABC):
 
     def place(self, name: str, pose: Pose) -> None:
         """Puts a body somewhere at once, at rest."""
-        self._deeds.append(Place(name, pose))
+        self._deeds.append(Teleport(name, pose))
 
     def shove(self, target: str, force: Vector, duration_s: float) -> None:
         """Has a force [N] act on a link for a time, see `Shove`."""
@@ -271,6 +274,18 @@ class SceneResult(NamedTuple):
     time_s: float
     figures: dict[str, float]
     reason: str = ""
+
+
+def tag_in_world(camera: Pose, tag: Pose) -> Pose:
+    """Returns the pose of a tag, to the micrometre, so that it is the same by whatever way both poses came.
+
+    Args:
+        camera: Pose of the camera's optical frame in the world.
+        tag: Pose of the tag in that frame.
+    """
+    position, (x, y, z, w) = camera @ tag
+    along_x, along_y, along_z = (round(each, TAG_DIGITS) for each in position)
+    return Pose((along_x, along_y, along_z), normalized([round(each, TAG_DIGITS) for each in (x, y, z, w)]))
 
 
 def run_scene(scene: Scene, stage: Stage) -> SceneResult:

@@ -20,7 +20,6 @@ from . import SCENES
 from .scene import (
     Change,
     Deed,
-    Place,
     Put,
     Scene,
     SceneResult,
@@ -29,10 +28,12 @@ from .scene import (
     Shove,
     Stage,
     Switch,
+    Teleport,
     Touch,
     Tune,
-    Watch,
+    Watched,
     run_scene,
+    tag_in_world,
 )
 
 TASK = "rpbi_examples.scenes.task:SceneTask"
@@ -144,7 +145,7 @@ def run_episode(env: WorldEnv, seed: int) -> SceneResult:
     return run_scene(env.task.scene, EnvStage(env))
 
 
-def see(world: World, watch: Watch, time_s: float) -> Seen:
+def see(world: World, watch: Watched, time_s: float) -> Seen:
     """Returns what a scene sees of a world."""
     tick = world.clock.tick
     joints = {}
@@ -169,13 +170,15 @@ def see(world: World, watch: Watch, time_s: float) -> Seen:
     return Seen(time_s, joints, {name: Pose(*pose) for name, pose in poses.items()}, wrenches, contacts, tags)
 
 
-def _tags(world: World, watch: Watch) -> Iterator[tuple[int, Pose]]:
-    """Yields the numbers and the poses in the world of the tags that detectors see."""
+def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
+    """Yields the numbers and the poses in the world of the tags that detectors see, by cameras under `poses`."""
+    frames = {each.tf_id: Pose(*each.pose) for each in world.config.poses}
     for sensor in (sensor for name in world.bodies for sensor in world.sensors_of(name)):
         if isinstance(sensor, AprilTagsSensor) and sensor.topic in watch.tags:
-            sample, camera = sensor.read(world.clock.tick), world.cameras[sensor.config.camera].pose
-            for tag in sample.tags if sample and camera else ():
-                yield tag.id, Pose(*camera) @ Pose(*tag.pose)
+            sample = sensor.read(world.clock.tick)
+            camera = frames.get(world.cameras[sensor.config.camera].config.object_tf.tf_id)
+            if sample is not None and camera is not None:
+                yield from ((tag.id, tag_in_world(camera, Pose(*tag.pose))) for tag in sample.tags)
 
 
 def do(world: World, deed: Deed) -> None:
@@ -186,7 +189,7 @@ def do(world: World, deed: Deed) -> None:
     """
     if isinstance(deed, Put):
         world.put(deed.slot, deed.value)
-    elif isinstance(deed, Place):
+    elif isinstance(deed, Teleport):
         world.act(deed.name, "teleport", deed.pose)
     elif isinstance(deed, Shove):
         name, _, link = deed.target.partition("/")

@@ -23,7 +23,7 @@ from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, Twist
 from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.controller_state import ControllerStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
@@ -237,7 +237,8 @@ class Robot(JointedBody):
     def _state(self) -> RobotState:
         measured = self.drive.measured()
         positions, velocities = zip(*measured.values()) if measured else ((), ())
-        return RobotState(self.base_pose(), positions, velocities)
+        twist = Twist() if self.has_fixed_base else self.base_twist()
+        return RobotState(self.base_pose(), positions, velocities, twist)
 
     def _spring(self, state: RobotState) -> None:
         """Applies the efforts of the springs of IMPEDANCE_CONTROL, and those that balance gravity and motion."""

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, HzOrOff, ListOf, Switch, Text
 from rpbi.control.robot_dynamics import RobotDynamics
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, Twist
 
 Array = npt.NDArray[np.float64]
 
@@ -33,11 +33,13 @@ class RobotState(NamedTuple):
         base: Pose of the root link in the world.
         position: Positions of all n driven joints [rad or m], in the order of `RobotDynamics.joints`.
         velocity: Their velocities [rad/s or m/s].
+        base_twist: Twist of the root link in the world; 0 where the base is fixed.
     """
 
     base: Pose
     position: tuple[float, ...]
     velocity: tuple[float, ...]
+    base_twist: Twist = Twist()
 
 
 class SetPoints(NamedTuple):

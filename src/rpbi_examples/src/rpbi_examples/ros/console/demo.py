@@ -24,6 +24,7 @@ from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.processes.child import kill_with_children
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from robot_model.geometry import Pose
@@ -31,7 +32,6 @@ from rpbi.ros.publishers.status import MAX_CLOCK_HZ
 from rpbi.world.loading import LoadedWorld, load_world
 from rpbi_examples import demo_report
 from rpbi_examples.draw_rate import draw_rate_hz
-from rpbi_examples.process_tree import kill_with_children
 from rpbi_examples.ros.joint_targets import HZ as TARGET_HZ
 from rpbi_utils import Recorder, bag_to_dataframes
 from rpbi_utils.ros.bags.bag_reader import BagReader

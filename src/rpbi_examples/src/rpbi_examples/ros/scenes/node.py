@@ -39,19 +39,20 @@ def _run() -> None:
         stage.begin(scene)
         result = run_scene(scene, stage)
         succeeded += result.success
-        _report(seed, result, stage.state_hash())
+        _report(seed, result, stage)
         if number == config.episodes:
             rospy.loginfo("%d of %d episodes succeeded", succeeded, number)
             rospy.signal_shutdown("all episodes are done")
             break
 
 
-def _report(seed: int, result: SceneResult, state_hash: str) -> None:
-    figures = ", ".join(f"{name}: {value:g}" for name, value in result.figures.items())
-    verdict = "succeeded" if result.success else "failed"
-    reason = f": {result.reason}" if result.reason else ""
+def _report(seed: int, result: SceneResult, stage: SimulatorStage) -> None:
+    """Logs in one line how an episode ended."""
+    verdict = "succeeded" if result.success else f"failed: {result.reason}" if result.reason else "failed"
+    parts = [f"{name}: {value:.4g}" for name, value in result.figures.items()]
+    parts += [f"real-time factor: {stage.reached_factor():.3f}", f"state: {stage.state_hash()}"]
     say = rospy.loginfo if result.success else rospy.logwarn
-    say("seed %d %s after %.1f s%s; %s; state %s", seed, verdict, result.time_s, reason, figures, state_hash)
+    say("seed %d %s, after %.2f s; %s", seed, verdict, result.time_s, ", ".join(parts))
 
 
 def main() -> None:

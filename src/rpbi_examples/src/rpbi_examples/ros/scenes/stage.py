@@ -28,7 +28,6 @@ from rpbi.ros.tick_listener import TickListener
 from rpbi_examples.scenes.scene import (
     Change,
     Deed,
-    Place,
     Put,
     Scene,
     Seen,
@@ -36,9 +35,11 @@ from rpbi_examples.scenes.scene import (
     Shove,
     Stage,
     Switch,
+    Teleport,
     Touch,
     Tune,
-    Watch,
+    Watched,
+    tag_in_world,
 )
 
 PATIENCE_S = 20.0
@@ -59,11 +60,11 @@ class SimulatorStage(Stage):
         real_time_factor: Largest number of simulated seconds a second; 0 is as fast as possible.
     """
 
-    def __init__(self, watch: Watch, ticks: int, real_time_factor: float) -> None:
+    def __init__(self, watch: Watched, ticks: int, real_time_factor: float) -> None:
         self._watch, self._ticks, self._factor = watch, ticks, real_time_factor
         self._services: dict[str, Any] = {}
         self._inputs: list[PlannedInput] = []
-        self._due_s = 0.0
+        self._begin_s = self._due_s = 0.0
         self._scene: Scene | None = None
         topics: dict[str, type] = {f"rpbi/{name}/joint_states": JointState for name in watch.robots}
         topics |= {f"rpbi/{name}/base_state": Odometry for name in watch.bodies}
@@ -79,19 +80,16 @@ class SimulatorStage(Stage):
     def begin(self, scene: Scene) -> None:
         """Brings the world to the start of an episode."""
         self._ask("rpbi/reset", Trigger)
-        self._scene, self._due_s = scene, time.monotonic()
+        self._scene, self._begin_s = scene, time.monotonic()
+        self._due_s = self._begin_s
         scene.prepare()
         for deed in scene.take_deeds():
             self.do(deed)
 
     def do(self, deed: Deed) -> None:
         if isinstance(deed, Put):
-            if isinstance(deed.value, Pose):
-                names, values = POSE_NAMES, (*deed.value.position, *deed.value.quat_xyzw)
-            else:
-                names, values = tuple(deed.value), tuple(deed.value.values())
-            self._inputs.append(PlannedInput(0, deed.slot, names, values))
-        elif isinstance(deed, Place):
+            self._inputs.append(_input(deed))
+        elif isinstance(deed, Teleport):
             self._ask(f"rpbi/{deed.name}/set_pose", SetTransform, transform_message(*deed.pose))
         elif isinstance(deed, Shove):
             force = Wrench(force=Vector3(*deed.force))
@@ -118,6 +116,11 @@ class SimulatorStage(Stage):
             time.sleep(max(0.0, self._due_s - time.monotonic()))
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException("ROS shuts down")
+
+    def reached_factor(self) -> float:
+        """Returns the simulated seconds a second of this episode."""
+        assert self._scene is not None
+        return self._scene.seen.time_s / (time.monotonic() - self._begin_s)
 
     def state_hash(self) -> str:
         """Returns the hash of the world's state."""
@@ -146,7 +149,9 @@ class SimulatorStage(Stage):
             {name: SeenWrench(_vector(each.force), _vector(each.torque)) for name, each in wrenches.items()},
             {name: tuple(map(_touch, found[f"rpbi/{name}/contacts"].points)) for name in watch.contacts},
             {
-                detection.id[0]: self._camera(found[topic].header.frame_id) @ _pose(detection.pose.pose.pose)
+                detection.id[0]: tag_in_world(
+                    self._camera(found[topic].header.frame_id), _pose(detection.pose.pose.pose)
+                )
                 for topic in watch.tags
                 for detection in found[topic].detections
             },
@@ -161,6 +166,13 @@ class SimulatorStage(Stage):
                 raise InterfaceError(f"no TF of the camera from '{WORLD}' to '{frame}' within {PATIENCE_S:g} s")
             self._cameras[frame] = _pose(as_pose(message.transform))
         return self._cameras[frame]
+
+
+def _input(deed: Put) -> PlannedInput:
+    value = deed.value
+    if isinstance(value, Pose):
+        return PlannedInput(0, deed.slot, POSE_NAMES, (*value.position, *value.quat_xyzw))
+    return PlannedInput(0, deed.slot, tuple(value), tuple(value.values()))
 
 
 def _pose(message: Any) -> Pose:

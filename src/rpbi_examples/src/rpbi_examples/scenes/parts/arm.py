@@ -8,11 +8,10 @@ from custom_ros_tools.transforms import finite_vector
 from ik_ros.problem import IKProblem
 from ik_ros.solvers.kdl import KdlConfig, KdlSolver
 from robot_model.geometry import Pose, minus, plus, quaternion_of, quaternion_product, rotation_between, scaled
+from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
-from .scene import Scene, SceneFailedError
 
-
-class Arm:
+class LedArm:
     """Leads a link of a robot by the targets of its joints, from where the last target was.
 
     Args:

@@ -1,0 +1,145 @@
+"""A controller that lets a humanoid stand on both feet and reach with a hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ListOf, NonNegative, Text, Unit
+from robot_model.asset_files import ExistingFile
+from robot_model.geometry import Pose
+from rpbi.control.controllers.cartesian_impedance import PoseTarget
+from rpbi.control.controllers.controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
+from rpbi.engine.inputs import check_pose
+
+from .dynamics import FREE, FloatingRobot, turn_between
+from .program import WholeBodyProgram, wrench_cone
+from .tasks import AccelerationTask, Approach, Gain, capture, pull, spring
+
+LINEAR, ANGULAR, UP = slice(0, 3), slice(3, 6), slice(2, 3)
+CAPTURE_WEIGHT = 100.0
+"""Of the capture point, before all others: a robot that falls reaches nothing."""
+HEIGHT, UPRIGHT, POSTURE = Gain(50.0, 20.0), Gain(60.0, 5.0), Gain(30.0, 0.02)
+"""Of the centre of mass's height, of the torso, and of all joints, whose weight is low: they serve the other tasks."""
+HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
+"""Of the hand's position and orientation."""
+
+
+class BalanceConfig(ControllerConfig):
+    """Keys of `Balance`."""
+
+    urdf_filename: ExistingFile = Field(description="The robot's URDF; `{package}/path` is resolved.")
+    hand: Text = Field(description="The link that reaches.")
+    point: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
+        (0.0, 0.0, 0.0), description="The point of it that comes to the target, in its frame."
+    )
+    torso: Text = Field(description="The link that stays upright.")
+    soles: ListOf[Text] = Field(
+        min_length=1, description="Links whose frames are in the middle of the soles: x forward, z up."
+    )
+    half_length: Annotated[NonNegative, Unit("m")] = Field(
+        0.09, description="Half of the length of a sole that is used."
+    )
+    half_width: Annotated[NonNegative, Unit("m")] = Field(
+        0.055, description="Half of the width of a sole that is used."
+    )
+    friction: NonNegative = Field(0.5, description="Coefficient of friction that is relied on.")
+    period_ticks: int = Field(2, ge=1, description="Ticks from one solution to the next; efforts stay in between.")
+    capture_gain: NonNegative = Field(3.0, description="How far the centre of pressure goes beyond the capture point.")
+    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Of the hand, for its mass.")
+    hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's way.")
+
+
+class Balance(Controller):
+    """Stands on both feet, and moves a hand to a target.
+
+    Every few ticks a quadratic program finds efforts that bring the capture point over the middle of the feet and the
+    hand to its target, and keep height, an upright torso and the posture of the start. The feet stand still and neither
+    slide nor tip. `target` is a pose of the hand's point in the world; until one comes, the arm keeps its posture.
+    """
+
+    Config = BalanceConfig
+    inputs = {"target": "rpbi.ros.messages.controllers:POSE_TARGET"}
+
+    def __init__(self, arm: ControlledRobot, config: Any) -> None:
+        super().__init__(arm, config)
+        self._robot = robot = FloatingRobot(config.urdf_filename, [arm.model.joints[i].name for i in arm.chosen])
+        self._hand, self._torso = robot.frame(config.hand, config.point), robot.frame(config.torso)
+        self._soles = [robot.frame(sole) for sole in config.soles]
+        cone = wrench_cone(config.half_length, config.half_width, config.friction)
+        self._program = WholeBodyProgram(robot, cone, len(self._soles))
+
+    def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> Pose:
+        """Accepts finite poses."""
+        return check_pose(value.pose if isinstance(value, PoseTarget) else value)
+
+    def start(self, state: RobotState, tick: int) -> None:
+        """Stands as it is measured."""
+        self._robot.update(state)
+        self._posture = self._robot.positions.copy()
+        self._height = self._robot.centre[2]
+        self._upright = _yaw_only(self._robot.placement(self._soles[0]).rotation)
+        self._approach: Approach | None = None
+        self._efforts = np.zeros(len(self._posture))
+        self._ticks = 0
+        self._unsolved = 0
+        self._errors: dict[str, float] = {}
+
+    def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
+        """Returns the efforts of all joints."""
+        if self._ticks % self.config.period_ticks == 0:
+            self._robot.update(state)
+            self._solve(targets.get("target"))
+        self._ticks += 1
+        return self._efforts
+
+    def report(self) -> Mapping[str, float]:
+        """Returns how far centre of mass and hand are from their goals [m], and how often there was no solution."""
+        return {**self._errors, "unsolved": float(self._unsolved)}
+
+    def _solve(self, target: Pose | None) -> None:
+        robot, config = self._robot, self.config
+        centre = robot.motion_of_centre()
+        middle = np.mean([robot.placement(sole).translation for sole in self._soles], axis=0)
+        turn = turn_between(robot.placement(self._torso).rotation, self._upright)
+        height = self._height - middle[2]
+        tasks = [
+            capture(centre, robot.centre, middle[:2], height, config.capture_gain, CAPTURE_WEIGHT),
+            spring(centre, UP, self._height - robot.centre[UP], HEIGHT),
+            spring(robot.motion(self._torso), ANGULAR, turn, UPRIGHT),
+        ]
+        self._errors = {"centre": float(np.linalg.norm(robot.centre[:2] - middle[:2]))}
+        if target is not None:
+            tasks += self._hand_tasks(target)
+        posture = pull(self._posture - robot.positions, -robot.velocities[FREE:], POSTURE)
+        feet = [robot.motion(sole, own_axes=True) for sole in self._soles]
+        found = self._program.solve(tasks, posture, POSTURE.weight, feet)
+        if found is None:
+            self._unsolved += 1
+        else:
+            self._efforts = robot.in_given_order(found)
+
+    def _hand_tasks(self, target: Pose) -> list[AccelerationTask]:
+        placement = self._robot.placement(self._hand)
+        if self._approach is None:
+            period_s = self.config.period_ticks * self.arm.dt_s
+            self._approach = Approach(placement.translation, placement.rotation, period_s, self.config.hand_speed)
+        way = self._approach
+        way.advance(target, placement.translation, placement.rotation)
+        self._errors["hand"] = float(np.linalg.norm(target.position - placement.translation))
+        motion, stiffness = self._robot.motion(self._hand), self.config.hand_stiffness
+        turn = turn_between(placement.rotation, way.turn)
+        return [
+            spring(motion, LINEAR, way.position - placement.translation, Gain(stiffness, HAND_WEIGHT), way.velocity),
+            spring(motion, ANGULAR, turn, Gain(stiffness, HAND_TURN_WEIGHT)),
+        ]
+
+
+def _yaw_only(rotation: Array) -> Array:
+    """Returns the upright orientation that faces where another one does."""
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))

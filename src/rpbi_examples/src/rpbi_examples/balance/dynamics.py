@@ -1,0 +1,147 @@
+"""The dynamics of a robot whose base floats, by Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from custom_ros_tools.errors import MissingDependency, UnknownNameError
+from robot_model.geometry import Quaternion
+from rpbi.control.controllers.controller import Array, RobotState
+
+try:
+    import pinocchio as pin
+except ImportError as error:
+    raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
+
+FREE = 6
+"""Velocities of the base: linear and angular, in its own axes."""
+
+
+class FrameMotion(NamedTuple):
+    """How a frame or the centre of mass moves, in m and rad, for n velocities of the robot.
+
+    Attributes:
+        jacobian: From velocities of the robot to the frame's, linear before angular, shape (6, n) or (3, n).
+        velocity: Velocity of the frame, shape (6,) or (3,).
+        drift: Acceleration of the frame where the robot's velocities are constant, of the same shape.
+    """
+
+    jacobian: Array
+    velocity: Array
+    drift: Array
+
+
+class FloatingRobot:
+    """Mass, bias and kinematics of a robot whose base floats; n is 6 of the base and one for each joint.
+
+    Args:
+        urdf_filename: Its URDF.
+        joints: All of its joints, in the order of the states that it is updated with.
+
+    Attributes:
+        mass_matrix: Shape (n, n).
+        bias: Gravity, Coriolis and centrifugal forces and the joints' damping, shape (n,) [N, N m].
+        positions: Of the joints, shape (n - 6,) [rad].
+        velocities: Of base and joints, shape (n,).
+        count: n.
+        effort_limits: Of the joints, shape (n - 6,) [N m].
+        lower: Least positions of the joints, shape (n - 6,) [rad].
+        upper: Greatest ones.
+        centre: The centre of mass in the world, shape (3,) [m].
+
+    Raises:
+        ValueError: If there are other joints than these.
+    """
+
+    def __init__(self, urdf_filename: str, joints: Sequence[str]) -> None:
+        self._model = pin.buildModelFromUrdf(urdf_filename, pin.JointModelFreeFlyer())
+        known = list(self._model.names)[2:]
+        if set(joints) != set(known):
+            different = ", ".join(sorted(set(joints) ^ set(known)))
+            raise ValueError(f"joints: expected all {len(known)} of {urdf_filename}, got others: {different}")
+        self._data = self._model.createData()
+        self._order = np.array([joints.index(name) for name in known])
+        self.effort_limits: Array = self._model.effortLimit[FREE:].copy()
+        self.lower: Array = self._model.lowerPositionLimit[FREE + 1 :].copy()
+        self.upper: Array = self._model.upperPositionLimit[FREE + 1 :].copy()
+        self._still = np.zeros(self._model.nv)
+        self._below = np.tril_indices(self._model.nv, -1)
+        self.count: int = self._model.nv
+
+    def frame(self, link: str, point: Sequence[float] = (0.0, 0.0, 0.0)) -> int:
+        """Returns the number of a new frame: that of a link, moved to a point of it [m].
+
+        Raises:
+            UnknownNameError: If there is no such link.
+        """
+        model = self._model
+        if not model.existFrame(link):
+            raise UnknownNameError("link", link, [each.name for each in model.frames])
+        above = model.frames[model.getFrameId(link)]
+        place = above.placement * pin.SE3(np.eye(3), np.array(point))
+        name = f"{link}/{model.nframes}"
+        number = model.addFrame(pin.Frame(name, above.parent, model.getFrameId(link), place, pin.OP_FRAME))
+        self._data = model.createData()
+        return int(number)
+
+    def in_given_order(self, of_joints: Array) -> Array:
+        """Returns one number for each joint in the order of the states."""
+        ordered = np.empty_like(of_joints)
+        ordered[self._order] = of_joints
+        return ordered
+
+    def update(self, state: RobotState) -> None:
+        """Computes everything for a state."""
+        model, data = self._model, self._data
+        turn = pin.Quaternion(np.array(state.base.quat_xyzw)).normalized()
+        back = turn.matrix().T
+        linear, angular = back @ state.base_twist.linear, back @ state.base_twist.angular
+        self.positions = np.array(state.position)[self._order]
+        self.velocities = v = np.concatenate((linear, angular, np.array(state.velocity)[self._order]))
+        q = np.concatenate((state.base.position, turn.coeffs(), self.positions))
+        self.mass_matrix = mass = pin.crba(model, data, q)  # the upper half
+        mass[self._below] = mass.T[self._below]
+        self.bias = pin.nonLinearEffects(model, data, q, v) + model.damping * v
+        pin.computeJointJacobians(model, data, q)
+        self._jacobian_of_centre = pin.jacobianCenterOfMass(model, data, q)
+        pin.centerOfMass(model, data, q, v, self._still)  # leaves the drift of all frames behind
+        pin.updateFramePlacements(model, data)
+        self.centre = data.com[0].copy()
+
+    def placement(self, frame: int) -> Any:
+        """Returns the pose of a frame in the world, as Pinocchio has it."""
+        return self._data.oMf[frame]
+
+    def motion_of_centre(self) -> FrameMotion:
+        """Returns how the centre of mass moves, in the axes of the world."""
+        return FrameMotion(self._jacobian_of_centre, self._data.vcom[0], self._data.acom[0])
+
+    def motion(self, frame: int, own_axes: bool = False) -> FrameMotion:
+        """Returns how the origin of a frame moves, in the axes of the world or of the frame."""
+        axes = pin.LOCAL if own_axes else pin.LOCAL_WORLD_ALIGNED
+        return FrameMotion(
+            pin.getFrameJacobian(self._model, self._data, frame, axes),
+            pin.getFrameVelocity(self._model, self._data, frame, axes).vector,
+            pin.getFrameClassicalAcceleration(self._model, self._data, frame, axes).vector,
+        )
+
+
+def rotation_of(quat_xyzw: Quaternion) -> Array:
+    """Returns the rotation of a unit quaternion, 3 x 3."""
+    rotation: Array = pin.Quaternion(np.array(quat_xyzw)).matrix()
+    return rotation
+
+
+def turn_between(start: Array, end: Array) -> Array:
+    """Returns the rotation vector from an orientation to another [rad], both 3 x 3, in the axes of the world."""
+    turn: Array = pin.log3(end @ start.T)
+    return turn
+
+
+def turned(start: Array, turn: Array) -> Array:
+    """Returns an orientation, 3 x 3, turned by a rotation vector [rad] in the axes of the world."""
+    end: Array = pin.exp3(turn) @ start
+    return end

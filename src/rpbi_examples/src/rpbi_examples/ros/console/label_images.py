@@ -1,0 +1,45 @@
+"""The command `label_images`."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+from tqdm import tqdm
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from rpbi_utils.labelled_images.dataset import write_labelled_images
+
+
+def label_images(
+    world: Annotated[str, Argument("WORLD.yaml", files="*.yaml")] = "{rpbi_examples}/configs/clutter/config.yaml",
+    *,
+    images: Annotated[int, Argument("N", parse=int)] = 100,
+    out: Annotated[Path, Argument("DIR", parse=Path)] = Path("labelled_images"),
+    seed: Annotated[int, Argument("N", parse=int)] = 0,
+    camera: Annotated[str, Argument("NAME")] = "",
+) -> str:
+    """Makes a data set of labelled images of a world's objects: masks, boxes, poses and models.
+
+        ./rpbi label_images --images 100 --out clutter
+
+    It needs no ROS master. For each image the objects of the world fall at random, and a camera at a random place
+    looks at them once they are at rest. The data set is in the BOP format, with a COCO file; see docs/datasets.md.
+
+    Args:
+        WORLD.yaml: a world with a camera and objects; that of the example `clutter` without it
+        images: number of images; 100 without it
+        out: a new or empty folder; labelled_images without it
+        seed: image n depends on the world, the seed and n alone; 0 without it
+        camera: the camera; the first one without it
+    """
+    if images < 1 or seed < 0:
+        raise UsageError(f"--images and --seed: expected at least 1 and 0, got {images} and {seed}")
+    begin_s = time.monotonic()
+    period_s = 0.1 if sys.stderr.isatty() else 10.0
+    with tqdm(total=images, unit=" images", leave=False, mininterval=period_s, delay=1.0) as bar:
+        found = write_labelled_images(world, out, images, seed, camera=camera, report=bar.update)
+    return (
+        f"{out}: {found.images} images, {found.labels} labels, kinds of objects: {found.kinds}, "
+        f"visible of an object: {100.0 * found.visible_fraction:.0f} % on average, {time.monotonic() - begin_s:.0f} s"
+    )

@@ -1,0 +1,150 @@
+"""A person waves, hands a thing to a Panda and takes it back; each acts by what it sees of the thing and the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from custom_ros_tools.transforms import yaw_of
+from robot_model.geometry import Pose, Vector
+
+from .parts.holding import Holders, PandaArm, Still, about_z, above, tilt_deg, until, yaw_to
+from .parts.person import SwayingPerson, together
+from .scene import Scene, SceneFailedError, Watched
+
+HALF_HEIGHTS_M = {"bottle": 0.063, "can": 0.06, "carton": 0.065}
+"""Height of the origin of each thing above its base."""
+DYNAMICS = (0.25, 0.5), (0.45, 0.9)
+"""Least mass [kg] and friction of a thing, and the largest ones."""
+REST, PLACES_M = Pose((0.31, -0.24, 1.08)), ((0.37, -0.34, 1.05), (0.45, -0.16, 1.18))
+"""The palm near the body, and corners of the box in which it is held out."""
+OFF_M, OFF_RAD, PAUSES_S = 0.008, 0.1, (0.2, 1.5)
+"""Largest errors of the person: of a thing on the palm, of the palm's direction to the robot; and pauses."""
+BASE = Pose((1.18, -0.2, 0.6), (0.0, 0.0, 1.0, 0.0))
+APPROACH = Pose(quat_xyzw=(0.0, math.sin(math.radians(-55.0)), 0.0, math.cos(math.radians(-55.0))))
+BEFORE = Pose((0.0, 0.0, -0.14))
+"""The gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, seen from there."""
+GRASP_M, LIFT_M, OPEN_M = 0.09, 0.1, 0.04
+"""Height of a grasp above the base of a thing, height above the palm, way of each finger."""
+SHOWN_M, ALONE_S = (0.66, -0.2, 1.24), 1.0
+"""Where the robot shows the thing, and how long at least."""
+LOWEST_M, CARRIED_N = -0.05, 2.0
+"""Height above the palm to which a thing is lowered at most, and force of the palm at which the robot lets go."""
+WAVES, MAX_TILT_DEG, STILL_M = 3, 10.0, 0.002
+"""Waves, largest tilt at the end, and way within which a thing stands still on the palm."""
+HANDS = {"human", "panda"}
+
+
+class Handover(Scene):
+    """A person waves, holds out a thing and later an empty palm; a Panda takes the thing, shows it and returns it."""
+
+    world = "{rpbi_examples}/configs/handover/config.yaml"
+    watch = Watched(("human", "panda"), bodies=tuple(HALF_HEIGHTS_M), contacts=("human", *HALF_HEIGHTS_M))
+    longest_s = 45.0
+
+    def __init__(self, random: np.random.Generator) -> None:
+        super().__init__(random)
+        self.thing = str(random.choice(list(HALF_HEIGHTS_M)))
+        self._half_m = HALF_HEIGHTS_M[self.thing]
+        places = [tuple(place) for place in random.uniform(*PLACES_M, (2, 3)).tolist()]
+        self._palms = [Pose(each, about_z(yaw_to(each, BASE) + random.uniform(-OFF_RAD, OFF_RAD))) for each in places]
+        self._pauses_s = random.uniform(*PAUSES_S, 2).tolist()
+        self._holders, self._on_palm = Holders(self, self.thing), Still()
+        self._force_n = self._largest_tilt_deg = 0.0
+
+    @cached_property
+    def person(self) -> SwayingPerson:
+        """The person, made by `note` in the first cycle, so that it begins alike everywhere."""
+        return SwayingPerson(self, self.random)
+
+    def prepare(self) -> None:
+        """Puts a thing of some mass and friction on the palm."""
+        x, y, yaw = self.random.uniform(-1.0, 1.0, 3).tolist()
+        self.place(self.thing, REST @ Pose((OFF_M * x, OFF_M * y, self._half_m + 1e-4), about_z(OFF_RAD * yaw)))
+        mass, friction = self.random.uniform(*DYNAMICS).tolist()
+        self.change(self.thing, mass=mass, lateralFriction=friction)
+
+    def act(self) -> Iterator[None]:
+        """Has the person and the robot act side by side."""
+        for _ in together(self._person_acts(), self._robot_acts()):
+            if not self._holders.all_names <= HANDS:
+                raise SceneFailedError(f"the {self.thing} has fallen")
+            yield
+
+    def _person_acts(self) -> Iterator[None]:
+        """Waves, holds out the thing until the robot has it, and the palm until the thing is back."""
+        person, holders = self.person, self._holders
+        yield from together(person.wave(WAVES), person.go(REST, 4.5))
+        yield from person.go(self._palms[0], 1.5)
+        yield from person.stay_until(lambda: holders.is_alone("panda", 0.5))
+        yield from person.go(REST, 1.5 + self._pauses_s[0])
+        yield from person.go(self._palms[1], 1.5)
+        yield from person.stay_until(lambda: holders.is_alone("human", 0.5))
+        yield from person.go(person.target, self._pauses_s[1])
+        yield from person.go(REST, 2.0)
+        yield from person.go(REST, 1.0)
+
+    def _robot_acts(self) -> Iterator[None]:
+        """Takes the thing from the palm, shows it, puts it back and lets go when the palm carries it."""
+        arm, holders = PandaArm(self, "panda", BASE), self._holders
+        home = arm.target
+        yield from until(self.person.holds_out)
+        yield from arm.follow(lambda: self._grasp() @ BEFORE, 1.8)
+        yield from arm.follow(self._grasp, 1.5)
+        yield from arm.close_on(holders)
+        yield from arm.go(Pose(above(arm.target.position, LIFT_M), arm.target.quat_xyzw), 1.2)
+        thing = self._where()
+        in_gripper, yaw = arm.pose().inverse() @ thing, yaw_of(thing.quat_xyzw) - yaw_to(thing.position, BASE)
+
+        def standing(place: Vector) -> Pose:
+            """Returns the gripper that holds the thing upright with its base at a place [m]."""
+            return Pose(above(place, self._half_m), about_z(yaw_to(place, BASE) + yaw)) @ in_gripper.inverse()
+
+        yield from arm.go(standing(SHOWN_M), 1.8)
+        yield from self.wait(ALONE_S)
+        yield from until(self.person.holds_out)
+        yield from arm.follow(lambda: standing(above(self.person.palm().position, LIFT_M)), 2.0)
+        for _ in arm.go(standing(above(self.person.palm().position, LOWEST_M)), 4.5):
+            if holders.force("human") > CARRIED_N:
+                break
+            yield
+        else:
+            raise SceneFailedError(f"expected the palm to carry {CARRIED_N:g} N, got {holders.force('human'):.1f} N")
+        yield from arm.open(OPEN_M)
+        yield from arm.go(arm.target @ BEFORE, 1.2)
+        yield from arm.go(home, 1.5)
+
+    def _grasp(self) -> Pose:
+        """Returns the gripper at the thing, where that is now."""
+        thing = self._where()
+        return Pose(above(thing.position, GRASP_M - self._half_m), about_z(yaw_of(thing.quat_xyzw))) @ APPROACH
+
+    def note(self) -> None:
+        """Notes waves, who holds the thing, how it and the palm move, and forces on the person."""
+        self.person.note()
+        self._holders.note()
+        self._on_palm.note((self.person.palm().inverse() @ self._where()).position)
+        self._largest_tilt_deg = max(self._largest_tilt_deg, tilt_deg(self._where()))
+        self._force_n = max(self._force_n, sum(touch.normal_force for touch in self.seen.contacts["human"]))
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the person waved, the robot alone held the thing, and it now stands still on the palm."""
+        was_handed_over = self._holders.alone_s.get("panda", 0.0) >= ALONE_S and self.person.swings >= 2 * WAVES - 1
+        is_back = self._holders.is_alone("human", 0.5) and self._holders.links() == {"RightHand"}
+        is_standing = self._on_palm.is_within(STILL_M) and tilt_deg(self._where()) < MAX_TILT_DEG
+        return was_handed_over and is_back and is_standing and self._holders.all_names <= HANDS
+
+    def figures(self) -> dict[str, float]:
+        """Returns the largest force on the person, how long the robot held the thing, and its tilts."""
+        return {
+            "largest force on the person [N]": self._force_n,
+            "held by the robot alone [s]": self._holders.alone_s.get("panda", 0.0),
+            "tilt [deg]": tilt_deg(self._where()),
+            "largest tilt [deg]": self._largest_tilt_deg,
+        }
+
+    def _where(self) -> Pose:
+        return self.seen.poses[self.thing]

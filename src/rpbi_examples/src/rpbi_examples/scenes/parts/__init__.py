@@ -1,0 +1,1 @@
+"""Parts of scenes that others can use: arms, paths, people, grasps."""

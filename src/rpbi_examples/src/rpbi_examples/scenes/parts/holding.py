@@ -1,0 +1,167 @@
+"""Who holds a thing, by its contacts; whether it is still; and a Panda that closes its gripper until it feels it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from robot_model.geometry import Pose, Quaternion, Vector, minus, norm, plus, rotated
+from rpbi_examples.scenes.scene import Scene, SceneFailedError
+
+from .arm import LedArm, between, smooth
+
+CYCLE_S = 0.02
+"""Time of a cycle [s]."""
+STILL_S = 0.5
+"""Time after which something is still that has not moved [s]."""
+FINGER, FINGER_LINKS = "panda_finger_joint1", {"panda_leftfinger", "panda_rightfinger"}
+"""The finger of a Panda that the other one mimics, which opens from 0 on; and the links of both."""
+FINGER_SPEED, PRESS_S = 0.04, 0.3
+"""Speed of each finger [m/s], and for how long the fingers press before they are taken to hold."""
+
+
+class Holders:
+    """Notes in every cycle what touches a thing.
+
+    Args:
+        scene: The scene that it is in.
+        thing: The thing, whose contacts the scene sees.
+
+    Attributes:
+        names: Bodies that touch it now.
+        all_names: Bodies that have touched it so far.
+        alone_s: The longest time for which a body alone touched it [s], by body.
+    """
+
+    def __init__(self, scene: Scene, thing: str) -> None:
+        self._scene, self._thing = scene, thing
+        self.names: frozenset[str] = frozenset()
+        self.all_names: set[str] = set()
+        self.alone_s: dict[str, float] = {}
+        self._since_s = 0.0
+
+    def note(self) -> None:
+        """Notes what touches it in this cycle."""
+        names = frozenset(touch.other for touch in self._scene.seen.contacts[self._thing])
+        if names != self.names:
+            self.names, self._since_s = names, self._scene.seen.time_s
+        self.all_names |= names
+        if len(names) == 1:
+            (name,) = names
+            self.alone_s[name] = max(self.alone_s.get(name, 0.0), self.has_lasted_s())
+
+    def has_lasted_s(self) -> float:
+        """Returns for how long the same bodies have touched it [s]."""
+        return self._scene.seen.time_s - self._since_s
+
+    def is_alone(self, name: str, duration_s: float) -> bool:
+        """Returns whether a body alone has touched it for some time [s]."""
+        return self.names == {name} and self.has_lasted_s() >= duration_s
+
+    def force(self, name: str) -> float:
+        """Returns the sum of the normal forces of a body on it [N]."""
+        return sum(each.normal_force for each in self._scene.seen.contacts[self._thing] if each.other == name)
+
+    def links(self) -> set[str]:
+        """Returns the links of other bodies that touch it."""
+        return {touch.other_link for touch in self._scene.seen.contacts[self._thing]}
+
+
+class Still:
+    """Notes in every cycle where something is, to tell whether it stays there."""
+
+    def __init__(self) -> None:
+        self._places: deque[Vector] = deque(maxlen=round(STILL_S / CYCLE_S))
+
+    def note(self, place: Vector) -> None:
+        """Notes where it is [m]."""
+        self._places.append(place)
+
+    def is_within(self, way_m: float) -> bool:
+        """Returns whether it has been within a way of where it is now, for `STILL_S`."""
+        is_known = len(self._places) == self._places.maxlen
+        return is_known and all(norm(minus(self._places[-1], each)) < way_m for each in self._places)
+
+
+class PandaArm(LedArm):
+    """A Panda, led by the point between its fingers, which feel what touches them.
+
+    Args:
+        scene: The scene that it acts in.
+        robot: The robot's name in the world.
+        base: Pose of its base in the world.
+    """
+
+    def __init__(self, scene: Scene, robot: str, base: Pose) -> None:
+        super().__init__(scene, robot, "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget", base)
+
+    def follow(self, goal: Callable[[], Pose], duration_s: float) -> Iterator[None]:
+        """Goes to a goal that may move meanwhile, as `go` does.
+
+        Raises:
+            SceneFailedError: If it is out of reach.
+        """
+        start, begin_s, share = self.target, self._scene.seen.time_s, 0.0
+        while share < 1.0:
+            share = (self._scene.seen.time_s - begin_s) / duration_s
+            self.send(between(start, goal(), smooth(share)))
+            yield
+
+    def opening(self) -> float:
+        """Returns the way of each finger [m]."""
+        return self._scene.seen.joints[self._robot][FINGER]
+
+    def close_on(self, holders: Holders) -> Iterator[None]:
+        """Closes until both fingers touch a thing, and then presses with all their force.
+
+        Raises:
+            SceneFailedError: If there is nothing between them.
+        """
+        target_m = self.opening()
+        while not FINGER_LINKS <= holders.links():
+            target_m -= FINGER_SPEED * CYCLE_S
+            if target_m < 0.0:
+                raise SceneFailedError(f"{self._robot}: expected both fingers at the thing, got a closed gripper")
+            self._send_finger(target_m)
+            yield
+        self._send_finger(0.0)
+        yield from self._scene.wait(PRESS_S)
+
+    def open(self, opening_m: float) -> Iterator[None]:
+        """Opens both fingers, so slowly that they push nothing away."""
+        target_m = self.opening()
+        while target_m < opening_m:
+            target_m = min(target_m + FINGER_SPEED * CYCLE_S, opening_m)
+            self._send_finger(target_m)
+            yield
+
+    def _send_finger(self, target_m: float) -> None:
+        self._scene.put(f"{self._robot}/target", {FINGER: target_m})
+
+
+def about_z(yaw: float) -> Quaternion:
+    """Returns a rotation about the vertical [rad]."""
+    return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+
+
+def above(place: Vector, height_m: float) -> Vector:
+    """Returns the place that is higher by a height [m]."""
+    return plus(place, (0.0, 0.0, height_m))
+
+
+def tilt_deg(pose: Pose) -> float:
+    """Returns the angle between the z axis of a pose and the vertical [deg]."""
+    return math.degrees(math.acos(min(rotated(pose.quat_xyzw, (0.0, 0.0, 1.0))[2], 1.0)))
+
+
+def yaw_to(place: Vector, goal: Pose) -> float:
+    """Returns the direction from a place to a goal about the vertical [rad]."""
+    x, y, _ = minus(goal.position, place)
+    return math.atan2(y, x)
+
+
+def until(condition: Callable[[], bool]) -> Iterator[None]:
+    """Waits until a condition holds; used as `yield from until(...)`."""
+    while not condition():
+        yield

@@ -1,0 +1,86 @@
+"""Areas that a rectangular tool goes over lane by lane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Stamp(NamedTuple):
+    """Where a rectangular tool is on a plane.
+
+    Attributes:
+        x: Its middle [m].
+        y: Its middle [m].
+        yaw: Its turn [rad].
+    """
+
+    x: float
+    y: float
+    yaw: float
+
+    def covers(self, points: np.ndarray, half: tuple[float, float]) -> np.ndarray:
+        """Returns whether points of the plane are under a tool of half the extents `half` [m].
+
+        Args:
+            points: Shape (..., 2) [m].
+            half: Along the x and y axis of the tool [m].
+
+        Returns:
+            Booleans, shape (...).
+        """
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        inside = np.abs((points - (self.x, self.y)) @ [[cos, -sin], [sin, cos]]) < half
+        return np.asarray(inside.all(axis=-1))
+
+
+def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:
+    """Returns places along a path of parallel lanes that half circles join.
+
+    Args:
+        count: Number of lanes; they are parallel to y, and about the origin.
+        length: Length of a lane [m].
+        pitch: Way between lanes [m].
+        step: Way from place to place [m], rounded to divide the path.
+
+    Returns:
+        Shape (n, 2) [m].
+    """
+    angles = np.linspace(0.0, np.pi, 30)
+    turn = pitch / 2.0 * np.column_stack((1.0 - np.cos(angles), np.sin(angles)))
+    lane = np.concatenate(([(0.0, -length / 2.0)], turn + (0.0, length / 2.0)))
+    starts = pitch * (np.arange(count) - (count - 1) / 2.0)
+    path = np.concatenate([lane * (1.0, (-1.0) ** number) + (x, 0.0) for number, x in enumerate(starts)])
+    path = path[: 1 - len(turn)]  # the last lane ends without a turn
+    ways = ways_along(path)
+    at = np.linspace(0.0, ways[-1], round(ways[-1] / step) + 1)
+    return np.column_stack([np.interp(at, ways, axis) for axis in path.T])
+
+
+def middles(size: tuple[float, float], count: tuple[int, int]) -> np.ndarray:
+    """Returns the middles of the cells of a rectangle about the origin.
+
+    Args:
+        size: Extents of the rectangle along x and y [m].
+        count: Numbers of cells along x and y.
+
+    Returns:
+        Shape (*count, 2) [m].
+    """
+    indices = np.moveaxis(np.indices(count), 0, -1)
+    return np.asarray(size * ((indices + 0.5) / count - 0.5))
+
+
+def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
+    """Returns the way from the first place to each, along the path.
+
+    Args:
+        places: At least one; x and y [m] of each come first.
+
+    Returns:
+        Shape (n,) [m].
+    """
+    steps = np.linalg.norm(np.diff(np.array(places)[:, :2], axis=0), axis=1)
+    return np.concatenate(([0.0], np.cumsum(steps)))

@@ -1,0 +1,116 @@
+"""A person who holds out the palm of the right hand and waves with the left one, by the motors of an avatar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from robot_model.geometry import Pose, plus, quaternion_of, quaternion_product
+from rpbi_examples.scenes.scene import Scene
+
+from .arm import LedArm, between, smooth
+from .holding import Still
+
+NAME, URDF, ROOT = "human", "{rpbi_examples}/robots/human_hands.urdf", Pose((0.0, 0.0, 0.9275))
+"""The avatar in its world, its URDF, and where its trunk is."""
+LEFT_HAND = Pose((0.0, 0.36, 0.0))
+"""Middle of the left hand in the frame of its forearm."""
+OUT_X_M, CALM_M = 0.34, 0.008
+"""The place beyond which the palm is held out, and the way within which it is still in spite of its sway."""
+SWAY_HZ, TREMOR_HZ = 0.4, 8.0
+SWAY_M, TREMOR_M, SWAY_RAD = 2.5e-3, 2e-4, 0.01
+"""Amplitudes of sway and tremor along each axis, and of the sway about it."""
+RAISED = {"Shoulder_rotx": -35.0, "Shoulder_roty": -90.0, "Elbow_rotz": -115.0}
+"""Joints of the left arm that waves [deg]; the others are at 0."""
+WAVE_DEG, WAVE_S, RAISE_S = 25.0, 0.8, 1.0
+"""Amplitude of the elbow, period of a wave, and time that raising or lowering the arm takes."""
+SHOULDER_M, MIDDLE_M, SWING_M = 1.43, 0.55, 0.08
+"""Height of the shoulders, where the left hand waves along y, and how far a swing goes at least to each side."""
+
+
+class SwayingPerson:
+    """Moves the arms of an avatar; the right palm sways as that of someone who stands.
+
+    Args:
+        scene: The scene that it acts in.
+        random: Random numbers of the sway.
+
+    Attributes:
+        target: The pose around which the palm sways, in the world: z out of the palm, x along the fingers.
+        swings: How often the raised left hand has gone from one side to the other, as the joints have it.
+    """
+
+    def __init__(self, scene: Scene, random: np.random.Generator) -> None:
+        self._scene = scene
+        self._right = LedArm(scene, NAME, URDF, "Trunk", "RightPalm", ROOT)
+        self._left = LedArm(scene, NAME, URDF, "Trunk", "LeftForeArm", ROOT)
+        self._phases = random.uniform(0.0, 2.0 * math.pi, (3, 3))
+        self.target = self._right.target
+        self.swings, self._side, self._calm = 0, 0.0, Still()
+
+    def palm(self) -> Pose:
+        """Returns where the right palm is."""
+        return self._right.pose()
+
+    def note(self) -> None:
+        """Notes in a cycle where both hands are."""
+        self._calm.note(self.palm().position)
+        _, y, z = (self._left.pose() @ LEFT_HAND).position
+        if z > SHOULDER_M and abs(y - MIDDLE_M) > SWING_M:
+            side = math.copysign(1.0, y - MIDDLE_M)
+            self.swings += side == -self._side
+            self._side = side
+
+    def holds_out(self) -> bool:
+        """Returns whether the right palm is held out and still."""
+        return self.palm().position[0] > OUT_X_M and self._calm.is_within(CALM_M)
+
+    def go(self, pose: Pose, duration_s: float) -> Iterator[None]:
+        """Moves the right palm along a line to a pose in the world, from rest to rest.
+
+        Raises:
+            SceneFailedError: If it is out of reach.
+        """
+        start, begin_s = self.target, self._scene.seen.time_s
+        while (share := (self._scene.seen.time_s - begin_s) / duration_s) < 1.0:
+            self._send(between(start, pose, smooth(share)))
+            yield
+
+    def stay_until(self, is_over: Callable[[], bool]) -> Iterator[None]:
+        """Keeps the right palm where it is until a condition holds."""
+        while not is_over():
+            self._send(self.target)
+            yield
+
+    def wave(self, count: int) -> Iterator[None]:
+        """Raises the left arm, waves some times and lowers the arm."""
+        joints = self._left.joint_names
+        down = [self._scene.seen.joints[NAME][name] for name in joints]
+        up = [math.radians(RAISED.get(name.removeprefix("jLeft"), 0.0)) for name in joints]
+        yield from self._left.move_joints(up, RAISE_S)
+        elbow, begin_s = joints.index("jLeftElbow_rotz"), self._scene.seen.time_s
+        while (time_s := self._scene.seen.time_s - begin_s) < count * WAVE_S:
+            swing = math.radians(WAVE_DEG) * math.sin(2.0 * math.pi * time_s / WAVE_S)
+            self._scene.put(f"{NAME}/target", {joints[elbow]: up[elbow] + swing})
+            yield
+        yield from self._left.move_joints(down, RAISE_S)
+
+    def _send(self, pose: Pose) -> None:
+        """Sends the palm to a pose, swaying a little around it."""
+        self.target = pose
+        sway, tremor, turn = (
+            np.sin(2.0 * math.pi * hz * self._scene.seen.time_s + phases)
+            for hz, phases in zip((SWAY_HZ, TREMOR_HZ, SWAY_HZ), self._phases)
+        )
+        x, y, z = (SWAY_M * sway + TREMOR_M * tremor).tolist()
+        tilt = quaternion_of(tuple((SWAY_RAD * turn).tolist()))
+        self._right.send(Pose(plus(pose.position, (x, y, z)), quaternion_product(tilt, pose.quat_xyzw)))
+
+
+def together(*acts: Iterator[None]) -> Iterator[None]:
+    """Goes on with all acts in every cycle, in their order, until the last one has ended."""
+    running = list(acts)
+    while running := [act for act in running if next(act, running) is None]:
+        yield

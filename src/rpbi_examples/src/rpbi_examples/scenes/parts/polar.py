@@ -1,0 +1,85 @@
+"""An arm that leads its link about the axis of its base, pointing away from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from robot_model.geometry import Pose, Vector
+from rpbi_examples.scenes.scene import Scene
+
+from .arm import LedArm, smooth
+
+SHORTEST_S = 0.5
+
+
+class Spot(NamedTuple):
+    """A place in cylindrical coordinates, whose axis is z of the world.
+
+    Attributes:
+        radius: Distance from the axis [m].
+        azimuth: Angle about the axis, from x [rad].
+        height: Height [m].
+    """
+
+    radius: float
+    azimuth: float
+    height: float
+
+    @classmethod
+    def of(cls, position: Vector) -> Spot:
+        """Returns the spot of a position in the world [m]."""
+        x, y, z = position
+        return cls(math.hypot(x, y), math.atan2(y, x), z)
+
+    def moved(self, out: float = 0.0, up: float = 0.0) -> Spot:
+        """Returns the spot that is further out and higher [m]."""
+        return Spot(self.radius + out, self.azimuth, self.height + up)
+
+    def pose(self) -> Pose:
+        """Returns the pose in the world whose axis x points away from the axis, and z up."""
+        x, y = self.radius * math.cos(self.azimuth), self.radius * math.sin(self.azimuth)
+        return Pose((x, y, self.height), (0.0, 0.0, math.sin(self.azimuth / 2.0), math.cos(self.azimuth / 2.0)))
+
+
+class PolarArm(LedArm):
+    """Leads a link of an arm whose base is on the axis z of the world, without a turn of the wrist.
+
+    Args:
+        scene: The scene that it acts in.
+        robot: The robot's name in the world.
+        urdf: Its URDF.
+        base_link: Link from which the chain begins.
+        link: The link that is led.
+        base: Pose of the base link in the world.
+
+    Attributes:
+        spot: The last spot that the link was sent to.
+    """
+
+    def __init__(self, scene: Scene, robot: str, urdf: str, base_link: str, link: str, base: Pose) -> None:
+        super().__init__(scene, robot, urdf, base_link, link, base)
+        self.spot = Spot.of(self.target.position)
+
+    def swing(self, end: Spot, speed: float, turn_speed: float) -> Iterator[None]:
+        """Goes to a spot, from rest to rest; used as `yield from arm.swing(...)`.
+
+        Args:
+            end: The spot.
+            speed: Mean speed out and up [m/s].
+            turn_speed: Largest mean speed of the azimuth [rad/s].
+
+        Raises:
+            SceneFailedError: If a spot on the way is out of reach.
+        """
+        start, begin_s = self.spot, self._scene.seen.time_s
+        out, turn, up = (b - a for a, b in zip(start, end))
+        duration_s = max(math.hypot(out, up) / speed, abs(turn) / turn_speed, SHORTEST_S)
+        share = 0.0
+        while share < 1.0:
+            share = min((self._scene.seen.time_s - begin_s) / duration_s, 1.0)
+            gone = smooth(share)
+            self.spot = Spot(start.radius + gone * out, start.azimuth + gone * turn, start.height + gone * up)
+            self.send(self.spot.pose())
+            yield

@@ -1,0 +1,143 @@
+"""A Talos stands on its feet, reaches for a ball, is pushed, and brings its hand back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+
+from robot_model.asset_files import find_file
+from robot_model.geometry import Pose, Vector, minus, norm, quaternion_of, quaternion_product, rotated, scaled
+from robot_model.model import RobotModel
+
+from .scene import Scene, SceneFailedError, Watched
+
+URDF = "{example-robot-data}/robots/talos_data/robots/talos_reduced_box.urdf"
+HAND, POINT = "gripper_left_base_link", Pose((0.0, 0.0, -0.13))
+"""The hand, and the point between its fingers, as in configs/talos/talos.yaml [m]."""
+TORSO, SOLES = "torso_2_link", ("left_sole_link", "right_sole_link")
+FEET = {"leg_left_6_link", "leg_right_6_link"}
+HEIGHT_M, LOWEST_M = 1.0223, 0.8
+"""Height of the pelvis at the start, and the least while the robot stands."""
+MOST_SHIFT, MOST_RISE_M, MOST_TURN = 0.05, 2e-3, (0.01, 0.01, 0.2)
+"""Largest deviations of the start: of x and y [m], of the height, and as a rotation vector [rad]."""
+NEAREST, FARTHEST = (0.35, 0.05, 0.9), (0.55, 0.4, 1.3)
+"""Corners of the box of targets: before the pelvis and to its left, and over the floor [m]."""
+FORWARD = quaternion_of((0.0, -math.pi / 2.0, 0.0))
+"""Orientation of a hand that points forward."""
+IMPULSE, PUSH_S = 10.0, 0.1
+"""Of a push [N s], and how long it takes [s]."""
+REACHED_S, BACK_S, STAYS_S = 3.0, 4.0, 2.0
+"""By when the hand is at its target, by when it is back after a push, and how long it stays there then."""
+NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG = 0.02, 0.01, 5.0
+"""Largest error of the hand, way of the feet, and lean of the torso at the end."""
+HIDDEN = Pose((0.0, 0.0, -1.0))
+
+
+class Talos(Scene):
+    """A Talos balances by torques: it reaches for a ball, is pushed at its torso from somewhere, and stands.
+
+    Attributes:
+        target: Where the point of the hand is to be, in the world.
+        push_angle: Where the push goes to, from where the robot faces at the start, to its left [rad].
+        impulse: Of the push [N s].
+    """
+
+    world = "{rpbi_examples}/configs/talos/config.yaml"
+    watch = Watched(robots=("talos",), bodies=("talos",), contacts=("floor",))
+
+    def __init__(self, random: np.random.Generator) -> None:
+        super().__init__(random)
+        self._robot = _robot()
+        x, y, above, *turn = random.uniform(-1.0, 1.0, 6) * (MOST_SHIFT, MOST_SHIFT, MOST_RISE_M, *MOST_TURN)
+        yaw = quaternion_of((0.0, 0.0, turn[2]))
+        tilt = quaternion_of((turn[0], turn[1], 0.0))
+        self._start = Pose((x, y, HEIGHT_M + abs(above)), quaternion_product(yaw, tilt))
+        in_front: Vector = tuple(random.uniform(NEAREST, FARTHEST).tolist())
+        self.target = Pose((x, y, 0.0), yaw) @ Pose(in_front, FORWARD)
+        self._yaw, self.push_angle = turn[2], float(random.uniform(-math.pi, math.pi))
+        self.impulse = IMPULSE
+        self._until_push_s = float(random.uniform(0.0, 1.0))
+        self._feet: list[Vector] = []
+        self._lean_deg = self._most_lean_deg = self._slip_m = self._late_error_m = 0.0
+        self._is_late = False
+
+    def prepare(self) -> None:
+        """Puts the robot onto the floor, not quite upright."""
+        self.place("talos", self._start)
+
+    def act(self) -> Iterator[None]:
+        """Stands, reaches, is pushed and brings its hand back."""
+        yield from self._stand(0.5)
+        self._feet = [self.pose(sole).position for sole in SOLES]
+        self.place("ball", self.target)
+        self.put("talos/balance/target", self.target)
+        yield from self._stand(REACHED_S)
+        if self._error_m() > NEAR_M:
+            raise SceneFailedError(f"the hand does not reach the ball: it is {1e3 * self._error_m():.0f} mm away")
+        yield from self._stand(self._until_push_s)
+        yield from self._push()
+        yield from self._stand(BACK_S - PUSH_S)
+        self._is_late = True
+        yield from self._stand(STAYS_S)
+
+    def note(self) -> None:
+        """Notes lean, way of the feet and error of the hand."""
+        up = rotated(self.pose(TORSO).quat_xyzw, (0.0, 0.0, 1.0))
+        self._lean_deg = math.degrees(math.acos(min(up[2], 1.0)))
+        if self._feet:
+            self._most_lean_deg = max(self._most_lean_deg, self._lean_deg)
+            ways = [norm(minus(self.pose(sole).position, start)) for sole, start in zip(SOLES, self._feet)]
+            self._slip_m = max(self._slip_m, *ways)
+        if self._is_late:
+            self._late_error_m = max(self._late_error_m, self._error_m())
+
+    def has_succeeded(self) -> bool:
+        """Returns whether it stands upright on both feet, where they were, and the hand has come back and stayed."""
+        on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
+        stands = on_floor == FEET and self._slip_m < MAX_SLIP_M and self._lean_deg < MAX_LEAN_DEG
+        return stands and self._is_late and self._late_error_m < NEAR_M
+
+    def figures(self) -> dict[str, float]:
+        """Returns the error of the hand after it is back, the largest lean and the way of the feet."""
+        return {
+            "hand error [mm]": 1e3 * (self._late_error_m if self._is_late else self._error_m()),
+            "largest lean [deg]": self._most_lean_deg,
+            "feet slip [mm]": 1e3 * self._slip_m,
+        }
+
+    def pose(self, link: str) -> Pose:
+        """Returns where a link is in the world."""
+        joints = self.seen.joints["talos"]
+        return self.seen.poses["talos"] @ self._robot.pose([joints[name] for name in self._robot.joint_names], link)
+
+    def _push(self) -> Iterator[None]:
+        """Pushes the torso; a stick shows from where."""
+        angle = self._yaw + self.push_angle
+        cos, sin = math.cos(angle), math.sin(angle)
+        behind = minus(self.pose(TORSO).position, scaled(0.6, (cos, sin, 0.0)))
+        self.place("stick", Pose(behind, quaternion_of((-sin * math.pi / 2.0, cos * math.pi / 2.0, 0.0))))
+        self.shove(f"talos/{TORSO}", scaled(self.impulse / PUSH_S, (cos, sin, 0.0)), PUSH_S)
+        yield from self._stand(PUSH_S)
+        self.place("stick", HIDDEN)
+
+    def _stand(self, duration_s: float) -> Iterator[None]:
+        """Waits.
+
+        Raises:
+            SceneFailedError: If the robot falls.
+        """
+        for _ in self.wait(duration_s):
+            yield
+            if self.seen.poses["talos"].position[2] < LOWEST_M:
+                raise SceneFailedError("the robot has fallen")
+
+    def _error_m(self) -> float:
+        return norm(minus((self.pose(HAND) @ POINT).position, self.target.position))
+
+
+@cache
+def _robot() -> RobotModel:
+    return RobotModel(find_file(URDF, ""))

@@ -1,0 +1,150 @@
+"""An arm wipes the stains off a tilted board with a sponge, and presses with a constant force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from robot_model.geometry import Pose, dot, plus, quaternion_of, quaternion_product, rotated
+
+from .parts.arm import LedArm
+from .parts.lanes import Stamp, lanes, middles, ways_along
+from .scene import Scene, SceneFailedError, Watched
+
+URDF = "{rpbi_examples}/robots/kuka_lwr_sponge.urdf"
+BASE = Pose((0.5, 0.0, 0.0))
+"""Of the arm in the world, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
+SPONGE_M, STAIN_M = (0.06, 0.03), 0.009
+"""Half the extents of the sponge, as in the URDF, and radius of a stain, as in configs/wiping/stain.yaml."""
+FACING = (1.0, 0.0, 0.0, 0.0)
+"""Orientation of the sponge on the board: its z axis points into the board."""
+PIVOT, FACE_M = (-0.16, 0.0, 0.15), 0.06
+"""Ball joint of the board's stand in the world [m], and height of the board's face over it."""
+RANGES = ((-0.02, -0.02, -0.1, 0.3, -0.15, 2000.0, 0.4), (0.02, 0.02, 0.1, 0.5, 0.15, 5000.0, 1.0))
+"""Shift of the board along x and y [m], turns about x, y and z [rad], stiffness of the sponge [N/m], friction."""
+SIZE_M, STAINS, CELLS = (0.25, 0.36), (8, 10), (50, 72)
+"""Extents of the dirty part of the board; it is divided into parts with a stain each, and into cells for coverage."""
+LANES, LENGTH_M, PITCH_M, SPEED = 3, 0.36, 0.084, 0.15
+"""The path, and the speed along it [m/s]; in one of the lanes, a stain is wholly under the sponge."""
+OVER_M, PATIENCE_S = 0.05, 4.0
+"""Height of the sponge over the board before and afterwards; longest time until it presses [s]."""
+FORCES_N, TOLERANCE, LEAST_WAY, LEAST_STAINS = (15.0, 25.0), 0.1, 0.95, 0.99
+"""Range of the force and its largest error; shares of the way with that force, and of the stains gone, in a success."""
+
+
+class Wiping(Scene):
+    """A KUKA LWR4+ wipes a board lane by lane; a controller in the tick holds the force.
+
+    Attributes:
+        force: Normal force that is asked for [N].
+        stains: Places of all stains on the board by name, shape (2,) [m].
+        left: Stains that are still there.
+        stamps: Where the sponge was on the board, by cycle of the path.
+        forces: Normal force of the sponge in these cycles [N].
+        covered: Which cells of the board were wiped.
+    """
+
+    world = "{rpbi_examples}/configs/wiping/config.yaml"
+    watch = Watched(robots=("kuka_lwr",), bodies=("board",), contacts=("board",))
+
+    def __init__(self, random: np.random.Generator) -> None:
+        super().__init__(random)
+        self.force = float(random.uniform(*FORCES_N))
+        self.stains = {
+            f"stain_{number:02d}": middle + random.uniform(-0.4, 0.4, 2) * SIZE_M / STAINS
+            for number, middle in enumerate(middles(SIZE_M, STAINS).reshape(-1, 2))
+        }
+        self.left = list(self.stains)
+        self.stamps: list[Stamp] = []
+        self.forces: list[float] = []
+        self.covered = np.zeros(CELLS, bool)
+
+    def prepare(self) -> None:
+        """Tilts the board and all stains with it, and takes a sponge that is more or less soft and rough."""
+        x, y, about_x, about_y, yaw, stiffness, friction = self.random.uniform(*RANGES).tolist()
+        turn = quaternion_product(quaternion_of((0.0, 0.0, yaw)), quaternion_of((about_x, about_y, 0.0)))
+        board = Pose(plus(PIVOT, rotated(turn, (x, y, FACE_M))), turn)
+        self.place("board", board)
+        for name, place in self.stains.items():
+            self.place(name, board @ Pose((*place.tolist(), 0.0005)))
+        self.change("board", lateralFriction=friction)
+        self.change("kuka_lwr/end_effector_sponge", contactStiffness=stiffness, contactDamping=100.0)
+
+    def act(self) -> Iterator[None]:
+        """Goes over the board, presses, wipes lane by lane, and goes away."""
+        board = self.seen.poses["board"]
+        path = lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
+        arm = self._arm()
+        yield from arm.go(board @ Pose((*path[0], OVER_M), FACING), 2.0)
+        self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
+        self.switch("kuka_lwr", start=("wipe",))
+        yield from self._press()
+        for x, y in path:
+            self.put("kuka_lwr/wipe/target", board @ Pose((x, y, 0.0), FACING))
+            yield
+            self._wipe(board.inverse() @ arm.pose())
+        self.switch("kuka_lwr", stop=("wipe",))
+        yield
+        arm = self._arm()
+        yield from arm.go(arm.target @ Pose((0.0, 0.0, -OVER_M)), 1.0)
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the force was held along the way, and the stains are gone."""
+        return self._held() >= LEAST_WAY and self._gone() >= LEAST_STAINS
+
+    def figures(self) -> dict[str, float]:
+        """Returns how the sponge pressed, and what it has reached."""
+        return {
+            "force [N]": self.force,
+            "mean force [N]": float(np.mean(self.forces or [0.0])),
+            "way within 10 % [%]": 100.0 * self._held(),
+            "stains gone [%]": 100.0 * self._gone(),
+            "coverage [%]": 100.0 * float(self.covered.mean()),
+        }
+
+    def _arm(self) -> LedArm:
+        """Returns the arm as it stands now."""
+        return LedArm(self, "kuka_lwr", URDF, "lwr_arm_0_link", "end_effector_sponge", BASE)
+
+    def _press(self) -> Iterator[None]:
+        """Waits until the sponge presses."""
+        end_s = self.seen.time_s + PATIENCE_S
+        while not self._is_held(self._normal_force()):
+            if self.seen.time_s > end_s:
+                raise SceneFailedError(f"expected to press with {self.force:.1f} N, got {self._normal_force():.1f} N")
+            yield
+        yield from self.wait(0.3)
+
+    def _wipe(self, sponge: Pose) -> None:
+        """Notes where the sponge is on the board and how it presses; what is wholly under it then vanishes."""
+        x, y, _ = rotated(sponge.quat_xyzw, (1.0, 0.0, 0.0))
+        stamp, force = Stamp(*sponge.position[:2], math.atan2(y, x)), self._normal_force()
+        self.stamps.append(stamp)
+        self.forces.append(force)
+        if self._is_held(force):
+            self.covered |= stamp.covers(middles(SIZE_M, CELLS), SPONGE_M)
+            inner = SPONGE_M[0] - STAIN_M, SPONGE_M[1] - STAIN_M
+            for name in [name for name in self.left if stamp.covers(self.stains[name], inner)]:
+                self.left.remove(name)
+                self.vanish(name)
+
+    def _normal_force(self) -> float:
+        """Returns the force on the board, into its face [N]."""
+        down = rotated(self.seen.poses["board"].quat_xyzw, (0.0, 0.0, -1.0))
+        return sum(touch.normal_force * dot(touch.normal, down) for touch in self.seen.contacts["board"])
+
+    def _is_held(self, force: float) -> bool:
+        return abs(force - self.force) <= TOLERANCE * self.force
+
+    def _held(self) -> float:
+        """Returns the share of the way along which the force was held."""
+        if len(self.stamps) < 2:
+            return 0.0
+        is_held = [self._is_held(force) for force in self.forces]
+        return float(np.average(is_held[1:], weights=np.diff(ways_along(self.stamps))))
+
+    def _gone(self) -> float:
+        """Returns the share of the stains that are gone."""
+        return 1.0 - len(self.left) / len(self.stains)

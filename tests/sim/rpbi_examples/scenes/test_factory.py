@@ -1,0 +1,89 @@
+"""Both arms of a robot sort parts from a belt: tags lead them, they keep their distance, a miss is tried again."""
+
+from __future__ import annotations
+
+import pytest
+
+from robot_model.geometry import Pose
+from rpbi_examples.scenes import factory
+from rpbi_examples.scenes.cell.line import PARTS, grasp_yaw, is_in_box, on_belt
+from rpbi_examples.scenes.cell.two_arms import DOWN, TwoArms
+from rpbi_examples.scenes.scene import Put, Seen
+from rpbi_examples.scenes.task import make_env, run_episode
+
+LEFT_OUT, RIGHT_OUT = Pose((0.3, 0.25, 1.04), DOWN), Pose((0.3, -0.25, 1.04), DOWN)
+
+
+@pytest.fixture(scope="module")
+def env():
+    found = make_env("factory")
+    yield found
+    found.close()
+
+
+def test_a_camera_sees_parts_that_the_belt_carries_and_no_others(env):
+    belt_y_m = []
+    env.task.seed = 201
+    env.reset()
+    scene = env.task.scene
+    assert not scene.seen.tags, "the housing hides them"
+    for position in range(150):
+        env.world.put("conveyor/target", {"belt_joint": 0.003 * position})
+        env.step(None)
+        belt_y_m.append({part: tag.position[1] for part, tag in on_belt(scene.seen.tags).items()})
+    assert 1 <= len(belt_y_m[-1]) < len(PARTS)
+    for part in belt_y_m[-11]:
+        seen, true = on_belt(scene.seen.tags)[part].position, scene.seen.poses[part].position
+        assert seen[:2] == pytest.approx(true[:2], abs=0.004) and seen != true
+        assert belt_y_m[-11][part] - belt_y_m[-1][part] == pytest.approx(0.03, abs=0.004), "friction carries it along"
+
+
+class Stand:
+    """A scene with a robot that stands still."""
+
+    def __init__(self, joints):
+        self.seen = Seen(joints={"nextage": joints})
+        self.deeds = []
+
+    def put(self, slot, value):
+        self.deeds.append(Put(slot, value))
+
+
+@pytest.mark.parametrize("least_m, is_sent", [(0.05, False), (-1.0, True)])
+def test_an_arm_waits_before_it_comes_too_near_to_the_other(env, least_m, is_sent):
+    robot = env.world.bodies["nextage"]
+    env.reset(seed=200)
+    names = {joint.index: joint.name for joint in robot.model.moving}
+    scene = Stand({names[index]: position for index, position in robot.joint_positions().items()})
+    fingers = {"LHAND_JOINT0": 0.04, "RHAND_JOINT0": 0.04}
+    links = {"left": "LHAND_tip", "right": "RHAND_tip"}
+    arms = TwoArms(scene, "nextage", factory.URDF, "CHEST_JOINT0_Link", links, factory.CHEST, fingers, least_m)
+    assert arms.send("left", LEFT_OUT) and arms.send("right", RIGHT_OUT)
+    assert arms.send("left", Pose((0.45, 0.04, 1.0), DOWN))
+    sent = len(scene.deeds)
+    assert arms.send("right", Pose((0.45, -0.04, 1.0), DOWN)) is is_sent
+    assert (len(scene.deeds) > sent) is is_sent
+    assert arms.send("right", RIGHT_OUT), "the way out is always free"
+
+
+def test_a_hand_grasps_as_the_shape_of_the_part_lets_it():
+    block, cube, cylinder = (PARTS[name] for name in ("block_1", "cube_1", "cylinder_1"))
+    assert grasp_yaw(block, 2.0, -1.0) == pytest.approx(2.0 - 3.14159265)
+    assert grasp_yaw(cube, 2.0, -1.0) == pytest.approx(2.0 - 3.14159265)
+    assert grasp_yaw(cube, 0.4, -1.0) == pytest.approx(0.4 - 1.57079633)
+    assert grasp_yaw(cylinder, 2.0, -1.0) == -1.0
+
+
+def test_parts_count_in_the_compartment_of_their_kind_alone():
+    assert is_in_box("cube_2", (0.20, 0.05, 0.9))
+    assert not is_in_box("cube_2", (0.27, 0.05, 0.9)), "that of the cylinders"
+    assert not is_in_box("cube_2", (0.20, 0.05, 0.96)), "above the rim"
+    assert not is_in_box("cube_2", (0.20, 0.05, 0.02)), "on the floor"
+
+
+def test_a_grasp_that_misses_is_tried_again_and_then_left(env, monkeypatch):
+    monkeypatch.setattr(factory, "HELD_M", 1.0)
+    monkeypatch.setattr(factory.Factory, "longest_s", 7.0)
+    result = run_episode(env, 202)
+    tries = env.task.scene._tries.values()
+    assert (result.done, result.reason) == (0, "not done after 7 s") and max(tries) > 1

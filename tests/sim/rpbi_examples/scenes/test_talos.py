@@ -1,0 +1,52 @@
+"""A Talos stands, reaches and is pushed; what it cannot do ends its episode."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+pytest.importorskip("pinocchio")
+pytest.importorskip("daqp")
+
+from rpbi_examples.balance.largest_push import stands
+from rpbi_examples.scenes.scene import run_scene
+from rpbi_examples.scenes.task import EnvStage, make_env, run_episode
+
+
+@pytest.fixture(scope="module")
+def env():
+    found = make_env("talos")
+    yield found
+    found.close()
+
+
+def begin(env, seed: int):
+    env.task.seed = seed
+    env.reset(seed=seed)
+    return env.task.scene
+
+
+def test_it_stands_and_its_hand_comes_back_after_a_push(env):
+    result = run_episode(env, 2)
+    assert result.success, result
+    figures = result.figures
+    assert figures["hand error [mm]"] < 10.0 and figures["feet slip [mm]"] < 5.0
+    assert 1.0 < figures["largest lean [deg]"] < 10.0
+    efforts = env.world.bodies["talos"].motors.applied_efforts
+    assert len(efforts) == 32 and max(map(abs, efforts.values())) > 20.0  # torques hold it, not motors
+
+
+def test_a_push_beyond_its_strength_throws_it_over(env):
+    assert not stands(env, 2, math.pi, 120.0)
+    assert env.world.bodies["talos"].base_pose().position[2] < 0.8
+
+
+def test_a_target_out_of_reach_is_told_of(env):
+    scene = begin(env, 2)
+    x, y, z = scene.target.position
+    scene.target = scene.target._replace(position=(x + 1.0, y, z))
+    result = run_scene(scene, EnvStage(env))
+    assert not result.success and "the hand does not reach the ball" in result.reason
+    assert env.world.bodies["talos"].base_pose().position[2] > 0.82  # it stands all the same
+    assert result.figures["largest lean [deg]"] < 20.0 and result.figures["feet slip [mm]"] < 2.0

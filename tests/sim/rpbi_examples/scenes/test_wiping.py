@@ -1,0 +1,62 @@
+"""The board is wiped with the force that was asked for; too little force or too wide lanes make an episode fail."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from rpbi_examples.scenes import wiping
+from rpbi_examples.scenes.task import make_env, run_episode
+from rpbi_examples.scenes.wiping_plot import draw
+
+ROBOTS = Path(__file__).parents[4] / "src/rpbi_examples/robots"
+
+
+@pytest.fixture(scope="module")
+def env():
+    found = make_env("wiping")
+    yield found
+    found.close()
+
+
+def test_the_board_is_wiped_with_the_force(env, tmp_path):
+    result = run_episode(env, 203)
+    assert result.success, result
+    figures = result.figures
+    assert figures["mean force [N]"] == pytest.approx(figures["force [N]"], rel=0.01)
+    assert figures["way within 10 % [%]"] > 99.0
+    assert figures["stains gone [%]"] == 100.0 and figures["coverage [%]"] > 99.0
+    scene = env.task.scene
+    assert len(scene.stains) == 80 and not any(name.startswith("stain") for name in env.world.bodies)
+    draw(scene, result, "wiping", tmp_path / "plot.png")
+    assert (tmp_path / "plot.png").stat().st_size > 10_000
+
+
+def test_lanes_that_are_too_wide_leave_stains(env, monkeypatch):
+    monkeypatch.setattr(wiping, "LANES", 1)
+    result = run_episode(env, 203)
+    assert not result.success and not result.reason
+    assert result.figures["way within 10 % [%]"] > 95.0 and 20.0 < result.figures["stains gone [%]"] < 60.0
+    left = {name for name in env.world.bodies if name.startswith("stain")}
+    assert left == set(env.task.scene.left)
+
+
+def test_another_force_than_that_asked_for_fails_in_one_line(env, monkeypatch):
+    monkeypatch.setattr(wiping.Wiping, "tune", lambda *_, **__: None)  # the controller keeps its 10 N, straight down
+    result = run_episode(env, 203)
+    assert not result.success and result.reason.startswith("expected to press with 22.8 N, got ")
+    assert result.figures["stains gone [%]"] == 0.0
+
+
+def test_the_arm_is_that_of_the_other_examples():
+    arm, other = (ElementTree.parse(ROBOTS / f"{name}.urdf").getroot() for name in ("kuka_lwr_sponge", "kuka_lwr"))
+    for root, tools in ((arm, ["sponge"]), (other, ["sponge", "ball"])):
+        for tool in tools:
+            for part in root.findall(f"link[@name='end_effector_{tool}']"):
+                root.remove(part)
+    for joint in other.findall("joint[@name='end_effector_ball']"):
+        other.remove(joint)
+    texts = [ElementTree.canonicalize(ElementTree.tostring(root, "unicode"), strip_text=True) for root in (arm, other)]
+    assert texts[0] == texts[1]
