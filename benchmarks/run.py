@@ -23,7 +23,19 @@ BENCHMARKS = (
     *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "contacts", "physics"),
 )
 WHEN_NAMED = (
-    *("datasets", "dressing", "farm", "forks", "guard_faults", "gym", "haptics", "lfd", "live_plot", "passivity"),
+    *(
+        "datasets",
+        "dressing",
+        "examples",
+        "farm",
+        "forks",
+        "guard_faults",
+        "gym",
+        "haptics",
+        "lfd",
+        "live_plot",
+        "passivity",
+    ),
     *("press", "pushing", "recording", "soak", "streams", "teleop", "verify"),
 )
 """Those that take too long to run with the others."""
