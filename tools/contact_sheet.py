@@ -19,7 +19,7 @@ from rpbi_examples.scenes.task import EnvStage, make_env
 IMAGES = Path(__file__).parents[1] / "docs/images"
 SIZE_PX, COLUMNS, CAPTION_PX = (320, 240), 4, 22
 SEED = 3
-SCENES = {"cup": 6.0, "wiping": 8.0, "handover": 8.0, "talos": 5.0, "factory": 16.0, "dual_arm": 5.0}
+SCENES = {"cup": 6.0, "wiping": 8.0, "handover": 8.0, "talos": 3.96, "factory": 16.0, "dual_arm": 5.0}
 """Scenes, and when they are drawn [s]."""
 ROBOTS = {
     "kuka_lwr": ((1.6, -1.5, 1.3), (0.45, 0.0, 0.45)),
@@ -28,7 +28,7 @@ ROBOTS = {
     "kinova": ((1.1, -1.1, 0.9), (0.0, 0.0, 0.4)),
     "talos": ((2.4, -1.6, 1.7), (0.0, 0.0, 1.0)),
     "nextage": ((1.7, -1.1, 1.7), (0.0, 0.0, 1.0)),
-    "mobile_base": ((0.9, -1.5, 1.1), (-0.4, 0.0, 0.2)),
+    "mobile_base": ((0.3, -1.9, 1.2), (-0.9, 0.0, 0.2)),
     "human_model": ((2.6, -1.6, 1.6), (0.0, 0.0, 0.95)),
 }
 """Robots of the basic examples: where the camera is and where it looks [m]."""

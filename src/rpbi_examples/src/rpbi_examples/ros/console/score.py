@@ -26,9 +26,9 @@ def score(
 
         ./rpbi score cup --seeds 1-100 --json cup.json
 
-    It needs no ROS master. Success is judged by the state of the simulation. A seed leads to the same episode on any
-    computer, and in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed episodes
-    are in FOLDER/SCENE_failures.png; see docs/examples.md.
+    It needs no ROS master. Success is judged by the state of the simulation. A seed leads to the same episode in any
+    process, and in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed episodes are
+    in FOLDER/SCENE_failures.png; see docs/examples.md.
 
     Usage:
         ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--jobs N]

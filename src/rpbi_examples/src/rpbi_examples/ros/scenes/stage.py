@@ -52,7 +52,8 @@ LATE_S = 0.1
 class SimulatorStage(Stage):
     """Steps the simulator, and waits for what the scene sees of it.
 
-    Since the world waits for the scene, an episode goes as that of the same seed in another process, on any computer.
+    Since the world waits for the scene, an episode goes as that of the same seed in another process, however slow the
+    computer is.
 
     Args:
         watch: What scenes see.
