@@ -21,11 +21,11 @@ from .tasks import AccelerationTask, Approach, Gain, capture, pull, spring
 
 LINEAR, ANGULAR, UP = slice(0, 3), slice(3, 6), slice(2, 3)
 CAPTURE_WEIGHT = 100.0
-"""Of the capture point, before all others: a robot that falls reaches nothing."""
+"""Weight of the capture point, the largest of all: a robot that falls reaches nothing."""
 HEIGHT, UPRIGHT, POSTURE = Gain(50.0, 20.0), Gain(60.0, 5.0), Gain(30.0, 0.02)
-"""Of the centre of mass's height, of the torso, and of all joints, whose weight is low: they serve the other tasks."""
+"""Gains of the centre of mass's height, the torso and the posture, whose weight is low: it serves the others."""
 HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
-"""Of the hand's position and orientation."""
+"""Weights of the hand's position and orientation."""
 
 
 class BalanceConfig(ControllerConfig):
@@ -49,7 +49,9 @@ class BalanceConfig(ControllerConfig):
     friction: NonNegative = Field(0.5, description="Coefficient of friction that is relied on.")
     period_ticks: int = Field(2, ge=1, description="Ticks from one solution to the next; efforts stay in between.")
     capture_gain: NonNegative = Field(3.0, description="How far the centre of pressure goes beyond the capture point.")
-    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Of the hand, for its mass.")
+    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(
+        150.0, description="Stiffness of the hand, by mass."
+    )
     hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's way.")
 
 

@@ -21,7 +21,7 @@ FREE = 6
 
 
 class FrameMotion(NamedTuple):
-    """How a frame or the centre of mass moves, in m and rad, for n velocities of the robot.
+    """Motion of a frame or of the centre of mass, in m and rad, for n velocities of the robot.
 
     Attributes:
         jacobian: From velocities of the robot to the frame's, linear before angular, shape (6, n) or (3, n).
@@ -44,10 +44,10 @@ class FloatingRobot:
     Attributes:
         mass_matrix: Shape (n, n).
         bias: Gravity, Coriolis and centrifugal forces and the joints' damping, shape (n,) [N, N m].
-        positions: Of the joints, shape (n - 6,) [rad].
-        velocities: Of base and joints, shape (n,).
+        positions: Positions of the joints, shape (n - 6,) [rad].
+        velocities: Velocities of base and joints, shape (n,) [m/s, rad/s].
         count: n.
-        effort_limits: Of the joints, shape (n - 6,) [N m].
+        effort_limits: Largest efforts of the joints, shape (n - 6,) [N m].
         lower: Least positions of the joints, shape (n - 6,) [rad].
         upper: Greatest ones.
         centre: The centre of mass in the world, shape (3,) [m].

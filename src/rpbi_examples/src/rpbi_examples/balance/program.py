@@ -20,13 +20,13 @@ except ImportError as error:
 
 UNBOUNDED = 1e30
 EQUAL, SOFT = 5, 8
-"""How daqp marks an equation, and a bound that gives way where nothing else would do."""
+"""Marks of daqp: of an equation, and of a bound that gives way where there is no other solution."""
 LIMIT_RATE = 15.0
-"""How fast a joint may come to its limit [1/s]."""
+"""Rate at which a joint may approach its limit [1/s]."""
 WRENCH_COST = np.array((1e-5, 1e-5, 1e-6, 1e-3, 1e-3, 1e-3))
 """Costs of the squares of contact forces [1/N^2] and torques [1/(N m)^2]: small, so that both feet share the load."""
 FOOT_DAMPING = 20.0
-"""How fast a foot that moves is to come to rest [1/s]."""
+"""Rate at which a foot that moves comes to rest [1/s]."""
 
 
 class WholeBodyProgram:

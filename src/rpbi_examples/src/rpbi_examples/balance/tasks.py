@@ -14,11 +14,11 @@ from .dynamics import FrameMotion, rotation_of, turn_between, turned
 GRAVITY = 9.81
 """[m/s^2]."""
 RATE = 6.0
-"""How fast the rest of a way is covered [1/s]."""
+"""Rate at which the rest of a way is covered [1/s]."""
 TURN_SPEED = 1.5
 """Largest rotational speed [rad/s]."""
 LEASH_M, LEASH_RAD = 0.05, 0.3
-"""How far the point and the orientation may be ahead of the hand."""
+"""Largest lead of the target of the hand, in position and orientation."""
 
 
 class AccelerationTask(NamedTuple):
@@ -27,7 +27,7 @@ class AccelerationTask(NamedTuple):
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
         wanted: Shape (k,) [m/s^2 or rad/s^2].
-        weight: How much a deviation costs, by its square.
+        weight: Cost of the square of a deviation.
     """
 
     jacobian: Array
@@ -36,7 +36,7 @@ class AccelerationTask(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """How a spring pulls.
+    """Stiffness and weight of a spring.
 
     Attributes:
         stiffness: For each unit of mass [1/s^2].

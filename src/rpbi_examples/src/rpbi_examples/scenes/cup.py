@@ -9,6 +9,7 @@ import numpy as np
 
 from robot_model.geometry import ZERO, Pose, Vector, minus, norm, rotated
 
+from .parts.arm import about_z
 from .parts.polar import PolarArm, Spot
 from .scene import Scene, SceneFailedError, Watched
 
@@ -48,7 +49,7 @@ class Cup(Scene):
     def prepare(self) -> None:
         """Puts a cup of some friction on the table, the balls into it, and the shelf at some height."""
         radius, azimuth, yaw = self.random.uniform((0.58, -0.6, -math.pi), (0.7, 0.2, math.pi)).tolist()
-        cup = Pose(Spot(radius, azimuth, TABLE_M).pose().position, (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
+        cup = Pose(Spot(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
         self.place("cup", cup)
         self.change("cup", lateralFriction=float(self.random.uniform(0.4, 1.0)))
         for number, ball in enumerate(BALLS):

@@ -18,7 +18,7 @@ from robot_model.geometry import (
     rotated,
 )
 
-from .parts.arm import between, smooth
+from .parts.arm import about_z, between, smooth, tilt_deg
 from .scene import Scene, Touch, Watched
 
 HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
@@ -82,8 +82,7 @@ class DualArm(Scene):
 
     def note(self) -> None:
         """Notes the tilt of the box, and the forces on it while it is carried."""
-        up = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 0.0, 1.0))
-        self._tilt_deg = max(self._tilt_deg, math.degrees(math.acos(min(up[2], 1.0))))
+        self._tilt_deg = max(self._tilt_deg, tilt_deg(self.seen.poses["box"]))
         if self._is_carrying:
             self._forces.append(min(self._pressure(robot) for robot in FLANGES))
             left, right = (sum(touch.force[2] for touch in self._touches(robot)) for robot in FLANGES)
@@ -139,4 +138,4 @@ class DualArm(Scene):
 def _on_table(random: np.random.Generator) -> Pose:
     """Returns a random pose of the box on the table."""
     x, y, yaw = random.uniform((0.5, -0.08, -0.25), (0.6, 0.08, 0.25)).tolist()
-    return Pose((x, y, TABLE_M + HALF_HEIGHT_M), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
+    return Pose((x, y, TABLE_M + HALF_HEIGHT_M), about_z(yaw))

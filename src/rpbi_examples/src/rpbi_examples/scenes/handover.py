@@ -11,7 +11,8 @@ import numpy as np
 from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose, Vector
 
-from .parts.holding import Holders, PandaArm, Still, about_z, above, tilt_deg, until, yaw_to
+from .parts.arm import about_z, tilt_deg
+from .parts.holding import Holders, PandaArm, Still, above, until, yaw_to
 from .parts.person import SwayingPerson, together
 from .scene import Scene, SceneFailedError, Watched
 

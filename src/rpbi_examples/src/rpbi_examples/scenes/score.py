@@ -69,8 +69,10 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Iterator[SeedResul
     """
     if jobs == 1:
         _open(scene)
-        yield from map(_run, seeds)
-        _close()
+        try:
+            yield from map(_run, seeds)
+        finally:
+            _close()
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of small matrices would contend for the processors
     context = multiprocessing.get_context("spawn")

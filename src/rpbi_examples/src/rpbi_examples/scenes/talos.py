@@ -9,9 +9,10 @@ from functools import cache
 import numpy as np
 
 from robot_model.asset_files import find_file
-from robot_model.geometry import Pose, Vector, minus, norm, quaternion_of, quaternion_product, rotated, scaled
+from robot_model.geometry import Pose, Vector, minus, norm, quaternion_of, quaternion_product, scaled
 from robot_model.model import RobotModel
 
+from .parts.arm import tilt_deg
 from .scene import Scene, SceneFailedError, Watched
 
 URDF = "{example-robot-data}/robots/talos_data/robots/talos_reduced_box.urdf"
@@ -85,8 +86,7 @@ class Talos(Scene):
 
     def note(self) -> None:
         """Notes lean, way of the feet and error of the hand."""
-        up = rotated(self.pose(TORSO).quat_xyzw, (0.0, 0.0, 1.0))
-        self._lean_deg = math.degrees(math.acos(min(up[2], 1.0)))
+        self._lean_deg = tilt_deg(self.pose(TORSO))
         if self._feet:
             self._most_lean_deg = max(self._most_lean_deg, self._lean_deg)
             ways = [norm(minus(self.pose(sole).position, start)) for sole, start in zip(SOLES, self._feet)]

@@ -22,7 +22,7 @@ def score(
     out: Annotated[Path, Argument("FOLDER", parse=Path, files="*")] = Path("out/score"),
     jobs: Annotated[int | None, Argument("N", parse=int)] = None,
 ) -> int:
-    """Runs an example from many random starts, as fast as possible, and tells how often it succeeds.
+    """Runs a scene from many random starts, as fast as possible, and reports how often it succeeds.
 
         ./rpbi score cup --seeds 1-100 --json cup.json
 

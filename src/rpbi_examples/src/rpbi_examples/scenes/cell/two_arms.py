@@ -9,7 +9,7 @@ import numpy as np
 
 from custom_ros_tools.config import replace_package
 from robot_model.geometry import Pose, Vector, angle_between, minus, norm, quaternion_product
-from rpbi_examples.scenes.parts.arm import LedArm, between, smooth
+from rpbi_examples.scenes.parts.arm import LedArm, about_z, between, smooth
 from rpbi_examples.scenes.scene import Scene
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.robot import GuardedRobot
@@ -152,13 +152,9 @@ class Gripper:
 
     def go(self, position: Vector, yaw: float) -> Iterator[Pose]:
         """Goes along a line to where it points down, from rest to rest, with the position [m] between the fingers."""
-        start, end = self._arm.target, Pose(position, quaternion_product(_about_z(yaw), DOWN))
+        start, end = self._arm.target, Pose(position, quaternion_product(about_z(yaw), DOWN))
         way_s = norm(minus(end.position, start.position)) / self._speed
         turn_s = angle_between(start.quat_xyzw, end.quat_xyzw) / self._turn_speed
         count = math.ceil(max(way_s, turn_s) / self._cycle_s)
         for index in range(count):
             yield between(start, end, smooth((index + 1) / count))
-
-
-def _about_z(yaw: float) -> tuple[float, float, float, float]:
-    return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from custom_ros_tools.transforms import finite_vector
 from ik_ros.problem import IKProblem
 from ik_ros.solvers.kdl import KdlConfig, KdlSolver
-from robot_model.geometry import Pose, minus, plus, quaternion_of, quaternion_product, rotation_between, scaled
+from robot_model.geometry import (
+    Pose,
+    Quaternion,
+    minus,
+    plus,
+    quaternion_of,
+    quaternion_product,
+    rotated,
+    rotation_between,
+    scaled,
+)
 from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
 
@@ -107,3 +118,13 @@ def between(start: Pose, end: Pose, share: float) -> Pose:
     position = plus(start.position, scaled(share, minus(end.position, start.position)))
     turn = quaternion_of(scaled(share, rotation_between(start.quat_xyzw, end.quat_xyzw)))
     return Pose(position, quaternion_product(turn, start.quat_xyzw))
+
+
+def about_z(yaw: float) -> Quaternion:
+    """Returns a rotation about the vertical [rad]."""
+    return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+
+
+def tilt_deg(pose: Pose) -> float:
+    """Returns the angle between the z axis of a pose and the vertical [deg]."""
+    return math.degrees(math.acos(min(rotated(pose.quat_xyzw, (0.0, 0.0, 1.0))[2], 1.0)))

@@ -6,7 +6,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from robot_model.geometry import Pose, Quaternion, Vector, minus, norm, plus, rotated
+from robot_model.geometry import Pose, Vector, minus, norm, plus
 from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
 from .arm import LedArm, between, smooth
@@ -140,19 +140,9 @@ class PandaArm(LedArm):
         self._scene.put(f"{self._robot}/target", {FINGER: target_m})
 
 
-def about_z(yaw: float) -> Quaternion:
-    """Returns a rotation about the vertical [rad]."""
-    return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
-
-
 def above(place: Vector, height_m: float) -> Vector:
     """Returns the place that is higher by a height [m]."""
     return plus(place, (0.0, 0.0, height_m))
-
-
-def tilt_deg(pose: Pose) -> float:
-    """Returns the angle between the z axis of a pose and the vertical [deg]."""
-    return math.degrees(math.acos(min(rotated(pose.quat_xyzw, (0.0, 0.0, 1.0))[2], 1.0)))
 
 
 def yaw_to(place: Vector, goal: Pose) -> float:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from robot_model.geometry import Pose, Vector
 from rpbi_examples.scenes.scene import Scene
 
-from .arm import LedArm, smooth
+from .arm import LedArm, about_z, smooth
 
 SHORTEST_S = 0.5
 
@@ -40,7 +40,7 @@ class Spot(NamedTuple):
     def pose(self) -> Pose:
         """Returns the pose in the world whose axis x points away from the axis, and z up."""
         x, y = self.radius * math.cos(self.azimuth), self.radius * math.sin(self.azimuth)
-        return Pose((x, y, self.height), (0.0, 0.0, math.sin(self.azimuth / 2.0), math.cos(self.azimuth / 2.0)))
+        return Pose((x, y, self.height), about_z(self.azimuth))
 
 
 class PolarArm(LedArm):
