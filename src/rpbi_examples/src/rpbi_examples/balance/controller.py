@@ -49,9 +49,7 @@ class BalanceConfig(ControllerConfig):
     friction: NonNegative = Field(0.5, description="Coefficient of friction that is relied on.")
     period_ticks: int = Field(2, ge=1, description="Ticks from one solution to the next; efforts stay in between.")
     capture_gain: NonNegative = Field(3.0, description="How far the centre of pressure goes beyond the capture point.")
-    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(
-        150.0, description="Stiffness of the hand, by mass."
-    )
+    hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Stiffness of the hand, by mass.")
     hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's way.")
 
 
