@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import hashlib
 import os
 import random
@@ -25,7 +26,10 @@ KILLS, QUICK_KILLS = 100, 5
 STOPPED_S = 3.0
 TOPICS = [JOINT_STATES, "/tf", "/rpbi/state", "/rpbi/commands"]
 IMAGES = [COLOUR, DEPTH]
+COUNTED = (JOINT_STATES, *IMAGES)
+"""Topics of one publisher each, whose messages are numbered."""
 REPAIRED_S = 20.0
+ANSWERED_S = 60.0
 
 
 def run(quick: bool) -> list[Result]:
@@ -51,16 +55,24 @@ def _lost(folder: Path, name: str, seconds: float, stopped_s: float) -> list[Res
         recorder._process.send_signal(signal.SIGSTOP)
         time.sleep(stopped_s)
         recorder._process.send_signal(signal.SIGCONT)
-        sent = recorder.published()
-    numbers: dict[str, list[int]] = {topic: [] for topic in sent}
+        sent = _published(recorder)
+    numbers: dict[str, list[int]] = collections.defaultdict(list)
     with rosbag.Bag(str(path)) as bag:
         for topic, message, _ in bag.read_messages(raw=True):
             numbers[topic].append(int.from_bytes(message[1][:4], "little"))  # header.seq counts what is published
-    counted = (JOINT_STATES, *IMAGES)
-    lost = sum(numbers[topic][-1] - numbers[topic][0] + 1 - len(numbers[topic]) for topic in counted)
+    lost = sum(numbers[topic][-1] - numbers[topic][0] + 1 - len(numbers[topic]) for topic in COUNTED)
     lost += sum(max(count - len(numbers[topic]), 0) for topic, count in sent.items())
     figure = f"{name}: lost of {sum(map(len, numbers.values()))}"
     return [Result("recording", figure, float(lost), "messages", None, Target(0.0))]
+
+
+def _published(recorder: Recorder) -> dict[str, int]:
+    """Returns the publishers' own counts of messages, when all of `COUNTED` have answered."""
+    end_s = time.monotonic() + ANSWERED_S
+    while missing := set(COUNTED) - (sent := recorder.published()).keys():
+        if time.monotonic() > end_s:
+            raise RuntimeError(f"no publisher of {', '.join(sorted(missing))} reports a count within {ANSWERED_S:g} s")
+    return sent
 
 
 def _after_kills(ros: Session, kills: int) -> list[Result]:

@@ -6,6 +6,9 @@ import json
 import os
 import re
 import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +32,7 @@ class Scene(NamedTuple):
     launch: tuple[str, ...]
     ready: str
     program: str | None = None
-    longest_s: float = 3.0
+    longest_s: float = 1.8
 
 
 FAST = "real_time_factor:=0"
@@ -37,10 +40,10 @@ SCENES = {
     "pushing": Scene(("basic_example_kuka_lwr.launch", FAST), "/rpbi/reset"),
     "grasping": Scene(("grasp_example.launch", FAST), "/rpbi/reset"),
     "wiping": Scene(("wiping_example.launch", FAST), "/rpbi/reset"),
-    "a person's stick": Scene(("teleop.launch", "device:=joystick"), "/toggle_teleop_tf", "stick", 4.0),
+    "a person's stick": Scene(("teleop.launch", "device:=joystick"), "/toggle_teleop_tf", "stick", 3.0),
 }
 EPISODES, QUICK_EPISODES = 250, 3
-SHORTEST_S = 1.2
+SHORTEST_S = 0.6
 """Length of the shortest episode, in wall time [s]."""
 CHANGED = 20
 """Number of episodes of a scene that are verified with a changed file."""
@@ -49,33 +52,47 @@ DIGIT = re.compile(r"(baseMass|lateralFriction|timeStep|gravZ|rollingFriction): 
 
 def run(quick: bool) -> list[Result]:
     """Records episodes of each scene, and verifies them in fresh processes, as `./rpbi verify` does."""
-    count = QUICK_EPISODES if quick else EPISODES
-    results = []
-    for name, scene in SCENES.items():
-        with Session() as ros:
-            folder = EpisodeFolder(ros.folder / "episodes")
-            _record(ros, scene, folder, count)
-            numbers = folder.numbers()
-            same = 0
-            for verdict in verify_all(folder, numbers, os.cpu_count() or 1, ()):
-                same += verdict.is_same
-                if not verdict.is_same:
-                    print(f"{name}: episode {verdict.number}: {verdict.text}", file=sys.stderr, flush=True)
-            results.append(Result("verify", f"{name}: the same, of {count}", same, "", None, Target(count, True)))
-            named, affected = _named_after_a_change(folder, numbers[:CHANGED])
-            figure = f"{name}: named after one digit of a file was changed, of {affected}"
-            results.append(Result("verify", figure, named, "", None, Target(affected, True)))
-    return results
+    with tempfile.TemporaryDirectory() as root:
+        folders = {name: EpisodeFolder(Path(root) / name.replace(" ", "_")) for name in SCENES}
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # a recorder mostly waits
+            recordings = [
+                pool.submit(_record, SCENES[name], folders[name], QUICK_EPISODES if quick else EPISODES)
+                for name in SCENES
+            ]
+        for recording in recordings:
+            recording.result()
+        return [result for name in SCENES for result in _verified(name, folders[name])]
 
 
-def _record(ros: Session, scene: Scene, folder: EpisodeFolder, count: int) -> None:
-    random = np.random.default_rng(len(scene.launch))
+def _verified(name: str, folder: EpisodeFolder) -> list[Result]:
+    numbers = folder.numbers()
+    same = 0
+    for verdict in verify_all(folder, numbers, os.cpu_count() or 1, ()):
+        same += verdict.is_same
+        if not verdict.is_same:
+            print(f"{name}: episode {verdict.number}: {verdict.text}", file=sys.stderr, flush=True)
+    named, affected = _named_after_a_change(folder, numbers[:CHANGED])
+    changed = f"{name}: named after one digit of a file was changed, of {affected}"
+    return [
+        Result("verify", f"{name}: the same, of {len(numbers)}", same, "", None, Target(len(numbers), True)),
+        Result("verify", changed, named, "", None, Target(affected, True)),
+    ]
+
+
+def _record(scene: Scene, folder: EpisodeFolder, count: int) -> None:
+    lengths = np.random.default_rng(len(scene.launch)).uniform(SHORTEST_S, scene.longest_s, count).round(2).tolist()
+    with Session() as ros:
+        _record_in(ros, scene, folder, lengths)
+    if len(folder.numbers()) != count:
+        raise RuntimeError(f"{scene.launch[0]}: {len(folder.numbers())} episodes of {count} were recorded")
+
+
+def _record_in(ros: Session, scene: Scene, folder: EpisodeFolder, lengths: list[float]) -> None:
     ros.node(["roslaunch", "rpbi_examples", *scene.launch, "headless:=true"], scene.ready)
     if scene.program:
         ros.program(scene.program)
     ros.set_parameters("/record", {"folder": str(folder.path), "reset": True, "disk_reserve_mb": 100.0})
     ros.node(["rosrun", "episodes", "record_node.py"], "/record/start")
-    lengths = random.uniform(SHORTEST_S, scene.longest_s, count).round(2).tolist()
     ros.result_of(ros.program("record_episodes", json.dumps(lengths)), timeout_s=60.0 + 10.0 * sum(lengths))
 
 
