@@ -1,6 +1,10 @@
-"""Costs of predictions: one that is good, and some that fail."""
+"""Costs of predictions: some that are good, and some that fail."""
 
+import builtins
 import os
+import pickle
+import resource
+import signal
 
 
 def height(world):
@@ -23,6 +27,45 @@ def endless(world):
     return float("nan")
 
 
-def dies(world):
-    """Ends its process."""
-    os._exit(9)
+def killed(world):
+    """Has its process killed, as the kernel does when memory runs out."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def hungry(world):
+    """Takes more memory than its process may have, if the first joint moves."""
+    if moves(world):
+        resource.setrlimit(resource.RLIMIT_AS, (1 << 28, 1 << 28))
+        return len(bytearray(1 << 30))
+    return 0.0
+
+
+def unwritten(world):
+    """Has no memory left when the answer is written."""
+    opened = open
+
+    def fail_once(*_):
+        builtins.open = opened
+        raise MemoryError
+
+    builtins.open = fail_once
+    return 0.0
+
+
+def cut(world):
+    """Has its answer cut short, if the first joint moves."""
+    if moves(world):
+        dumps = pickle.dumps
+        pickle.dumps = lambda answer: dumps(answer)[:-20]
+    return 0.0
+
+
+def kills_the_follower(world):
+    """Kills the process that it was forked from."""
+    os.kill(os.getppid(), signal.SIGKILL)
+    return 0.0
+
+
+def moves(world):
+    """Returns whether the first joint of the arm moves."""
+    return abs(next(iter(world.bodies["iiwa"].joint_positions().values()))) > 0.001

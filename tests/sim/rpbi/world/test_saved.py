@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import costs
+import numpy as np
 import pybullet
 import pytest
 import scripted_session as script
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
+from rpbi.follower import __main__ as follower
 from rpbi.world import World
+from rpbi.world.forks.prediction import Prediction, PredictionJob
+from rpbi.world.forks.shadow import Shadow
 from rpbi.world.saved.command_log import MAX_KEPT
 from rpbi.world.saved.state import WorldState
 
@@ -129,7 +135,8 @@ def test_a_process_that_ends_while_it_starts_is_named_and_the_next_one_predicts(
     [
         ("costs:broken", "RuntimeError: no such thing"),
         ("costs:endless", "cost: expected a finite number at tick 1, got nan"),
-        ("costs:dies", "its process ended early"),
+        ("costs:killed", "its process ended early"),
+        ("costs:unwritten", "its process ended early"),
         ("nowhere:cost", "nowhere"),
     ],
 )
@@ -139,6 +146,54 @@ def test_a_cost_that_fails_is_named_and_the_world_goes_on(arm, cost, fault):
     assert fault in prediction.fault and prediction.cost == float("inf")
     assert arm.state_hash() == before
     assert arm.predict([[]], 5)[0].fault == ""
+
+
+@pytest.mark.parametrize(("cost", "fault"), [("hungry", "MemoryError"), ("cut", "its process ended early")])
+def test_a_candidate_without_memory_costs_itself_alone(arm, cost, fault):
+    first, second, third = arm.predict([[], [(0, TARGET, {"lbr_iiwa_joint_1": 1.0})], []], 30, cost=f"costs:{cost}")
+    assert fault in second.fault and second.cost == float("inf")
+    assert (first.fault, third.fault) == ("", "") and first.state_hash == third.state_hash
+
+
+def test_an_answer_that_is_cut_anywhere_is_the_same_fault():
+    prediction = Prediction(1.0, "hash", np.arange(3), {"box": np.ones((3, 7))}, {"iiwa": np.ones((3, 7))})
+    answer = pickle.dumps(prediction)
+    assert follower._read(answer).poses["box"].shape == (3, 7)
+    assert {follower._read(answer[:end]).fault for end in range(len(answer))} == {follower._read(b"").fault}
+
+
+def test_a_process_that_cannot_fork_keeps_no_pipe(monkeypatch):
+    forks = iter([1, 1])
+
+    def fork() -> int:
+        for pid in forks:
+            return pid
+        raise BlockingIOError("no process is left")
+
+    before = os.listdir("/proc/self/fd")
+    monkeypatch.setattr(os, "fork", fork)
+    with pytest.raises(BlockingIOError):
+        list(follower._predict_all(None, [[], [], []], PredictionJob(5, (), 1, None), 3))
+    assert os.listdir("/proc/self/fd") == before
+
+
+def test_another_process_follows_when_one_has_died(arm, monkeypatch):
+    with pytest.raises(InterfaceError, match="the process that follows the world has ended"):
+        arm.predict([[]], 5, cost="costs:kills_the_follower")
+    assert arm.predict([[]], 5)[0].fault == ""
+    with monkeypatch.context() as patch, pytest.raises(InterfaceError, match="has ended"):
+        patch.setattr(Shadow, "follow", lambda shadow, *_: shadow._process.kill())
+        arm.fork()
+    with arm.fork()[0] as fork:
+        assert fork.state_hash() == arm.state_hash()
+
+
+def test_a_cost_that_only_this_process_has_is_named(arm, monkeypatch):
+    here = ModuleType("only_here")
+    exec("def cost(world): return 0.0", vars(here))
+    monkeypatch.setitem(sys.modules, "only_here", here)
+    with pytest.raises(InterfaceError, match="the process that follows the world: .*'only_here'"):
+        arm.predict([[]], 5, cost=here.cost)
 
 
 def test_inputs_that_are_refused_are_named(arm):

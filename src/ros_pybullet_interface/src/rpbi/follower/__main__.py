@@ -42,16 +42,15 @@ def main() -> None:
 
     def fork() -> None:
         assert world is not None
-        own = Connection(recv_handle(connection))
-        os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
-        if os.fork():
-            own.close()
-            return
-        try:
-            connection.close()
-            _serve(own, _requests_of(world))
-        finally:
-            os._exit(0)
+        with Connection(recv_handle(connection)) as own:
+            os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
+            if os.fork():
+                return
+            try:
+                connection.close()
+                _serve(own, _requests_of(world))
+            finally:
+                os._exit(0)
 
     def predictions(candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
         assert world is not None
@@ -84,10 +83,11 @@ def _requests_of(world: World) -> dict[str, Callable[..., Any]]:
 def _serve(connection: Connection, requests: dict[str, Callable[..., Any]]) -> None:
     while True:
         try:
-            name, arguments = connection.recv()
+            request = connection.recv_bytes()
         except (EOFError, OSError):
             return
         try:
+            name, arguments = pickle.loads(request)  # which may name a function that is not known here
             answer = pickle.dumps((True, requests[name](*arguments)))
         except Exception as error:
             answer = pickle.dumps((False, _words(error)))
@@ -106,41 +106,63 @@ def _predict_all(world: World, candidates: Sequence[Candidate], job: PredictionJ
     waiting = list(enumerate(candidates))
     answers: dict[int, list[bytes]] = {}
     running: dict[int, int] = {}
-    while waiting or running:
-        while waiting and len(running) < jobs:
-            index, candidate = waiting.pop(0)
-            running[_start(world, candidate, job)] = index
-            answers[index] = []
-        for pipe in select.select(list(running), [], [])[0]:
-            if part := os.read(pipe, PIPE_BYTES):
-                answers[running[pipe]].append(part)
-            else:
-                os.close(pipe)
-                del running[pipe]
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                index, candidate = waiting.pop(0)
+                running[_start(world, candidate, job)] = index
+                answers[index] = []
+            for pipe in select.select(list(running), [], [])[0]:
+                if part := os.read(pipe, PIPE_BYTES):
+                    answers[running[pipe]].append(part)
+                else:
+                    os.close(pipe)
+                    del running[pipe]
+    finally:
+        for pipe in running:
+            os.close(pipe)
     for index in range(len(candidates)):
         yield _read(b"".join(answers[index]))
 
 
 def _start(world: World, candidate: Candidate, job: PredictionJob) -> int:
-    """Forks, and returns the pipe from which the prediction can be read."""
+    """Forks, and returns the pipe from which the prediction can be read.
+
+    Raises:
+        OSError: If there is no memory, or no process, for the fork.
+    """
     reading, writing = os.pipe()
-    if os.fork():
+    try:
+        is_here = os.fork() > 0
+    except OSError:
+        os.close(reading)
+        os.close(writing)
+        raise
+    if is_here:
         os.close(writing)
         return reading
-    os.close(reading)
+    try:  # whatever fails here ends the fork, which must not serve in place of this process
+        os.close(reading)
+        prediction = _predicted(world, candidate, job)
+        with open(writing, "wb") as pipe:
+            pipe.write(pickle.dumps(prediction))
+    finally:
+        os._exit(0)
+
+
+def _predicted(world: World, candidate: Candidate, job: PredictionJob) -> Prediction:
     try:
-        answer = predict(world, candidate, job)
+        return predict(world, candidate, job)
     except Exception as error:
-        answer = Prediction(float("inf"), fault=_words(error))
-    with open(writing, "wb") as pipe:
-        pipe.write(pickle.dumps(answer))
-    os._exit(0)
+        return Prediction(float("inf"), fault=_words(error))
 
 
 def _read(text: bytes) -> Prediction:
-    if not text:
+    """Returns a prediction; text that is missing or cut short is a fault."""
+    try:
+        prediction: Prediction = pickle.loads(text)
+    except (EOFError, pickle.UnpicklingError):
         return Prediction(float("inf"), fault="its process ended early: its memory may have run out")
-    prediction: Prediction = pickle.loads(text)
     return prediction
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -534,7 +535,8 @@ class World:
         Raises:
             InterfaceError: If the state cannot be saved, or does not come to be the same there.
         """
-        return self._followed().fork(count)
+        with self._followed() as shadow:
+            return shadow.fork(count)
 
     def predict(
         self,
@@ -568,19 +570,21 @@ class World:
         for name in names:
             self._contents.body(name)
         job = PredictionJob(ticks, names, every, cost)
-        return self._followed().predict(candidates, job, jobs or os.cpu_count() or 1)
+        with self._followed() as shadow:
+            return shadow.predict(candidates, job, jobs or os.cpu_count() or 1)
 
-    def _followed(self) -> Shadow:
-        """Returns the process that follows this world, at the present state."""
+    @contextmanager
+    def _followed(self) -> Iterator[Shadow]:
+        """Yields the process that follows this world, at the present state; an error ends it."""
         self.prepare_forks()
         assert self._shadow is not None
         try:
             new = self.commands.records(self._shadow.commands)
             self._shadow.follow(new, self.clock.tick, self.state_hash())
-        except InterfaceError:
+            yield self._shadow
+        except BaseException:  # an interrupted one would give its answer to the next question
             self._end_shadow()
             raise
-        return self._shadow
 
     def _end_shadow(self) -> None:
         if self._shadow is not None:
