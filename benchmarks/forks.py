@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -15,8 +16,9 @@ from result import Result, Target
 from session import JOINT_STATES, Session
 
 SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
-sys.path += [str(SUPPORT / each) for each in ("worlds", "robots")]
-import scripted_session as script  # noqa: E402
+sys.path += (support := [str(SUPPORT / each) for each in ("worlds", "robots")])
+os.environ["PYTHONPATH"] = os.pathsep.join((os.environ.get("PYTHONPATH", ""), *support))  # of forks
+import sleeping_session as script  # noqa: E402
 
 from rpbi.world import World  # noqa: E402
 
@@ -25,6 +27,8 @@ FIRST_SEED = 5000
 """Seeds from here on were not used before."""
 SHORTEST, LONGEST, AHEAD = 100, 900, 500
 """Ticks before a state is saved, and after."""
+ASLEEP = 0.4
+"""Smallest share of worlds in which a body sleeps when they are saved."""
 KUKA = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
 ROBOT, TARGET = "kuka_lwr", "kuka_lwr/target"
 CANDIDATES, TICKS = 8, 200
@@ -32,6 +36,8 @@ CHOSEN, QUICK_CHOSEN = 100, 5
 LARGEST_S = 0.2
 PREPARED_S = 2.0
 """Time between the start of the process that forks, and the first prediction."""
+SAVED_S = 10
+"""Time with a target at every tick before a save [s]."""
 BESIDE_S, QUICK_BESIDE_S = 20.0, 5.0
 HZ, LEAST_HZ = 1000.0, 998.0
 ELSEWHERE = (
@@ -46,17 +52,23 @@ def run(quick: bool) -> list[Result]:
     return [
         *_exact(QUICK_SEEDS if quick else SEEDS),
         *_predictions(QUICK_CHOSEN if quick else CHOSEN),
+        *_saves(),
         *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
     ]
 
 
 def _exact(seeds: int) -> list[Result]:
     same = dict.fromkeys(("same process", "fork", "another process", "PyBullet's own saveState"), 0)
+    asleep = 0
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-        for way, is_same in _session(seed).items():
+        sleeps, ways = _session(seed)
+        asleep += sleeps
+        for way, is_same in ways.items():
             same[way] += is_same
     control = same.pop("PyBullet's own saveState")
+    share = Target(ASLEEP * seeds, at_least=True)
     return [
+        Result("forks", f"worlds in which a body sleeps when they are saved, of {seeds}", asleep, "", None, share),
         *(
             Result("forks", f"{way}: equal {AHEAD} ticks on, of {seeds}", count, "", None, Target(seeds, at_least=True))
             for way, count in same.items()
@@ -65,16 +77,18 @@ def _exact(seeds: int) -> list[Result]:
     ]
 
 
-def _session(seed: int) -> dict[str, bool]:
-    """Returns by way whether a session goes on in the same way."""
+def _session(seed: int) -> tuple[bool, dict[str, bool]]:
+    """Returns whether a body sleeps when a session is saved, and by way whether it goes on in the same way."""
     with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
-        world = script.build(Path(folder))
+        world = script.build(Path(folder), seed)
         script.run(world, seed, int(np.random.default_rng(seed).integers(SHORTEST, LONGEST)))
         file = Path(folder) / "here.world"
         state = world.save(file)
-        with world.fork()[0] as fork:
+        fork, other = world.fork(2)
+        with fork, other:
             fork.step(AHEAD)
             hashes = {"fork": fork.state_hash()}
+            sleeps = bool(other.call(script.sleeping))
         saved = world.pb.saveState()
         expected = _hash_later(world)
         command = [sys.executable, "-c", ELSEWHERE, str(file), str(AHEAD)]
@@ -86,7 +100,7 @@ def _session(seed: int) -> dict[str, bool]:
         world.restore(state)
         hashes["same process"] = _hash_later(world)
         world.close()
-    return {way: found == expected for way, found in hashes.items()}
+    return sleeps, {way: found == expected for way, found in hashes.items()}
 
 
 def _hash_later(world: World) -> str:
@@ -117,9 +131,9 @@ def _predictions(chosen: int) -> list[Result]:
     return [
         Result("forks", f"chosen candidate as predicted, of {chosen}", same, "", None, Target(chosen, at_least=True)),
         Result("forks", f"{what}: median", float(np.median(durations)), "s", None, Target(LARGEST_S)),
-        Result("forks", f"{what}: longest", max(durations), "s"),
+        Result("forks", f"{what}: longest", max(durations), "s", None, Target(LARGEST_S)),
         Result("forks", f"the first one, prepared {PREPARED_S:g} s before", prepared_s, "s", None, Target(LARGEST_S)),
-        Result("forks", "the first one, not prepared", cold_s, "s"),
+        Result("forks", "the first one, not prepared, for information", cold_s, "s"),
     ]
 
 
@@ -137,6 +151,23 @@ def _first(random: np.random.Generator, prepared_s: float) -> float:
     taken_s = time.perf_counter() - begin_s
     world.close()
     return taken_s
+
+
+def _saves() -> list[Result]:
+    """Saves a world after some seconds with a target at every tick."""
+    random, world = np.random.default_rng(FIRST_SEED), World.from_file(KUKA)
+    for _ in range(round(SAVED_S / world.clock.dt_s)):
+        world.put(TARGET, {"lwr_arm_0_joint": float(random.uniform(-0.5, 0.5))})
+        world.step()
+    with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
+        file = Path(folder) / "here.world"
+        begin_s = time.perf_counter()
+        world.save(file)
+        taken_s = time.perf_counter() - begin_s
+        size = file.stat().st_size
+    what = f"save after {SAVED_S} s, {world.commands.count} targets"
+    world.close()
+    return [Result("forks", f"{what}: time", taken_s, "s"), Result("forks", f"{what}: file", size / 1000, "kB")]
 
 
 def _beside_a_node(seconds: float) -> list[Result]:

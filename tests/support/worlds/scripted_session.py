@@ -10,9 +10,10 @@ import math
 import random
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pybullet
 from mobile_base import mobile_base
@@ -41,12 +42,33 @@ JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL, IMPEDANCE_CONTROL)
 
 
-def build(folder: Path | None = None) -> World:
+class Layout(NamedTuple):
+    """Places of what is in the world of a session.
+
+    Attributes:
+        joints_deg: Joints of the arm at the start [deg].
+        heap: Five places of boxes and balls [m].
+        base: Place of the base that drives [m].
+        more: More dynamic objects.
+        main: Keys of the main file.
+    """
+
+    joints_deg: Mapping[str, float] = {"lbr_iiwa_joint_2": 40.0, "lbr_iiwa_joint_4": -60.0}
+    heap: Sequence[tuple[float, ...]] = tuple((0.45, 0.02 * turn, 0.1 + 0.21 * turn) for turn in range(5))
+    base: tuple[float, ...] = (-0.8, 0.0, 0.0)
+    more: tuple[dict[str, Any], ...] = ()
+    main: Mapping[str, Any] = {}
+
+
+HEAP = Layout()
+
+
+def build(folder: Path | None = None, layout: Layout = HEAP) -> World:
     """Builds boxes and balls about an arm with a force-torque sensor, and a base that drives into them."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = folder or Path(temporary)
         arm = iiwa(
-            initial_joint_position={"lbr_iiwa_joint_2": 40.0, "lbr_iiwa_joint_4": -60.0},
+            initial_joint_position=dict(layout.joints_deg),
             joint_state_publisher_hz=500,
             broadcast_link_states=True,
             enabled_joint_force_torque_sensors=[
@@ -61,18 +83,17 @@ def build(folder: Path | None = None) -> World:
             setJointMotorControlArray={"controlMode": "POSITION_CONTROL", "positionGains": [0.05]},
         )
         things = tuple(
-            (box if turn % 2 else ball)(
-                f"body{turn}", basePosition=[0.45, 0.02 * turn, 0.1 + 0.21 * turn], broadcast_hz=100
-            )
-            for turn in range(5)
+            (box if turn % 2 else ball)(f"body{turn}", basePosition=list(place), broadcast_hz=100)
+            for turn, place in enumerate(layout.heap)
         )
         follower = {**box("follower"), "object_tf": {"tf_id": "hand", "hz": 30}}
         del follower["baseMass"]
         path = write_world(
             folder,
             collision=(FLOOR, follower),
-            dynamic=things,
-            robots=(arm, mobile_base(folder, loadURDF={"basePosition": [-0.8, 0.0, 0.0]})),
+            dynamic=(*things, *layout.more),
+            robots=(arm, mobile_base(folder, loadURDF={"basePosition": list(layout.base)})),
+            **layout.main,
         )
         return World.from_file(path)
 
@@ -210,12 +231,12 @@ class Script:
         world.attach(AttachmentConfig.parse(keys, "script"))
 
 
-def run(world: World, seed: int, ticks: int, every: int = 500) -> list[Checkpoint]:
+def run(world: World, seed: int, ticks: int, every: int = 500, script: type[Script] = Script) -> list[Checkpoint]:
     """Runs a script and returns the states at every so many ticks."""
-    script = Script(seed)
+    acting = script(seed)
     states = []
     for _ in range(ticks):
-        script.act(world)
+        acting.act(world)
         world.step()
         if world.clock.tick % every == 0:
             states.append(Checkpoint(world.resets, world.clock.tick, world.commands.count, world.state_hash()))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from robot_model.geometry import rotation_between
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
+from rpbi.linear_algebra import solve
 from rpbi.world import World
 
 from .parts import link_index, robot_of
@@ -118,7 +119,7 @@ class HandAction:
         error = np.array([*map(sub, self.goal, pose.position), *turn])
         positions = [state[0] for state in robot.drive.measured().values()]
         jacobian = robot.robot_model.jacobian(robot.base_pose(), positions, self._link)
-        change = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + DAMPING, error)
+        change = jacobian.T @ solve(jacobian @ jacobian.T + DAMPING, error)
         targets = np.minimum(np.maximum(positions + change, self._lower), self._upper)[self._moves]
         self._world.put(self._slot, JointCommand(self._names, position=targets.tolist()))
 

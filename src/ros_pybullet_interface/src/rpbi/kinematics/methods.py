@@ -9,6 +9,7 @@ import pybullet
 
 from robot_model.limits import Limits
 from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from rpbi.linear_algebra import inverse
 
 from .chain import BulletChain, Target
 
@@ -167,9 +168,9 @@ def _step(
     free = np.ones(len(wish), dtype=bool)
     for _ in range(len(wish)):
         J = jacobian[:, free]
-        inverse = J.T @ np.linalg.inv(J @ J.T + POSTURE_DAMPING * np.eye(len(J)))
+        pseudoinverse = J.T @ inverse(J @ J.T + POSTURE_DAMPING * np.eye(len(J)))
         rest = error - jacobian[:, ~free] @ step[~free]
-        mended, wished = inverse @ rest, wish[free] - inverse @ (J @ wish[free])
+        mended, wished = pseudoinverse @ rest, wish[free] - pseudoinverse @ (J @ wish[free])
         most = np.abs(wished).max(initial=0.0)
         step[free] = mended + wished * min(1.0, LARGEST_POSTURE_STEP / most if most else 1.0)
         beyond = free & ((step < lower) | (step > upper))

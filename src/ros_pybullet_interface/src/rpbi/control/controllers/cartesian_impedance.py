@@ -14,9 +14,10 @@ from rpbi.control.streams.jitter_buffer import BUFFER_S, JitterBuffer
 from rpbi.control.streams.target_stream import TargetStream
 from rpbi.engine.inputs import check_pose
 from rpbi.geometry import Pose, rotated
+from rpbi.linear_algebra import inverse
 
 from .controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
-from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, inverse, turn_between
+from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, turn_between
 
 LEAST_MOBILITY = 0.01
 """Smallest mobility that damping is computed with [1/kg, 1/(kg m^2)], for directions in which the arm hardly moves."""

@@ -14,11 +14,11 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
-from scipy.linalg import lapack
 
 from custom_ros_tools.errors import hint
 from custom_ros_tools.schema import ConfigModel, Positive, Unit
 from robot_model.geometry import Vector, scaled
+from rpbi.linear_algebra import solve
 from rpbi.urdf.joints import Joint
 
 Array = npt.NDArray[np.float64]
@@ -141,8 +141,7 @@ def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, veloc
     by_velocity = damping + stiffness * dt_s
     stiff = mass.copy()
     stiff.reshape(-1)[:: len(mass) + 1] += by_velocity * dt_s
-    acceleration: Array = lapack.dposv(stiff, forces - by_velocity * velocity)[1]
-    return acceleration
+    return solve(stiff, forces - by_velocity * velocity)
 
 
 def implicit_wrench(
@@ -161,19 +160,9 @@ def implicit_wrench(
     """
     by_acceleration = (damping + stiffness * dt_s) * dt_s
     given = wrench - by_acceleration * acceleration
-    solved: Array = lapack.dgesv(_EYE + by_acceleration[:, None] * mobility, given)[2]
-    return solved
-
-
-def inverse(matrix: Array) -> Array:
-    """Returns the inverse of a symmetric positive definite matrix, such as a mass matrix.
-
-    It avoids a solution of several right sides at once: LAPACK uses threads of its own for that, which on a busy
-    machine wait for each other much longer than the computation lasts.
-    """
-    root = lapack.dtrtri(lapack.dpotrf(matrix, lower=1)[0], lower=1)[0]
-    inverted: Array = root.T @ root
-    return inverted
+    root = np.sqrt(by_acceleration)  # of (1 + by_acceleration mobility) x = given, for a symmetric matrix
+    scaled_mobility = root[:, None] * mobility
+    return given - root * solve(_EYE + scaled_mobility * root, scaled_mobility @ given)
 
 
 def force_for(mobility: Array, acceleration: Array) -> Array:
@@ -182,8 +171,7 @@ def force_for(mobility: Array, acceleration: Array) -> Array:
     Args:
         mobility: Acceleration by force, shape (6, 6); of a singular arm it is not invertible but for a small part.
     """
-    wrench: Array = lapack.dposv(mobility + ROUNDING, acceleration)[1]
-    return wrench
+    return solve(mobility + ROUNDING, acceleration)
 
 
 def turn_between(start: Sequence[float], end: Sequence[float]) -> Vector:
