@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 from types import ModuleType
 
@@ -15,6 +17,7 @@ import pybullet
 import pytest
 import scripted_session as script
 import sleeping_session
+from soft_meshes import DEFORMABLE, GROUND, block
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
@@ -250,10 +253,27 @@ def test_files_that_are_none_are_named(arm, tmp_path):
     cut = tmp_path / "cut.world"
     cut.write_bytes(good.read_bytes()[:-20])
     (tmp_path / "text.world").write_text("tick: 3")
-    for name, reason in (("cut", "truncated"), ("text", "expected a state"), ("gone", "no such file")):
+    data = {**json.loads(zlib.decompress(good.read_bytes())), "format": 99}
+    (tmp_path / "other.world").write_bytes(zlib.compress(json.dumps(data).encode()))
+    reasons = {
+        "cut": "truncated",
+        "text": "expected a state",
+        "gone": "no such file",
+        "other": "expected a state .* format 99, this version reads 1",
+    }
+    for name, reason in reasons.items():
         with pytest.raises(ConfigError, match=rf"{name}\.world: .*{reason}"):
             World.from_state(tmp_path / f"{name}.world")
     assert WorldState.read(good) == arm.save()
+
+
+def test_worlds_with_soft_bodies_are_refused(tmp_path):
+    path = write_world(tmp_path, collision=(GROUND,), soft=(block(tmp_path),), **DEFORMABLE)
+    world = World.from_file(path)
+    for ask in (world.save, world.fork, lambda: world.predict([[]], 5)):
+        with pytest.raises(InterfaceError, match="expected no soft bodies, which never move the same way twice, got"):
+            ask()
+    world.close()
 
 
 def test_states_of_other_worlds_and_versions_are_refused(arm, tmp_path):

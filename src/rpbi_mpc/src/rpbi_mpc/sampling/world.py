@@ -96,12 +96,16 @@ class ForkedWorld(Plant):
         config: The input that is commanded.
         cost: Cost of a state, which is summed over all ticks: `module:name` of a function of the `World`, or of a class
             whose objects are called with it.
+
+    Raises:
+        InterfaceError: If the world cannot be forked, for instance because of a soft body.
     """
 
     def __init__(self, world: World, config: InputConfig, cost: str) -> None:
         self.world, self._config, self._cost = world, config, cost
         self.names = config.names
         self.lower, self.upper = np.array(config.lower), np.array(config.upper)
+        world.prepare_forks()
 
     def sense(self) -> Sensed:
         time_s = self.world.clock.tick * self.world.clock.dt_s
