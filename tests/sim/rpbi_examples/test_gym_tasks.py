@@ -12,7 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from rpbi.gym.env import WorldEnv
-from rpbi_examples.gym import ENVIRONMENTS
+from rpbi_examples.gym import ENVIRONMENTS, SCENE_ENVIRONMENTS
 
 Action = list[float]
 
@@ -91,10 +91,42 @@ def run(env: WorldEnv, act: Callable[[WorldEnv, Any, dict[str, Any]], Action]) -
     return bool(info["is_success"])
 
 
-def test_gymnasium_finds_nothing_to_complain_about(env):
+def check(env: WorldEnv) -> None:
+    """Has Gymnasium check an environment; a warning is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(env, skip_render_check=True)
+        check_env(env, skip_render_check=True)  # it opens a window, see tests/gui
+
+
+def test_gymnasium_finds_nothing_to_complain_about(env):
+    check(env)
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_nor_with_images_and_random_variation(name):
+    robot = "panda" if "Lift" in name else "kuka_lwr"
+    varied = {
+        "joints": [{"robot": robot, "offset": 0.01}],
+        "cameras": [{"camera": "camera", "position": [0.05, 0.05, 0.05], "rotation": 0.05}],
+        "delays": {"observation_s": [0.0, 0.04], "action_s": [0.0, 0.02]},
+    }
+    env = gymnasium.make(name, cameras=["camera"], render_mode="rgb_array", randomization=varied).unwrapped
+    check(env)
+    image = env.render()
+    assert image.shape == (240, 320, 3) and image.std() > 10.0
+    env.close()
+
+
+@pytest.mark.parametrize("name", SCENE_ENVIRONMENTS)
+def test_nor_in_scenes_whose_robots_move(name):
+    env = gymnasium.make(name).unwrapped
+    check(env)
+    before, _ = env.reset(seed=1)
+    for _ in range(5):
+        after, *_ = env.step(np.ones(env.action_space.shape, np.float32))
+    for robot in env.task._kind.watch.robots:
+        assert np.abs(after[f"{robot}/joints"] - before[f"{robot}/joints"]).max() > 0.003
+    env.close()
 
 
 def test_a_script_succeeds_and_standing_still_does_not(env):

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import writing_scene
-from gymnasium.utils.env_checker import check_env
 from PIL import Image
 
 from custom_ros_tools.console.argument import UsageError
@@ -60,16 +59,6 @@ def test_a_target_out_of_reach_fails_with_its_place(env, monkeypatch):
 def test_an_episode_that_takes_too_long_has_failed(env, monkeypatch):
     monkeypatch.setattr(writing_scene.Writing, "longest_s", 0.5)
     assert run_episode(env, 5).reason == "not done after 0.5 s"
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_scene_is_a_task_of_gymnasium(env):
-    check_env(env, skip_render_check=True)
-    observation, _ = env.reset(seed=1)
-    assert set(observation) >= {"kuka_lwr/joints"}
-    before = env.world.bodies["kuka_lwr"].joint_positions()
-    env.step(np.ones(env.action_space.shape, np.float32))
-    assert env.world.bodies["kuka_lwr"].joint_positions() != before
 
 
 def test_scores_are_tables_json_and_pictures(tmp_path, monkeypatch, capsys):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import sub
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +68,41 @@ class JointAction:
         """Moves the targets, which stay within the limits."""
         self._targets = np.minimum(np.maximum(self._targets + values * self._steps, self._lower), self._upper)
         self._world.put(self._slot, JointCommand(self._names, position=self._targets.tolist()))
+
+
+class PoseAction:
+    """Moves the target of a controller that leads a link, in the axes of the world, and keeps its orientation.
+
+    Args:
+        controller: The controller, as `ROBOT/CONTROLLER`; it has a `point` of the link, and its `target` is a pose.
+        link: The link.
+        low: Lower corner of the box that the target stays in [m].
+        high: Upper corner [m].
+        step: Largest change in an action along each axis [m].
+    """
+
+    size = 3
+
+    def __init__(
+        self, world: World, controller: str, link: str, low: Sequence[float], high: Sequence[float], step: float
+    ) -> None:
+        self._world, self._slot = world, f"{controller}/target"
+        self._robot, _, name = controller.partition("/")
+        robot = robot_of(world, self._robot)
+        config: Any = robot.controllers.config(name)
+        self._link, self._point = link_index(robot, link), Pose(config.point)
+        self._low, self._high, self._step = low, high, step
+        self._goal = Pose()
+
+    def reset(self) -> None:
+        """Begins at the present pose."""
+        self._goal = robot_of(self._world, self._robot).link_pose(self._link) @ self._point
+
+    def apply(self, values: Values) -> None:
+        """Moves the target."""
+        moved = np.clip(self._goal.position + self._step * values, self._low, self._high)
+        self._goal = self._goal._replace(position=tuple(moved.tolist()))
+        self._world.put(self._slot, self._goal)
 
 
 class HandAction:

@@ -49,6 +49,7 @@ class DualArm(Scene):
 
     world = "{rpbi_examples}/configs/dual_arm/config.yaml"
     watch = Watched(robots=("left", "right"), bodies=("box",), contacts=("box",))
+    hands = {f"{robot}/hold": "lbr_iiwa_link_7" for robot in FLANGES}
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)

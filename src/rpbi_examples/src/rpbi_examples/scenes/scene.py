@@ -150,6 +150,7 @@ class Scene(ABC):
     Attributes:
         world: Main YAML file of the world.
         watch: What it sees.
+        hands: Links that controllers lead to poses, by `ROBOT/CONTROLLER`; joints of other robots have targets.
         cycle_ticks: Ticks of a cycle.
         longest_s: Time after which an episode ends [s].
         seen: The newest view of the world, before the first cycle an empty one.
@@ -157,6 +158,7 @@ class Scene(ABC):
 
     world: ClassVar[str]
     watch: ClassVar[Watched]
+    hands: ClassVar[Mapping[str, str]] = {}
     cycle_ticks: ClassVar[int] = 20
     longest_s: ClassVar[float] = 30.0
 

@@ -48,6 +48,7 @@ class Talos(Scene):
 
     world = "{rpbi_examples}/configs/talos/config.yaml"
     watch = Watched(robots=("talos",), bodies=("talos",), contacts=("floor",))
+    hands = {"talos/balance": HAND}
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.schema import Fraction, Position, Text
+from custom_ros_tools.schema import Fraction, Position, Positive, Text
 from robot_model.geometry import Pose
-from rpbi.gym.actions import ActionPart, JointAction
+from rpbi.gym.actions import ActionPart, JointAction, PoseAction
 from rpbi.gym.env import WorldEnv
 from rpbi.gym.parts import ObservationPart, pose_part, robot_of
 from rpbi.gym.task import WorldTask, WorldTaskConfig
@@ -46,10 +46,11 @@ class SceneTaskConfig(WorldTaskConfig):
     low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the box that bodies are seen in.")
     high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
     speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
+    hand_speed: Positive = Field(0.25, description="Largest speed of hands along each axis [m/s].")
 
 
 class SceneTask(WorldTask):
-    """Does what a scene is about: actions move the joints of its robots, or are None, for a scene that acts itself."""
+    """Does what a scene is about: actions move its robots, or are None, for a scene that acts itself."""
 
     Config = SceneTaskConfig
 
@@ -63,9 +64,15 @@ class SceneTask(WorldTask):
         self._start_tick = 0
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns motions of all joints of its robots."""
-        speed, period_s = self.config.speed, self.period_s
-        return [JointAction(self.world, robot, (), speed, period_s) for robot in self._kind.watch.robots]
+        """Returns motions of all joints of its robots, or of hands where controllers drive them."""
+        config, period_s, hands = self.config, self.period_s, self._kind.hands
+        led = {controller.partition("/")[0] for controller in hands}
+        step = config.hand_speed * period_s
+        moved = [robot for robot in self._kind.watch.robots if robot not in led]
+        return [
+            *(JointAction(self.world, each, (), config.speed, period_s) for each in moved),
+            *(PoseAction(self.world, each, link, config.low, config.high, step) for each, link in hands.items()),
+        ]
 
     def parts(self) -> Iterator[ObservationPart]:
         """Adds the poses of its bodies."""
