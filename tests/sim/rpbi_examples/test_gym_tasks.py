@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from custom_ros_tools.config import load_config
 from rpbi.gym.env import WorldEnv
-from rpbi_examples.gym import ENVIRONMENTS, SCENE_ENVIRONMENTS
+from rpbi_examples.gym import ENVIRONMENTS, SCENE_ENVIRONMENTS, train_reach
 
 Action = list[float]
 
@@ -144,3 +145,12 @@ def test_success_is_not_the_rewards(env, monkeypatch):
     env.reset(seed=1)
     *_, info = env.step(np.zeros(env.action_space.shape, np.float32))
     assert not info["is_success"]
+
+
+def test_reaching_is_learned(monkeypatch):
+    monkeypatch.setattr(train_reach, "TESTS", 8)
+    task = {**load_config("{rpbi_examples}/configs/gym/reach/task.yaml"), "max_actions": 25}
+    envs = gymnasium.make_vec(train_reach.ENVIRONMENT, num_envs=8, vectorization_mode="sync", task=task)
+    first, *_, last = train_reach.train(envs, generations=4, tries=1, seed=1)
+    envs.close()
+    assert last.score > first.score + 1.5 and last.success > first.success

@@ -78,6 +78,63 @@ def test_what_varies_is_what_was_asked_for(tmp_path):
     assert delays > {0, 20} or len(delays) > 5
 
 
+RANGES = {
+    "lateralFriction": (0.2, 0.8),
+    "spinningFriction": (0.01, 0.05),
+    "rollingFriction": (0.001, 0.02),
+    "restitution": (0.1, 0.6),
+    "linearDamping": (0.0, 0.3),
+    "angularDamping": (0.1, 0.4),
+    "jointDamping": (0.5, 2.0),
+    "joint": (-0.1, 0.1),
+    "camera": (-0.05, 0.05),
+    "camera_turn": (0.0, 0.2),
+}
+"""What varies, by ranges."""
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """Values of 20 episodes by what varies, as the world has them, or as commands had them where it does not show."""
+    keys = [key for key in RANGES if key not in ("jointDamping", "joint", "camera", "camera_turn")]
+    varied = {
+        "dynamics": [
+            {"object": "box", **{key: list(RANGES[key]) for key in keys}},
+            {"object": "arm/bar", "jointDamping": list(RANGES["jointDamping"])},
+        ],
+        "joints": [{"robot": "arm", "offset": 0.1, "joints": ["swing"]}],
+        "cameras": [{"camera": "eye", "position": [0.05, 0.0, 0.0], "rotation": 0.2}],
+    }
+    env = made(tmp_path_factory.mktemp("varied"), randomization=varied)
+    place = env.world.cameras["eye"].pose
+    found = {key: [] for key in RANGES}
+    for seed in range(20):
+        env.reset(seed=seed)
+        changes = [each.value for each in env.world.commands.since(0)[1] if each.what == "dynamics"]
+        for key in ("linearDamping", "angularDamping", "jointDamping"):
+            found[key] += [value for change in changes if (value := getattr(change, key)) is not None]
+        box = env.world.dynamics("box")
+        found["lateralFriction"].append(box.lateral_friction)
+        found["spinningFriction"].append(box.spinning_friction)
+        found["rollingFriction"].append(box.rolling_friction)
+        found["restitution"].append(box.restitution)
+        found["joint"] += env.world.bodies["arm"].joint_positions().values()
+        env.world.apply_inputs()
+        way = place.inverse() @ env.world.cameras["eye"].pose
+        found["camera"].append(env.world.cameras["eye"].pose.position[0] - place.position[0])
+        found["camera_turn"].append(2.0 * np.arccos(min(abs(way.quat_xyzw[3]), 1.0)))
+    env.close()
+    return found
+
+
+@pytest.mark.parametrize("what", RANGES)
+def test_values_are_in_their_whole_ranges(drawn, what):
+    low, high = RANGES[what]
+    values = drawn[what]
+    assert len(values) == 20 and low <= min(values) and max(values) <= high
+    assert min(values) < low + 0.3 * (high - low) and max(values) > high - 0.3 * (high - low)
+
+
 def test_delays_show_in_observations(tmp_path):
     at_once, late = (made(tmp_path, randomization={"delays": {"observation_s": [s, s]}}) for s in (0.0, 0.02))
     now, then = episode(at_once, 1), episode(late, 1)
