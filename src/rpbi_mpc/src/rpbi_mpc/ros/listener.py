@@ -147,9 +147,10 @@ class TickSceneListener(SceneListener):
         for transform in message.transforms:
             if transform.child_frame_id == self._frame:
                 self._on_pose(transform)
-        newest_s = max((each.header.stamp.to_sec() for each in message.transforms), default=-math.inf)
+        sender = message._connection_header["callerid"]
+        stamps_s = [each.header.stamp.to_sec() for each in message.transforms]
         with self._changed:
-            self._sent_s[message._connection_header["callerid"]] = newest_s
+            self._sent_s[sender] = max([self._sent_s.get(sender, -math.inf), *stamps_s])
             self._changed.notify_all()
 
     def _on_joints(self, message: JointState) -> None:
