@@ -20,6 +20,7 @@ from rpbi_utils.msg import DriverState
 SLOW_S = 120.0
 START, END, HEIGHT = (0.33, -0.3), (0.33, -0.08), 0.712
 """Ends of the line, and height of what RViz shows [m]."""
+REPORT = ("cycles.csv", "path.png", "errors.png", "cycles.png")
 LINE = ("headless:=true", "path:=line")
 
 
@@ -78,7 +79,7 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
     summary = summary_of(process, tmp_path)
     assert summary["finished"] and summary["mean_error_mm"] < 5.0, summary
     assert summary["by_status"]["solved"] > 100
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in ("cycles.csv", "path.png", "cycles.png"))
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in REPORT)
     check_display(*shown)
 
 
