@@ -9,12 +9,14 @@ import time
 from pathlib import Path
 
 import pytest
+import rospy
 import yaml
 from controls_window import FILE, widgets
 from ros_system import RosSystem, find_executable, stop_group, wait_until
 from screen import Screen
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64
+from std_srvs.srv import Trigger, TriggerResponse
 from worlds import BOX_FLOOR, box, iiwa, write_world
 
 from ros_pybullet_interface.msg import SimulationState
@@ -211,6 +213,26 @@ def test_a_recording_with_a_label(controls, tmp_path):
     frames = bag_to_dataframes(str(bag))
     assert list(frames["/rpbi_controls_node/label"]["data"]) == ["push"]
     assert len(frames["/rpbi/other/joint_states"]) > 0
+
+
+def test_buttons_of_a_controller_call_its_services(controls):
+    controls.have_running()
+    assert "mpc_step" not in controls.widgets, "there is no controller"
+    called, services = [], []
+    for name in ("start", "step", "stop"):
+        answer = TriggerResponse(True, f"answer of {name}")
+        services.append(
+            rospy.Service(f"/mpc/{name}", Trigger, lambda _, name=name, answer=answer: called.append(name) or answer)
+        )
+    try:
+        for name in ("start", "step", "stop"):
+            controls.click(f"mpc_{name}")
+            controls.wait_for("message", f"MPC {name}: answer of {name}")
+        assert called == ["start", "step", "stop"]
+    finally:
+        for service in services:
+            service.shutdown()
+    wait_until(lambda: "mpc_step" not in controls.widgets, "the buttons go with the controller")
 
 
 def test_reaction_to_a_click_beside_a_fast_world(controls):

@@ -5,14 +5,22 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
+from nav_msgs.msg import Path
 from ros_system import RosSystem, wait_until
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
 
+from ros_pybullet_interface.srv import SetSensorRate
 from rpbi_mpc.msg import MpcStatus
 from rpbi_utils.msg import DriverState
 
 SLOW_S = 120.0
+START, END, HEIGHT = (0.33, -0.3), (0.33, -0.08), 0.712
+"""Ends of the line, and height of what RViz shows [m]."""
+REPORT = ("cycles.csv", "path.png", "errors.png", "cycles.png")
 LINE = ("headless:=true", "path:=line")
 
 
@@ -22,8 +30,40 @@ def summary_of(process, folder) -> dict:
     return json.loads((folder / "summary.json").read_text())
 
 
+def hide_for_a_while(ros: RosSystem, process) -> None:
+    """Turns Vicon off and on again between single steps, and compares positions of the joints meanwhile."""
+    joints = ros.listen("rpbi/nextage/joint_states", JointState)
+    assert ros.call("rpbi/set_sensor_rate", SetSensorRate, "vicon/box/box", 0.0).success
+    answers = [ros.call("mpc/step", Trigger).message for _ in range(7)]
+    assert answers[3].endswith(": solved") and answers[-1].endswith("expected one at least every 0.2 s"), answers
+    stood = joints.messages[-1].position
+    assert ": waiting: /vicon/box/box: no pose for" in ros.call("mpc/step", Trigger).message
+    assert joints.messages[-1].position == pytest.approx(stood, abs=1e-4), "the robot stands"
+    assert ros.output(process).count("waiting: /vicon/box/box: no pose for") == 1, "one line"
+    assert ros.call("rpbi/set_sensor_rate", SetSensorRate, "vicon/box/box", 100.0).success
+    answers = [ros.call("mpc/step", Trigger).message for _ in range(2)]
+    assert answers[-1].endswith(": solved"), answers
+
+
+def check_display(path, prediction, markers) -> None:
+    """Checks frames and places of what RViz shows."""
+    along = np.array([(each.pose.position.x, each.pose.position.y) for each in path.messages[-1].poses])
+    assert along[0] == pytest.approx(START, abs=1e-3) and along[-1] == pytest.approx(END, abs=1e-3)
+    assert len(prediction.messages) > 100
+    for message in (path.messages[-1], *prediction.messages):
+        assert {message.header.frame_id, *(each.header.frame_id for each in message.poses)} == {"rpbi/world"}
+        places = np.array([(each.pose.position.x, each.pose.position.y) for each in message.poses])
+        assert np.hypot(*(places[:, None] - along).T).min(axis=0).max() < 0.02, "predictions are beside the path"
+        assert {each.pose.position.z for each in message.poses} == {HEIGHT}
+    for marker in markers.messages[-1].markers:
+        sides = np.diff([(each.x, each.y) for each in marker.points], axis=0)
+        assert marker.header.frame_id == "rpbi/world" and np.hypot(*sides.T) == pytest.approx([0.1] * 4)
+        assert np.hypot(*(np.mean([(each.x, each.y) for each in marker.points[:4]], axis=0) - END)) < 0.02
+
+
 def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros: RosSystem, tmp_path) -> None:
     status = ros.listen("mpc/status", MpcStatus)
+    shown = (ros.listen("mpc/path", Path), ros.listen("mpc/prediction", Path), ros.listen("mpc/markers", MarkerArray))
     arguments = (*LINE, "start_on_init:=false", f"out:={tmp_path}")
     process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])
     for index in range(3):
@@ -31,6 +71,7 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
         assert answer.success and answer.message.startswith(f"cycle {index}: "), answer.message
     wait_until(lambda: status.messages and status.messages[-1].cycle == 2, "the status of the third cycle")
     assert not status.messages[-1].running and status.messages[-1].status == "solved"
+    hide_for_a_while(ros, process)
     assert not ros.call("mpc/stop", Trigger).success
     assert ros.call("mpc/start", Trigger).success
     refused = ros.call("mpc/step", Trigger)
@@ -38,7 +79,8 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
     summary = summary_of(process, tmp_path)
     assert summary["finished"] and summary["mean_error_mm"] < 5.0, summary
     assert summary["by_status"]["solved"] > 100
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in ("cycles.csv", "path.png", "cycles.png"))
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in REPORT)
+    check_display(*shown)
 
 
 def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -11,13 +11,11 @@ from custom_ros_tools.schema import (
     ConfigModel,
     Hz,
     KeyedError,
-    NonNegative,
     PositiveMetres,
     Seconds,
     Switch,
     Text,
     TopicName,
-    Unit,
     optional,
 )
 from custom_ros_tools.schema.json_schema import Schema, json_schema, resolved, schema_texts
@@ -40,9 +38,9 @@ class PlantConfig(ConfigModel):
         "rpbi/nextage/joint_states", description="Topic of the positions of the joints; on hardware, the measured ones."
     )
     slider: Text = Field("box", description="Name of the slider in the world, for predictions.")
-    vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
-    latency_s: Annotated[NonNegative, Unit("s")] = Field(
-        0.02, description="Latency of the tracker; a stepped world waits for such a pose."
+    vicon: TopicName = Field(
+        "vicon/box/box",
+        description="Topic of the pose of the slider's middle; in a stepped world, its frame on TF.",
     )
     timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
     ready: TopicName | None = optional(

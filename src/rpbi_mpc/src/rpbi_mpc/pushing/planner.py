@@ -66,6 +66,9 @@ class PushPlanner(ABC):
 class ProgramPlanner(PushPlanner):
     """Solves `PushingProgram` at each cycle, started from the last solution.
 
+    Further numbers of a plan are its first force, `normal` and `tangential` in units of the speed that it causes, and
+    the speed of `sliding` to the left along the face [m/s].
+
     Args:
         config: Slider, pusher, path and cost.
     """
@@ -86,6 +89,7 @@ class ProgramPlanner(PushPlanner):
             self._guess = self._program.guess_of(solved.states, solved.inputs)
         else:
             self._guess = None
+        normal, tangential, left, right = map(float, solved.inputs[0])
         return ControlPlan(
             self._commands(solved, max(situation.gap, 0.0)),
             solved.states,
@@ -96,6 +100,7 @@ class ProgramPlanner(PushPlanner):
             solved.iterations,
             solved.wall_s,
             solved.processor_s,
+            {"normal": normal, "tangential": tangential, "sliding": left - right},
         )
 
     def _solve(self, situation: PushSituation) -> Solved:

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
 OUTLINES = 12
 """Number of outlines of the slider in the picture of the path."""
+AHEAD_S = (0.4, 1.2)
+"""Times after which predicted and actual place of the slider are compared [s]."""
 
 
 def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingController) -> dict[str, Any]:
-    """Writes `cycles.csv`, `summary.json`, `path.png` and `cycles.png` to a folder; returns the summary.
+    """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder; returns the summary.
 
     Errors are those of the estimated slider, when the command of a cycle acts, to the reference of that time.
 
@@ -48,6 +50,7 @@ def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingContr
     (path / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     if len(seen):
         _draw_path(path / "path.png", table, controller)
+        _draw_errors(path / "errors.png", table, cycles, controller)
         _draw_cycles(path / "cycles.png", table, controller.config.slider)
     return summary
 
@@ -68,6 +71,13 @@ def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, An
     return figure, figure.subplots(rows, columns, sharex=rows > 1)
 
 
+def _predicted(cycle: Cycle, ahead_s: float) -> np.ndarray:
+    """Returns x, y of the slider that a plan predicts for some time after its first command [m]; NaN without it."""
+    plan = cycle.plan
+    row = 0 if plan is None else round(ahead_s / plan.state_step_s)
+    return np.full(2, np.nan) if plan is None or row >= len(plan.states) else plan.states[row, :2]
+
+
 def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingController) -> None:
     """Draws path, slider and pusher from above."""
     figure, axes = _figure(1, 1, (7.0, 5.5))
@@ -85,24 +95,51 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
     figure.savefig(file, dpi=120)
 
 
-def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> None:
-    """Draws error, place of the pusher, its velocity, and solve times over time."""
-    figure, axes = _figure(4, 1, (7.0, 8.0))
-    time_s = table["time_s"] - table["time_s"].iloc[0]
-    axes[0].plot(time_s, 1e3 * table["error_m"], color="tab:orange")
-    axes[0].set(ylabel="error [mm]", ylim=(0.0, None))
-    axes[1].plot(time_s, 1e3 * table["contact"], color="tab:blue")
-    for side in (-1, 1):
-        axes[1].axhline(side * 1e3 * slider.reach, color="0.6", ls="--", lw=1)
-    axes[1].set(ylabel="pusher on face [mm]")
-    axes[2].plot(time_s, 1e3 * table["command.pusher_vx"], label="x")
-    axes[2].plot(time_s, 1e3 * table["command.pusher_vy"], label="y")
-    axes[2].set(ylabel="pusher [mm/s]")
+def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], controller: PushingController) -> None:
+    """Draws errors of position and yaw, and of predictions, over the length of the path."""
+    figure, axes = _figure(3, 1, (7.0, 6.0))
+    along_m = table["path_time_s"].clip(upper=controller.path.duration_s) * controller.config.path.speed
+    turned = table["state.yaw"] - table["reference_yaw"]
+    axes[0].plot(along_m, 1e3 * table["error_m"], color="tab:orange")
+    axes[0].set(ylabel="position [mm]", ylim=(0.0, None))
+    axes[1].plot(along_m, np.degrees(np.arctan2(np.sin(turned), np.cos(turned))), color="tab:orange")
+    axes[1].axhline(0.0, color="0.6", lw=1)
+    axes[1].set(ylabel="yaw [deg]")
+    for ahead_s, colour in zip(AHEAD_S, ("tab:blue", "tab:cyan")):
+        then = table[["state.x", "state.y"]].shift(-round(ahead_s / controller.config.cycle_s)).to_numpy()
+        missed = then - np.array([_predicted(cycle, ahead_s) for cycle in cycles])
+        axes[2].plot(along_m, 1e3 * np.hypot(*missed.T), color=colour, label=f"{ahead_s:g} s ahead")
+    axes[2].set(ylabel="prediction [mm]", xlabel="along the path [m]", ylim=(0.0, None))
     axes[2].legend(loc="upper right")
-    axes[3].plot(time_s, 1e3 * table["wall_s"], color="0.7", label="wall clock")
-    axes[3].plot(time_s, 1e3 * table["processor_s"], color="tab:red", label="processor")
-    axes[3].set(ylabel="solver [ms]", xlabel="time [s]", ylim=(0.0, None))
+    figure.savefig(file, dpi=120)
+
+
+def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> None:
+    """Draws force and sliding of a plan, place and velocity of the pusher, cost and solve times over time."""
+    figure, axes = _figure(6, 1, (7.0, 10.5))
+    time_s = table["time_s"] - table["time_s"].iloc[0]
+    if "normal" in table:
+        edge = 1e3 * slider.friction * table["normal"]
+        axes[0].fill_between(time_s, -edge, edge, color="0.9", label="friction cone")
+        axes[0].plot(time_s, 1e3 * table["tangential"], color="tab:blue", label="tangential force")
+        axes[0].legend(loc="lower right")
+        axes[1].plot(time_s, 1e3 * table["sliding"], color="tab:blue")
+    axes[0].set(ylabel="force [mm/s]")
+    axes[1].set(ylabel="sliding [mm/s]")
+    axes[2].plot(time_s, 1e3 * table["contact"], color="tab:blue")
+    for side in (-1, 1):
+        axes[2].axhline(side * 1e3 * slider.reach, color="0.6", ls="--", lw=1)
+    axes[2].set(ylabel="pusher on face [mm]")
+    axes[3].plot(time_s, 1e3 * table["command.pusher_vx"], label="x")
+    axes[3].plot(time_s, 1e3 * table["command.pusher_vy"], label="y")
+    axes[3].set(ylabel="pusher [mm/s]")
     axes[3].legend(loc="upper right")
+    axes[4].plot(time_s, table["cost"], color="tab:green")
+    axes[4].set(ylabel="cost [-]", ylim=(0.0, None))
+    axes[5].plot(time_s, 1e3 * table["wall_s"], color="0.7", label="wall clock")
+    axes[5].plot(time_s, 1e3 * table["processor_s"], color="tab:red", label="processor")
+    axes[5].set(ylabel="solver [ms]", xlabel="time [s]", ylim=(0.0, None))
+    axes[5].legend(loc="upper right")
     figure.savefig(file, dpi=120)
 
 

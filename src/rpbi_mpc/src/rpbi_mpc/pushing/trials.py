@@ -67,7 +67,8 @@ class PushingTrial(NamedTuple):
     """Result of a trial.
 
     Attributes:
-        errors: Distance of the slider's middle from the reference, one for each cycle in which the reference moved [m].
+        errors: Distance of the slider's middle from the reference, one for each cycle [m]. The reference stands still
+            while the pusher is not at the slider, or the slider is too far behind.
         off_path: Distance from the path, wherever along it, likewise [m].
         cycles: The cycles.
         truth: Time, x, y, yaw, pusher x, pusher y after each half of a cycle.

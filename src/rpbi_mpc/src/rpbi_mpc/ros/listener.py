@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.transforms import yaw_of
@@ -18,6 +20,7 @@ from rpbi_mpc.node_configs import PlantConfig
 
 SLACK_S = 1e-4
 """Difference of stamps below which they are the same [s]: less than a tick, more than rounding."""
+TF = "/tf"
 KEPT = 1000
 """Number of joint states that are kept."""
 
@@ -49,13 +52,8 @@ class SceneListener:
         self._pose: tuple[float, np.ndarray] | None = None
         self._joints: deque[tuple[float, np.ndarray]] = deque(maxlen=KEPT)
         self.vicon, self.joint_states = (rospy.resolve_name(name) for name in (config.vicon, config.joint_states))
-        rospy.Subscriber(self.vicon, TransformStamped, self._on_pose, queue_size=100, tcp_nodelay=True)
+        self._subscribe_to_poses()
         rospy.Subscriber(self.joint_states, JointState, self._on_joints, queue_size=100, tcp_nodelay=True)
-
-    def wait_for(self, pose_s: float, joints_s: float, timeout_s: float) -> None:
-        """Waits until pose and joints are as new as two stamps [s], for at most a time of the wall clock [s]."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._has(pose_s, joints_s), timeout_s)
 
     def joints(self) -> np.ndarray | None:
         """Returns the newest positions of the joints [rad]; None before the first."""
@@ -71,9 +69,8 @@ class SceneListener:
             _, joints = min(self._joints, key=lambda each: abs(each[0] - stamp_s))
         return SeenScene(stamp_s, np.array([*pose, *self._hand.position(joints)[:2]]))
 
-    def _has(self, pose_s: float, joints_s: float) -> bool:
-        has_joints = bool(self._joints) and self._joints[-1][0] >= joints_s - SLACK_S
-        return has_joints and self._pose is not None and self._pose[0] >= pose_s - SLACK_S
+    def _subscribe_to_poses(self) -> None:
+        rospy.Subscriber(self.vicon, TransformStamped, self._on_pose, queue_size=100, tcp_nodelay=True)
 
     def _on_pose(self, message: TransformStamped) -> None:
         place, turn = message.transform.translation, message.transform.rotation
@@ -103,3 +100,59 @@ class SceneListener:
         with self._changed:
             self._joints.append((message.header.stamp.to_sec(), joints))
             self._changed.notify_all()
+
+
+class TickSceneListener(SceneListener):
+    """Takes poses from TF, where a simulator sends everything of a tick in one message.
+
+    A hidden slider is then one that the message of a tick does not have. The topic of the tracker would not show it: a
+    hidden slider sends nothing there, as if its message were late.
+
+    Args:
+        config: Topics; the frame on TF has the name of the tracker's topic.
+        hand: The hand whose joints they are.
+    """
+
+    def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
+        self._frame = config.vicon.lstrip("/")
+        self._simulator = ""
+        """The node that sends the joint states; others send TF, too."""
+        self._sent_s: dict[str, float] = {}
+        """Newest stamp on TF by node [s]."""
+        super().__init__(config, hand)
+
+    def wait_for_tick(self, time_s: float, timeout_s: float) -> str:
+        """Waits for the joint states and the TF of a tick, for at most a time of the wall clock.
+
+        Args:
+            time_s: Stamp of the tick [s].
+            timeout_s: Longest wait [s].
+
+        Returns:
+            The topics that have no such message yet, separated by commas; empty if all have one.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: not self._late(time_s), timeout_s)
+            return ", ".join(self._late(time_s))
+
+    def _late(self, time_s: float) -> list[str]:
+        joints_s = self._joints[-1][0] if self._joints else -math.inf
+        newest_s = {self.joint_states: joints_s, TF: self._sent_s.get(self._simulator, -math.inf)}
+        return [topic for topic, stamp_s in newest_s.items() if stamp_s < time_s - SLACK_S]
+
+    def _subscribe_to_poses(self) -> None:
+        rospy.Subscriber(TF, TFMessage, self._on_transforms, queue_size=100, tcp_nodelay=True)
+
+    def _on_transforms(self, message: TFMessage) -> None:
+        for transform in message.transforms:
+            if transform.child_frame_id == self._frame:
+                self._on_pose(transform)
+        sender = message._connection_header["callerid"]
+        stamps_s = [each.header.stamp.to_sec() for each in message.transforms]
+        with self._changed:
+            self._sent_s[sender] = max([self._sent_s.get(sender, -math.inf), *stamps_s])
+            self._changed.notify_all()
+
+    def _on_joints(self, message: JointState) -> None:
+        self._simulator = message._connection_header["callerid"]
+        super()._on_joints(message)

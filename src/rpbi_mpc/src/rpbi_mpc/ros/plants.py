@@ -19,13 +19,13 @@ from rpbi_mpc.node_configs import PlantConfig
 from rpbi_mpc.plant import Plant, Sensed
 from rpbi_mpc.sampling.world import RolloutTicks
 
-from .listener import SceneListener
+from .listener import SceneListener, TickSceneListener
 from .simulator import SteppedSimulator
 
 PATIENCE_S = 30.0
 """Longest wait for the first joint states [s]."""
-ARRIVAL_S = 0.5
-"""Longest wait for the messages of a tick [s] by the wall clock; a slider that is hidden sends none."""
+LATE_S = 5.0
+"""Wait for the messages of a tick [s] by the wall clock after which a warning is logged."""
 
 
 class HandPlant(Plant):
@@ -34,14 +34,14 @@ class HandPlant(Plant):
     Args:
         config: Topics and rates.
         hand: Inverse kinematics of the hand.
+        listener: Has poses and joints.
 
     Raises:
         InterfaceError: If no joint states arrive, or the hand is not where its targets can begin.
     """
 
-    def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
-        self._config, self._hand = config, hand
-        self._listener = SceneListener(config, hand)
+    def __init__(self, config: PlantConfig, hand: PlanarHand, listener: SceneListener) -> None:
+        self._config, self._hand, self._listener = config, hand, listener
         self._velocity = np.zeros(2)
         self._place: np.ndarray | None = None
         """Where the hand is sent [m]; None until it has been sent somewhere."""
@@ -117,12 +117,19 @@ class SteppedPlant(HandPlant):
     """A simulator that stands still between the steps, so that no decision depends on the speed of the computer."""
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
-        super().__init__(config, hand)
+        self._ticks = TickSceneListener(config, hand)
+        super().__init__(config, hand, self._ticks)
         self._simulator = SteppedSimulator(config.robot)
 
     def sense(self) -> Sensed:
-        now_s = self._simulator.time_s
-        self._listener.wait_for(now_s - self._config.latency_s, now_s, ARRIVAL_S)
+        """Returns the newest measurement that was sent until the last tick, however long its messages take.
+
+        Raises:
+            InterfaceError: If the simulator does not answer meanwhile.
+        """
+        while (late := self._ticks.wait_for_tick(self._simulator.time_s, LATE_S)) and not rospy.is_shutdown():
+            rospy.logwarn(f"{late}: no message of the tick at {self._simulator.time_s:.3f} s yet, expected one")
+            self._simulator.step(0)  # an error if it is gone
         return super().sense()
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
@@ -195,7 +202,7 @@ class TimedPlant(HandPlant):
     is_timed = True
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
-        super().__init__(config, hand)
+        super().__init__(config, hand, SceneListener(config, hand))
         self._targets = rospy.Publisher(f"rpbi/{config.robot}/joint_states/target", JointState, queue_size=10)
         self._next_s = time.monotonic()
         if config.ready:
