@@ -24,6 +24,7 @@ BENCHMARKS = (
 )
 WHEN_NAMED = (
     *(
+        "controls",
         "datasets",
         "dressing",
         "examples",
