@@ -57,7 +57,7 @@ class ScrolledDown(QScrollArea):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Sees all events of the content."""
-        if event.type() == QEvent.LayoutRequest:
+        if event.type() == QEvent.Type.LayoutRequest:
             bar = self.verticalScrollBar()
             self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar.width() * bar.isVisible())
         return bool(super().eventFilter(watched, event))
