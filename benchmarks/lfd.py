@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from result import Result, Target
 from session import Session
+from virtual_screen import virtual_screen
 
 FIRST_SEED = 100
 """Seeds from here on were not used while the example was written."""
@@ -26,7 +25,7 @@ def run(quick: bool) -> list[Result]:
     """Launches `lfd.launch` once for each seed, with a demonstration and an execution of its own."""
     print(HEADING, file=sys.stderr)
     scripted = [_session(seed, "scripted", {}) for seed in _seeds(QUICK if quick else SCRIPTED)]
-    with _screen() as display:
+    with virtual_screen(800, 600) as display:
         keyboard = [_session(seed, "keyboard", {"DISPLAY": display}) for seed in _seeds(QUICK if quick else KEYBOARD)]
     return [*_results("scripted", scripted, 0.95), *_results("keyboard", keyboard, 0.9)]
 
@@ -72,18 +71,3 @@ def _row(seed: int, operator: str, path: Path) -> dict[str, Any]:
     errors = (f"{1000.0 * each['box_error_m']:.1f} mm {each['box_error_deg']:.1f}" for each in (shown, executed))
     print(ROW.format(operator, seed, start, *errors), file=sys.stderr, flush=True)
     return dict(executed)
-
-
-@contextlib.contextmanager
-def _screen() -> Iterator[str]:
-    """Runs an X server without a monitor, and yields its display."""
-    reader, writer = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL, start_new_session=True)
-    os.close(writer)
-    try:
-        with os.fdopen(reader) as answer:
-            yield f":{answer.readline().strip()}"
-    finally:
-        server.terminate()
-        server.wait()

@@ -19,11 +19,12 @@ from typing import Any
 from result import Result, table
 
 BENCHMARKS = (
-    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
+    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "primitives"),
     *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "contacts", "physics"),
 )
 WHEN_NAMED = (
     *(
+        "controls",
         "datasets",
         "dressing",
         "examples",

@@ -91,9 +91,9 @@ class Session:
         self._processes.append(process)
         return process
 
-    def program(self, name: str, *arguments: Any) -> subprocess.Popen[bytes]:
-        """Starts one of `programs/`."""
-        return self.start([sys.executable, "-u", str(PROGRAMS / f"{name}.py"), *map(str, arguments)])
+    def program(self, name: str, *arguments: Any, **environment: str) -> subprocess.Popen[bytes]:
+        """Starts one of `programs/`, with further variables of its environment."""
+        return self.start([sys.executable, "-u", str(PROGRAMS / f"{name}.py"), *map(str, arguments)], **environment)
 
     def set_parameters(self, name: str, values: dict[str, Any]) -> None:
         """Sets the parameters below a name."""
@@ -134,8 +134,11 @@ class Session:
 
     def output(self, process: subprocess.Popen[bytes]) -> str:
         """Returns what a process has printed so far."""
-        path = self.folder / f"{self._processes.index(process)}.log"
-        return path.read_text(errors="replace")
+        return self.output_file(process).read_text(errors="replace")
+
+    def output_file(self, process: subprocess.Popen[bytes]) -> Path:
+        """Returns the file that has what a process prints."""
+        return self.folder / f"{self._processes.index(process)}.log"
 
     def wait_for_output(self, process: subprocess.Popen[bytes], text: str) -> None:
         """Waits until a process has printed a text.

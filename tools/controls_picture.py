@@ -13,7 +13,7 @@ from PIL import ImageGrab
 
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 
-WORLD = "{rpbi_examples}/configs/basic_example_panda/config.yaml"
+WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
 SIZE = (1400, 800)
 OPENS_S = 40.0
 """Time after which the window shows everything [s]."""

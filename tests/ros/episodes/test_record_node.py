@@ -6,6 +6,8 @@ import contextlib
 import io
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 from pathlib import Path
@@ -26,6 +28,8 @@ from episodes import EpisodeFolder, episodes_to_dataframes
 from ros_pybullet_interface.msg import SimulationState
 
 JOINTS = ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"]
+PAGE = (Path(__file__).resolve().parents[3] / "docs/data.md").read_text()
+RECORD = "rosrun episodes record_node.py _folder:=$HOME/demos"
 
 
 def _run(name: str, *words: str | Path) -> tuple[int, str]:
@@ -37,6 +41,13 @@ def _run(name: str, *words: str | Path) -> tuple[int, str]:
     return code, out.getvalue()
 
 
+def _of_page(name: str, home: Path) -> list[str]:
+    """Returns the words of a command of docs/data.md, from its name on."""
+    command = re.search(rf"\./rpbi ({name} [^`\n]+)", PAGE)
+    assert command is not None
+    return [word.replace("~", str(home)) for word in shlex.split(command[1])]
+
+
 def _recorder_pid(folder: EpisodeFolder) -> int:
     """Returns the process that records into a folder; other runs of this test have recorders too."""
     pattern = f"bag_writer.*{folder.path}/.*episode.bag"
@@ -46,15 +57,15 @@ def _recorder_pid(folder: EpisodeFolder) -> int:
 class _Session:
     """A world with an arm, and the node that records."""
 
-    def __init__(self, ros: Any, tmp_path: Path, **parameters: Any) -> None:
+    def __init__(self, ros: Any, tmp_path: Path, command: str = RECORD, **parameters: Any) -> None:
         self.ros, self.folder = ros, EpisodeFolder(tmp_path / "demos")
         world = main_config(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),), state_hash_hz=20.0)
         ros.simulator(world, use_sim_time=True)
-        for name, value in {"folder": str(self.folder.path), "disk_reserve_mb": 1.0, **parameters}.items():
+        for name, value in {"disk_reserve_mb": 1.0, **parameters}.items():
             rospy.set_param(f"/record/{name}", value)
         self.states = ros.listen("/rpbi/state", SimulationState)
         self.status = ros.listen("/record/status", String)
-        self.node = ros.start(["rosrun", "episodes", "record_node.py"])
+        self.node = ros.start(shlex.split(command.replace("$HOME", str(tmp_path))))
         wait_until(lambda: self.now()["recording"] is False, "the node is up")
         wait_until(lambda: "no rpbi/world" not in self.call("start").message, "it has the world's description")
 
@@ -124,8 +135,12 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     assert code == 1 and text.count(f"files/{copy.name}, the copy of {tmp_path}/") == 2
 
 
-def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) -> None:
-    session = _Session(ros, tmp_path, reset=True, start_button=1, also=["joy"])
+def test_the_session_of_the_page_with_resets_by_a_button_and_a_changed_urdf(
+    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"^roslaunch episodes record.launch .*$", PAGE, re.MULTILINE)
+    session = _Session(ros, tmp_path, f"{command} reset:=true also:=[joy]", start_button=1)
     session.move(0.4)
     with publishing("/joy", Joy) as joy, publishing("/rpbi/iiwa/joint_states/target", JointState):
         for is_recording in (False, True, False):
@@ -136,14 +151,16 @@ def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) ->
                 session.move(-0.4)
     folder = session.folder
     assert "/joy" in folder.read(folder.numbers()[-1]).topics
-    code, text = _run("verify", folder.path)
-    assert code == 0, text
-    folder.relabel(1, "success")  # the recorder is connected to the target from its beginning
-    for to in ("robomimic", "mcap", "lerobot"):
-        out = tmp_path / to
-        code, text = _run("export", folder.path, "--to", to, "--out", out, "--label", "success")
+    for name in ("episodes", "verify", "view", "export", "check_dataset"):
+        if name == "export":
+            folder.discard(0)  # the recorder is connected to the target from the beginning of the next one on
+        code, text = _run(*_of_page(name, tmp_path))
         assert code == 0, text
-        code, text = _run("check_dataset", out, "--source", folder.path)
+    assert (tmp_path / "episode_0.html").exists()
+    for to in ("robomimic", "mcap"):
+        code, text = _run("export", folder.path, "--to", to, "--out", tmp_path / to)
+        assert code == 0, text
+        code, text = _run("check_dataset", tmp_path / to, "--source", folder.path)
         assert code == 0, text
     [urdf] = [each for each in folder.files.glob("*.urdf")]
     urdf.write_text(urdf.read_text().replace('<mass value="', '<mass value="1'))

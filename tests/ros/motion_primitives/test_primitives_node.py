@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import threading
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rosbag
 import rospy
+import rosservice
 from cob_srvs.srv import SetString
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 from node_world import publishing
@@ -23,6 +28,7 @@ from motion_primitives.msg import PrimitiveState
 from motion_primitives.msg import ViaPoint as ViaPointMessage
 from motion_primitives.srv import PlanPrimitive
 
+PAGE = (Path(__file__).resolve().parents[3] / "docs/learning.md").read_text()
 SHOWN = reach(duration_s=1.0, samples=101)
 GOAL = [0.3, 0.4, 0.5, 0.0, 0.0, 0.6, 0.8]
 
@@ -45,19 +51,35 @@ def string(ros, name, data):
     return answer.success, answer.message
 
 
-def show(ros, own_tf, shown: Demonstration) -> tuple[bool, str]:
-    """Shows a motion on TF at 100 Hz while the node records."""
+@pytest.fixture
+def of_page(capsys, monkeypatch):
+    """Returns what the next command of docs/learning.md for a service prints, in the order of the page."""
+    (block,) = re.findall(r"```\n(\$ rosservice .*?)```", PAGE, re.DOTALL)
+    commands = iter([line.removeprefix("$ ") for line in block.splitlines() if line.startswith("$ ")])
+
+    def run(service: str) -> str:
+        words = shlex.split(next(commands))
+        assert words[:3] == ["rosservice", "call", f"/primitive/{service}"]
+        with monkeypatch.context() as patched:
+            patched.setattr(rospy, "init_node", lambda *_, **__: None)  # this process is a node already
+            rosservice.rosservicemain(words)
+        return capsys.readouterr().out
+
+    return run
+
+
+def show(own_tf, shown: Demonstration, record: Callable[[str], str]) -> str:
+    """Shows a motion on TF at 100 Hz while the node records, and returns what the end of the record prints."""
     send = lambda point: own_tf.set_tf("world", "hand", point[:3], point[3:])  # noqa: E731
     send(shown.points[0])
-    assert ros.call("primitive/record", SetBool, True).success
+    assert "success: True" in record("record")
     for point in shown.points:
         send(point)
         rospy.rostime.wallsleep(0.01)
-    answer = ros.call("primitive/record", SetBool, False)
-    return answer.success, answer.message
+    return record("record")
 
 
-def test_a_pose_that_is_shown_live(ros, own_tf, tmp_path):
+def test_a_pose_that_is_shown_live(ros, own_tf, tmp_path, of_page):
     states = start(
         ros,
         primitive={"type": "promp"},
@@ -69,9 +91,8 @@ def test_a_pose_that_is_shown_live(ros, own_tf, tmp_path):
     )
     assert trigger(ros, "learn") == (False, "demonstrations: expected at least one, got none")
     assert "learned nothing yet" in ros.call("primitive/plan", PlanPrimitive).message
-    success, message = show(ros, own_tf, SHOWN)
-    assert success and message.startswith("demonstration 1 of "), message
-    assert trigger(ros, "learn") == (True, "learned from 1 demonstrations")
+    assert 'success: True\nmessage: "demonstration 1 of ' in show(own_tf, SHOWN, of_page)
+    assert 'success: True\nmessage: "learned from 1 demonstrations"' in of_page("learn")
 
     # a plan from where the hand is
     answer = ros.call("primitive/plan", PlanPrimitive, goal=GOAL, duration=3.0)
@@ -125,7 +146,7 @@ def test_a_pose_that_is_shown_live(ros, own_tf, tmp_path):
     (tmp_path / "primitives/bad.yaml").write_text(text)
     success, message = string(ros, "load", "bad")
     assert not success and "'this:Zen' is not trusted" in message
-    assert ros.call("primitive/execute", PlanPrimitive, goal=GOAL, duration=5.0).success
+    assert "success: True" in of_page("execute")
     assert trigger(ros, "stop") == (True, "stopped") and trigger(ros, "stop")[0] is False
 
 

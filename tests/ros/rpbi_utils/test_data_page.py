@@ -12,12 +12,14 @@ from typing import Any
 import genpy
 import numpy as np
 import pytest
+import written_episodes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from episodes import EpisodeFolder
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -58,8 +60,11 @@ def test_the_examples_run_one_after_the_other(
     ros: Any, recording: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(recording.parent)
+    monkeypatch.setattr(written_episodes, "STATES", "/rpbi/kuka_lwr/joint_states")
+    for seconds in (0.2, 0.4):
+        written_episodes.write_episode(EpisodeFolder(Path("demos")), seconds=seconds, cameras=())
     blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    assert len(blocks) == 11
+    assert len(blocks) == 12
     names: dict[str, Any] = {}
     for block in blocks:
         exec(compile(block, "docs/data.md", "exec"), names)
@@ -78,6 +83,7 @@ def test_the_examples_run_one_after_the_other(
     assert names["pixels"].shape == (2, 3, 3)
     assert len(names["farthest"]) == 100 and {depth for _, depth in names["farthest"]} == {1.5}
     printed = capsys.readouterr().out
+    assert "episode\n0    20\n1    40\n" in printed
     assert "largest error: 0.0100 rad" in printed
     assert "pushed with up to 9.9 N, for 50% of the time" in printed
 

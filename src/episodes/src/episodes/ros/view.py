@@ -105,10 +105,7 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
             scene.arrows.append(found)
     scene.panels = force_panels({topic: tables[topic] for topic in forces}, start_s)
     scene.notes += frames.notes
-    hz = (len(times) - 1) / times[-1]
-    if hz < MAX_HZ - 1.0:
-        scene.notes.append(f"the view has {hz:.3g} poses a second, since the recording is long; the plots have all")
-    return scene
+    return scene.with_few_arrows()
 
 
 def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[float, Array]:

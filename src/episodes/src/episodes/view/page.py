@@ -23,6 +23,10 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "viser", "./rpbi setup html") from None
 
+MAX_BYTES = 2_000_000
+"""Size of a page above which it has fewer times [bytes]."""
+MIN_TIMES = 10
+"""Number of times that a page has at least."""
 FOV_RAD = np.radians(45.0)
 """Vertical angle of view at the start [rad]."""
 STILL = 1e-5
@@ -39,8 +43,14 @@ MAX_LINE_POINTS, MAX_POINTS = 1500, 30_000
 _WXYZ = [3, 0, 1, 2]
 
 
-def page_of(scene: PageScene) -> str:
-    """Returns the text of the page."""
+def page_of(scene: PageScene) -> tuple[str, PageScene]:
+    """Returns the text of a page and the scene that it shows, which has fewer times if the page would be too large."""
+    while len((text := _page(scene)).encode()) > MAX_BYTES and len(scene.times) > MIN_TIMES:
+        scene = scene.coarser(max(MIN_TIMES, len(scene.times) // 2))
+    return text, scene
+
+
+def _page(scene: PageScene) -> str:
     metres_per_newton = _arrow_scale(scene.arrows)
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
@@ -162,7 +172,7 @@ def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
         "title": scene.title,
         "seconds": round(float(scene.times[-1]), 6),
         "legend": f"arrows: 0.1 m is {0.1 / metres_per_newton:g} N" if scene.arrows else "no forces were recorded",
-        "notes": scene.notes,
+        "notes": scene.all_notes,
         "panels": [
             {"title": title, "lines": [{"name": name, **_points(line, count)} for name, line in lines.items()]}
             for title, lines in scene.panels.items()

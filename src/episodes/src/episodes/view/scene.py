@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,8 +18,8 @@ Array = NDArray[Any]
 
 MAX_HZ = 25.0
 """Largest rate of poses and arrows on a page [Hz]."""
-MAX_POSES = 25_000
-"""Number of poses of all links of a page; a longer recording has fewer a second."""
+MAX_POSES = MAX_ARROWS = 25_000
+"""Number of poses of all links of a page, and of its arrows; a longer recording has fewer a second."""
 
 
 class Poses(NamedTuple):
@@ -109,7 +109,7 @@ class PageScene:
         meshes: Meshes by the shape that they belong to.
         arrows: The forces.
         panels: Lines over time since the start [s], by the title of their panel.
-        notes: Sentences on what is not shown, or otherwise than it was.
+        notes: Sentences on what is not shown, or otherwise than it was; see `all_notes`.
     """
 
     title: str
@@ -121,3 +121,36 @@ class PageScene:
     arrows: list[Arrows] = field(default_factory=list)
     panels: dict[str, Mapping[str, pd.Series]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def all_notes(self) -> list[str]:
+        """The notes, and one on the rate of poses if it is lower than usual."""
+        hz = (len(self.times) - 1) / self.times[-1]
+        if hz >= MAX_HZ - 1.0:
+            return self.notes
+        reason = "since the recording is long or has many forces"
+        return [*self.notes, f"the view has {hz:.3g} poses a second, {reason}; the plots have all"]
+
+    def coarser(self, count: int) -> PageScene:
+        """Returns the same with fewer times.
+
+        Args:
+            count: Their number, at least 2; the first and the last one stay.
+        """
+        kept = np.linspace(0, len(self.times) - 1, count).round().astype(int)
+        links = [
+            replace(each, poses=Poses(*(column[kept] for column in each.poses)), is_there=each.is_there[kept])
+            for each in self.links
+        ]
+        arrows = [
+            replace(each, points=[each.points[i] for i in kept], forces=[each.forces[i] for i in kept])
+            for each in self.arrows
+        ]
+        return replace(self, times=self.times[kept], links=links, arrows=arrows)
+
+    def with_few_arrows(self) -> PageScene:
+        """Returns the same with about MAX_ARROWS arrows at most, by fewer times if there are more."""
+        arrows = sum(len(points) for each in self.arrows for points in each.points)
+        if arrows <= MAX_ARROWS:
+            return self
+        return self.coarser(max(2, len(self.times) * MAX_ARROWS // arrows))

@@ -44,7 +44,7 @@ def view(
         scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
     else:
         scene = scene_of_bag(recording, ns, any_size=any_size)
-    page = page_of(scene)
+    page, scene = page_of(scene)
     target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
     written = target.with_name(f".{target.name}.new")
     try:
@@ -53,5 +53,5 @@ def view(
         written.rename(target)
     except OSError as error:
         raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
-    lines = [f"note: {note}" for note in scene.notes]
+    lines = [f"note: {note}" for note in scene.all_notes]
     return "\n".join([f"{target}: {scene.times[-1]:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])

@@ -1,10 +1,10 @@
 """The controls window."""
 
 from PyQt5.QtCore import QObject, Qt, QTimer, pyqtSignal
-from PyQt5.QtWidgets import QLabel, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
+from PyQt5.QtWidgets import QLabel, QMainWindow, QSplitter, QVBoxLayout, QWidget
 
 from .link import SimulatorLink
-from .panel import Panel, named
+from .panel import Panel, ScrolledDown, named
 from .panels.cameras import CamerasPanel
 from .panels.joints import JointsPanel
 from .panels.mpc import MpcPanel
@@ -64,7 +64,7 @@ class ControlsWindow(QMainWindow):
         self._message.setWordWrap(True)
         self._message.setContentsMargins(8, 0, 8, 4)
         two_lines = 2 * self._message.fontMetrics().lineSpacing() + 4
-        self._message.setMinimumHeight(two_lines)  # else buttons would move when a message needs a second line
+        self._message.setFixedHeight(two_lines)  # else buttons would move under the mouse when a message comes
         self.statusBar().addWidget(self._message, 1)
         self.resize(*(SIZE if view is None else SIZE_WITH_VIEW))
         self._timer = QTimer(self)
@@ -92,6 +92,7 @@ class ControlsWindow(QMainWindow):
             seconds = outcome.duration_s
             duration = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
             self._message.setText(f"{outcome.name}: {text} ({duration})")
+            self._message.setToolTip(self._message.text())
             self._message.setStyleSheet("color: #a02020" if outcome.error else "")
         self.refresh()
 
@@ -102,10 +103,4 @@ def _column(panels: list[Panel]) -> QWidget:
     layout = QVBoxLayout(column)
     for panel in panels:
         layout.addWidget(panel, 0 if isinstance(panel, RunPanel | MpcPanel | RecordingPanel) else 1)
-    area = QScrollArea()
-    area.setWidget(column)
-    area.setWidgetResizable(True)
-    area.setFrameShape(QScrollArea.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setMinimumWidth(column.minimumSizeHint().width())
-    return area
+    return ScrolledDown(column)

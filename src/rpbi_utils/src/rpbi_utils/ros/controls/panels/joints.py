@@ -12,7 +12,6 @@ from PyQt5.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
-    QScrollArea,
     QSlider,
     QTabWidget,
     QVBoxLayout,
@@ -26,12 +25,14 @@ from ros_pybullet_interface.srv import ResetJointState, RobotInfo, SetJointState
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
 
 from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
+from ..panel import Panel, ScrolledDown, named
 from ..requests import LIMIT_S, BackgroundRequests, RequestResult
 
 UNLIMITED_RAD, UNLIMITED_M = math.pi, 1.0
 """Range of the slider of a joint without limits, to both sides."""
 SLIDER_STEPS = 10_000
+MOVED = "font-weight: bold"
+"""Style of the name of a joint whose slider was moved."""
 
 
 class JointRow:
@@ -67,6 +68,9 @@ class JointRow:
         self.measured.setMinimumWidth(self.measured.fontMetrics().horizontalAdvance("-000.0000 m"))
         self._digits, self._unit = self.target.decimals(), unit
         self.title = QLabel(self.name)
+        self.title.setStyleSheet(MOVED)
+        self.title.setMinimumWidth(self.title.sizeHint().width())  # else the slider would move under the mouse
+        self.title.setStyleSheet("")
         self.is_moved = False
         self.slider.valueChanged.connect(self._on_slider)
         self.target.valueChanged.connect(self._on_target)
@@ -101,7 +105,7 @@ class JointRow:
 
     def _mark(self, is_moved: bool) -> None:
         self.is_moved = is_moved
-        self.title.setStyleSheet("font-weight: bold" if is_moved else "")
+        self.title.setStyleSheet(MOVED if is_moved else "")
 
 
 class RobotTab(QWidget):
@@ -117,16 +121,13 @@ class RobotTab(QWidget):
         self._robot, self._panel = robot, panel
         self._rows: dict[str, JointRow] = {}
         self._is_known = self._is_asked = False
+        self._snapshot = SimulatorSnapshot()
         layout = QVBoxLayout(self)
-        area = QScrollArea()
-        area.setWidgetResizable(True)
-        area.setFrameShape(QScrollArea.NoFrame)
         self._table = QWidget()
         self._grid = QGridLayout(self._table)
         self._grid.setContentsMargins(0, 0, 8, 0)
         self._grid.setColumnStretch(1, 1)
-        area.setWidget(self._table)
-        layout.addWidget(area)
+        layout.addWidget(ScrolledDown(self._table))
 
         self._duration = named(QDoubleSpinBox(), "duration", "Duration of a motion, in the world's time")
         self._duration.setRange(0.1, 600.0)
@@ -150,14 +151,19 @@ class RobotTab(QWidget):
         positions = dict(zip(state.name, state.position)) if state is not None else {}
         for name in positions.keys() & self._rows.keys():
             self._rows[name].show_position(positions[name])
+        self._home.setEnabled(snapshot.has(self._service("move_to_initial_joint_state")))
+        self._halt.setEnabled(snapshot.has(self._service("stop_motion")))
+        self._snapshot = snapshot
+        self._show_moved()
+
+    def _show_moved(self) -> None:
+        """Shows which buttons work; called at once when a slider is moved, too."""
+        snapshot = self._snapshot
         is_moved = any(row.is_moved for row in self._rows.values())
         moves = snapshot.has(self._service("move_to_joint_state"))
         self._send.setEnabled(is_moved and (moves or snapshot.has(self._service("set_joint_state"))))
         self._back.setEnabled(is_moved)
-        self._home.setEnabled(snapshot.has(self._service("move_to_initial_joint_state")))
-        self._halt.setEnabled(snapshot.has(self._service("stop_motion")))
         self._duration.setEnabled(moves)
-        self._moves, self._state = moves, snapshot.state
 
     def _service(self, name: str) -> str:
         return f"rpbi/{self._robot}/{name}"
@@ -176,6 +182,8 @@ class RobotTab(QWidget):
         movable = [info for info in outcome.value.joint_info if not info.is_fixed]
         for row, joint in enumerate(map(JointRow, movable)):
             self._rows[joint.name] = joint
+            joint.slider.valueChanged.connect(self._show_moved)
+            joint.target.valueChanged.connect(self._show_moved)
             for column, widget in enumerate((joint.title, joint.slider, joint.target, joint.measured)):
                 self._grid.addWidget(widget, row, column)
         self._grid.setRowStretch(len(movable), 1)
@@ -187,7 +195,7 @@ class RobotTab(QWidget):
     def _on_send(self) -> None:
         moved = {name: row.target.value() for name, row in self._rows.items() if row.is_moved}
         state = JointState(name=[*moved], position=[*moved.values()])
-        if self._moves:
+        if self._snapshot.has(self._service("move_to_joint_state")):
             self._move("move_to_joint_state", "Send", state, self._release(moved))
         else:  # a visual robot is wherever its joints are put
             call = partial(_call, self._service("set_joint_state"), SetJointState, state)
@@ -213,7 +221,8 @@ class RobotTab(QWidget):
 
     def _move(self, service: str, name: str, state: JointState, then: Any = None) -> None:
         duration_s = self._duration.value()
-        pace = self._state.real_time_factor_asked if self._state else 1.0
+        simulation = self._snapshot.state
+        pace = simulation.real_time_factor_asked if simulation else 1.0
         limit_s = duration_s / (pace or 1.0) * 2.0 + LIMIT_S
         call = partial(_call, self._service(service), ResetJointState, state, duration_s)
         self._panel.ask(f"{name} of {self._robot}", call, then, limit_s)

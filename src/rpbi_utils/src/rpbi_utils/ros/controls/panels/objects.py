@@ -48,8 +48,8 @@ class ObjectsPanel(Panel):
         self._file.returnPressed.connect(self._on_add)
         self._remove = named(QPushButton("Remove"), "remove", "Takes what is selected out of the world")
         self._remove.clicked.connect(self._on_remove)
-        self.require("rpbi/add_pybullet_object", self._add)
-        self.require("rpbi/remove_pybullet_object", self._remove)
+        self.require("rpbi/add_pybullet_object", self._add, when=lambda _: bool(self._file.text().strip()))
+        self.require("rpbi/remove_pybullet_object", self._remove, when=lambda _: bool(self._chosen()))
         grid = QGridLayout(self)
         grid.addWidget(self._table, 0, 0, 1, 4)
         grid.addWidget(self._file, 1, 0, 1, 3)
@@ -59,7 +59,6 @@ class ObjectsPanel(Panel):
         grid.addWidget(self._remove, 2, 3)
 
     def refresh(self, snapshot: SimulatorSnapshot) -> None:
-        super().refresh(snapshot)
         rows = list(snapshot.objects.items())
         if rows != self._rows():
             chosen = self._chosen()
@@ -72,8 +71,7 @@ class ObjectsPanel(Panel):
                 if item.text() in chosen:
                     item.setSelected(True)
                     self._table.item(item.row(), 1).setSelected(True)
-        self._add.setEnabled(self._add.isEnabled() and bool(self._file.text().strip()))
-        self._remove.setEnabled(self._remove.isEnabled() and bool(self._chosen()))
+        super().refresh(snapshot)
 
     def _rows(self) -> list[tuple[str, str]]:
         count = self._table.rowCount()

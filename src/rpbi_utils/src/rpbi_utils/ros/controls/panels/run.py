@@ -10,7 +10,7 @@ from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
 
 from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
+from ..panel import Condition, Panel, named
 from ..requests import BackgroundRequests, RequestResult
 
 MAX_STEPS = 1_000_000
@@ -25,11 +25,14 @@ class RunPanel(Panel):
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Simulation", link, requests)
         grid = QGridLayout(self)
-        self._start = self._button("Start", "rpbi/start", "Lets the world run")
-        self._step = self._button("Step", "rpbi/step", "Goes one tick on")
-        self._stop = self._button("Stop", "rpbi/stop", "Lets the world stand still")
-        self._reset = self._button("Reset", "rpbi/reset", "Makes the world what it was at its start")
-        for column, button in enumerate((self._start, self._step, self._stop, self._reset)):
+        for column, button in enumerate(
+            (
+                self._button("Start", "rpbi/start", "Lets the world run", _stands),
+                self._button("Step", "rpbi/step", "Goes one tick on", _stands),
+                self._button("Stop", "rpbi/stop", "Lets the world stand still", _runs),
+                self._button("Reset", "rpbi/reset", "Makes the world what it was at its start", lambda _: True),
+            )
+        ):
             grid.addWidget(button, 0, column)
 
         self._count = named(QSpinBox(), "steps", "Number of steps")
@@ -38,7 +41,8 @@ class RunPanel(Panel):
         self._count.setGroupSeparatorShown(True)
         self._steps = named(QPushButton("N steps"), "n_steps", "Goes that many ticks on, as fast as possible")
         self._steps.clicked.connect(lambda: self._go(self._count.value()))
-        self.require("rpbi/step_n", self._steps, self._count)
+        self.require("rpbi/step_n", self._count)
+        self.require("rpbi/step_n", self._steps, when=_stands)
         grid.addWidget(QLabel("Steps"), 1, 0)
         grid.addWidget(self._count, 1, 1, 1, 2)
         grid.addWidget(self._steps, 1, 3)
@@ -73,11 +77,6 @@ class RunPanel(Panel):
 
     def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
-        stands = not snapshot.is_running
-        self._start.setEnabled(self._start.isEnabled() and stands)
-        self._stop.setEnabled(self._stop.isEnabled() and not stands)
-        for widget in (self._step, self._steps):
-            widget.setEnabled(widget.isEnabled() and stands)
         self._show_status(snapshot)
         state = snapshot.state
         if state is None:
@@ -111,10 +110,10 @@ class RunPanel(Panel):
         self._status.setText(text)
         self._status.setStyleSheet(f"font-weight: bold; color: {colour}")
 
-    def _button(self, title: str, service: str, tip: str) -> QPushButton:
+    def _button(self, title: str, service: str, tip: str, when: Condition) -> QPushButton:
         button: QPushButton = named(QPushButton(title), title.lower(), tip)
         button.clicked.connect(lambda: self.ask(title, partial(_call, service, Trigger), self._look_again))
-        self.require(service, button)
+        self.require(service, button, when=when)
         return button
 
     def _look_again(self, outcome: RequestResult) -> None:
@@ -130,3 +129,11 @@ class RunPanel(Panel):
 
 def _call(service: str, service_type: type, *arguments: object) -> Any:
     return RunningSimulator().call(service, service_type, *arguments).message
+
+
+def _runs(snapshot: SimulatorSnapshot) -> bool:
+    return snapshot.is_running
+
+
+def _stands(snapshot: SimulatorSnapshot) -> bool:
+    return not snapshot.is_running

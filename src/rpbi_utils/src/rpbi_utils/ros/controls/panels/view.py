@@ -3,11 +3,15 @@
 from pathlib import Path
 from typing import Any
 
+from PyQt5.QtWidgets import QDockWidget
+
 from custom_ros_tools.errors import InterfaceError
 
 
 def rviz_view(config_file: str, world_frame: str) -> Any:
     """Returns a widget with RViz's 3-D view, or None if its Python bindings are not installed.
+
+    Its panels are hidden; the menu of its tool bar, by a right click, shows them.
 
     Args:
         config_file: Displays and view, as RViz saves them.
@@ -34,5 +38,7 @@ def rviz_view(config_file: str, world_frame: str) -> Any:
     frame.setMenuBar(None)
     frame.setStatusBar(None)
     frame.setHideButtonVisibility(False)
+    for panel in frame.findChildren(QDockWidget):
+        panel.hide()
     frame.getManager().setFixedFrame(world_frame)
     return frame
