@@ -7,7 +7,7 @@ import json
 import pandas as pd
 import pytest
 from PIL import Image
-from ros_system import RosSystem, wait_until
+from ros_system import RPBI, RosSystem, wait_until
 from std_srvs.srv import Trigger
 
 from episodes import EpisodeFolder
@@ -22,35 +22,35 @@ SLOW_S = 400.0
 
 @pytest.fixture(scope="module")
 def session(ros_master, screen, tmp_path_factory):
-    """The session after its end, its output, and the folder of its results."""
+    """The session's process after its end, its output, and the folder of its results."""
     system = RosSystem(tmp_path_factory.mktemp("lfd"))
     try:
         out = system.folder / "out"
         arguments = ["operator:=keyboard", "seed:=5", "rounds:=1", "headless:=true", f"out:={out}", SLOW, GOAL]
-        launch = system.start(["roslaunch", "rpbi_examples", "lfd.launch", *arguments], **screen.environment)
+        launch = system.start([RPBI, "launch", "lfd", *arguments], **screen.environment)
         wait_until(lambda: "key 1: home" in system.output(launch), "it is ready", SLOW_S)
         assert system.call("/lfd/learn", Trigger).success  # nothing was shown yet
         wait_until(lambda: "learn: there is no demonstration yet: press 2" in system.output(launch), "it says so")
         person = ["rosrun", "rpbi_examples", "lfd_person.py", "_window:=true", "_seed:=5"]
         system.start(person, **screen.environment)
         wait_until(lambda: launch.poll() is not None, "it ends after an execution", SLOW_S)
-        yield system.output(launch), out
+        yield launch, system.output(launch), out
     finally:
         system.close()
 
 
 def test_the_box_is_at_its_goal_after_the_execution(session):
-    output, out = session
+    launch, output, out = session
     summary = json.loads((out / "summary.json").read_text())
     (executed,) = summary["executions"]
-    assert executed["at_goal"], output
+    assert executed["at_goal"] and launch.returncode == 0, output
     assert executed["box_error_m"] < 0.03 and executed["box_error_deg"] < 10.0
     assert max(map(abs, executed["start"])) > 0.02, "it began somewhere else"
     assert "box/yaw" in output, "the demonstration is shown as a table"
 
 
 def test_demonstration_and_execution_are_episodes_and_tables(session):
-    _, out = session
+    *_, out = session
     folder = EpisodeFolder(out / "episodes")
     episodes = {each.number: each for each in folder.all()}
     assert [episodes[number].label for number in sorted(episodes)][-2:] == ["success", "success"]
@@ -67,5 +67,5 @@ def test_demonstration_and_execution_are_episodes_and_tables(session):
 
 def test_pictures_are_drawn(session):
     for name in ("paths", "pipeline"):
-        with Image.open(session[1] / f"{name}.png") as picture:
+        with Image.open(session[-1] / f"{name}.png") as picture:
             assert len(picture.convert("RGB").getcolors(1 << 24)) > 100

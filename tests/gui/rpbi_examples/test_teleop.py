@@ -17,10 +17,16 @@ from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
+from episodes import EpisodeFolder
 from operator_node.emulators.spacenavd import SpacenavDaemon
 from operator_node.parser import reconstruct_interface_log_msg
 
 SLOW_S = 120.0
+REQUESTED, GUARDED, MEASURED = (
+    "/guarded/joint_states/target",
+    "/rpbi/kuka_lwr/joint_states/target",
+    "/rpbi/kuka_lwr/joint_states",
+)
 REAL = "rpbi/real/joint_states/target"
 REAL_NODES = ("stand_in/driver", "real_robot/guard", "real_robot/to_driver", "real_robot/states/from_driver")
 TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
@@ -105,11 +111,17 @@ def nothing() -> None:
     """Does nothing: the device is moved already."""
 
 
-def test_keys_move_the_arm(screen, follows):
+def test_keys_move_the_arm_and_targets_are_recorded_on_both_sides_of_the_guard(example, screen, follows, tmp_path):
+    recorder = example.start(["rosrun", "episodes", "record_node.py", f"_folder:={tmp_path}", "_disk_reserve_mb:=1.0"])
+    wait_until(lambda: example.call("/record/start", Trigger).success, "it is recorded")
     screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync")
     for key, direction in (("Up", AWAY), ("Right", RIGHT), ("b", -UP)):
         screen.run("xdotool", "keydown", key)
         follows(direction, nothing, lambda: screen.run("xdotool", "keyup", key))  # noqa: B023 (it is called here)
+    assert example.call("/record/stop", Trigger).success
+    stop_group(recorder)
+    recorded = EpisodeFolder(tmp_path).read(0).topics
+    assert all(recorded[topic]["messages"] > 10 for topic in (REQUESTED, GUARDED, MEASURED))
 
 
 def test_what_stands_in_for_a_real_robot_has_followed(example):

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import rospy
+from cob_srvs.srv import SetString
 from keyboard.msg import Key
 from node_world import main_config, publishing
 from ros_system import wait_until
@@ -25,6 +26,7 @@ from worlds import FLOOR, box, iiwa
 
 from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder, episodes_to_dataframes
+from episodes.folder import git_state, versions
 from ros_pybullet_interface.msg import SimulationState
 
 JOINTS = ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"]
@@ -55,17 +57,26 @@ def _recorder_pid(folder: EpisodeFolder) -> int:
 
 
 class _Session:
-    """A world with an arm, and the node that records."""
+    """A world with an arm, and the node that records.
+
+    Args:
+        command: The command that starts the node; a launch file has `parameters` as arguments.
+    """
 
     def __init__(self, ros: Any, tmp_path: Path, command: str = RECORD, **parameters: Any) -> None:
         self.ros, self.folder = ros, EpisodeFolder(tmp_path / "demos")
         world = main_config(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),), state_hash_hz=20.0)
         ros.simulator(world, use_sim_time=True)
-        for name, value in {"disk_reserve_mb": 1.0, **parameters}.items():
-            rospy.set_param(f"/record/{name}", value)
+        parameters = {"disk_reserve_mb": 1.0, **parameters}
+        words = shlex.split(command.replace("$HOME", str(tmp_path)))
+        if words[0] == "roslaunch":
+            words += [f"{name}:={value}" for name, value in parameters.items()]
+        else:
+            for name, value in parameters.items():
+                rospy.set_param(f"/record/{name}", value)
         self.states = ros.listen("/rpbi/state", SimulationState)
         self.status = ros.listen("/record/status", String)
-        self.node = ros.start(shlex.split(command.replace("$HOME", str(tmp_path))))
+        self.node = ros.start(words)
         wait_until(lambda: self.now()["recording"] is False, "the node is up")
         wait_until(lambda: "no rpbi/world" not in self.call("start").message, "it has the world's description")
 
@@ -115,6 +126,7 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     assert first.topics["/rpbi/iiwa/joint_states"]["messages"] > 10
     assert {"/clock", "/rpbi/commands", "/rpbi/state"} <= first.topics.keys()
     assert any(each["path"].endswith(".urdf") and each["meshes"] for each in first.files)
+    assert (first.versions, first.git) == (versions(), git_state()) and len(first.git) >= 40
 
     code, text = _run("episodes", folder.path)
     assert code == 0 and len(text.splitlines()) == 3 and "recovered" in text
@@ -135,22 +147,42 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     assert code == 1 and text.count(f"files/{copy.name}, the copy of {tmp_path}/") == 2
 
 
-def test_the_session_of_the_page_with_resets_by_a_button_and_a_changed_urdf(
+def test_the_session_of_the_page_with_resets_keys_and_buttons_and_a_changed_urdf(
     ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (command,) = re.findall(r"^roslaunch episodes record.launch .*$", PAGE, re.MULTILINE)
-    session = _Session(ros, tmp_path, f"{command} reset:=true also:=[joy]", start_button=1)
+    buttons = {"start_button": 1, "discard_button": 2, "label_buttons": {"0": "success"}}
+    session = _Session(ros, tmp_path, command, reset=True, also=["joy"], joy="pad", **buttons)
     session.move(0.4)
-    with publishing("/joy", Joy) as joy, publishing("/rpbi/iiwa/joint_states/target", JointState):
-        for is_recording in (False, True, False):
-            joy.publish(Joy(buttons=[0, 1]))
-            joy.publish(Joy(buttons=[0, 0]))
-            wait_until(lambda state=is_recording: session.now()["recording"] is state, "the button acts")
-            if is_recording:
-                session.move(-0.4)
+    assert _answer(ros.call("/record/label", SetString, "shown")) == "episode 0: shown"
+    with (
+        publishing("/pad", Joy) as joy,
+        publishing("/keyboard/keydown", Key) as keys,
+        publishing("/rpbi/iiwa/joint_states/target", JointState),
+    ):
+
+        def act(press: int | str, **expected: Any) -> None:
+            """Presses a key, or a button by its index, and waits for a status."""
+            if isinstance(press, str):
+                keys.publish(Key(code=getattr(Key, f"KEY_{press}")))
+            else:
+                joy.publish(Joy(buttons=[int(index == press) for index in range(3)]))
+                joy.publish(Joy(buttons=[0, 0, 0]))
+            wait_until(lambda: expected.items() <= session.now().items(), f"{press} acts")
+
+        act("r", recording=False, label="shown")
+        act(1, recording=True, episode=1)  # the recorder is connected to the target from its beginning
+        session.move(-0.4)
+        act(0, label="success")
+        act(1, recording=False)
+        for start, discard in (("r", 2), (1, "x")):
+            act(start, recording=True)
+            act(discard, recording=False)
     folder = session.folder
-    assert "/joy" in folder.read(folder.numbers()[-1]).topics
+    wait_until(lambda: folder.numbers() == [0, 1], "the others are discarded")
+    assert [each.label for each in folder.all()] == ["shown", "success"] and folder.taken() == {0, 1, 2, 3}
+    assert "/pad" in folder.read(1).topics
     for name in ("episodes", "verify", "view", "export", "check_dataset"):
         if name == "export":
             folder.discard(0)  # the recorder is connected to the target from the beginning of the next one on

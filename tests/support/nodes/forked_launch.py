@@ -1,8 +1,9 @@
-"""roslaunch whose nodes come from the process that it was forked from itself; see `forked_node`."""
+"""roslaunch or `./rpbi launch`, whose nodes come from the process that it was forked from itself; see `forked_node`."""
 
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import IO, Any
@@ -28,13 +29,19 @@ def start(
 
 
 def main() -> None:
-    """Runs roslaunch; in each of its nodes, runs the node."""
+    """Runs the command of the arguments; in each of its nodes, runs the node."""
     command = split_server()
     if command:
         run_script(command)
         return
     nodeprocess.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": start})
-    roslaunch.main()
+    del sys.argv[0]
+    if sys.argv[0] == "roslaunch":
+        roslaunch.main()
+    else:
+        from rpbi_examples.ros.console.launch import launch  # few tests need it
+
+        sys.exit(launch(*sys.argv[2:]))
 
 
 if __name__ == "__main__":

@@ -34,6 +34,8 @@ READ_LATE = {"DISPLAY", "LIBGL_ALWAYS_SOFTWARE", "SPNAV_SOCKET"}
 """Variables that no module reads when it is imported."""
 SUPPORT = Path(__file__).resolve().parents[1]
 """Where the tests' helpers are, in folders by subject; programs that tests start are in `programs`."""
+RPBI = str(SUPPORT.parents[1] / "rpbi")
+"""The program of the commands; its `launch` is started as roslaunch is."""
 
 
 def support_on_path(modules: str | None = None) -> dict[str, str]:
@@ -197,12 +199,13 @@ class RosSystem:
                 not forks.
             environment: Variables of its own; with any but those of a screen, or another PYTHONPATH, it is fresh too.
         """
-        is_ours = command[0] == "roslaunch" or command[0] == "rosrun" and command[1] in PACKAGES
+        is_launch = command[0] == "roslaunch" or [*command[:2]] == [RPBI, "launch"]
+        is_ours = is_launch or command[0] == "rosrun" and command[1] in PACKAGES
         forks = is_ours and not fresh and environment.keys() <= READ_LATE and os.environ.get("PYTHONPATH") == MODULES
         if command[0] == "rosrun":
             command = [find_executable(command[1], command[2]), *command[3:]]
         elif forks:
-            command = [str(SUPPORT / "nodes/forked_launch.py"), *command[1:]]
+            command = [str(SUPPORT / "nodes/forked_launch.py"), *command]
         path = self.folder / (log or f"{len(self.processes)}.log")
         everything = {**os.environ, "PYTHONUNBUFFERED": "1", **environment}
         process: subprocess.Popen

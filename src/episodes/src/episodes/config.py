@@ -1,5 +1,7 @@
 """Parameters of the node that records episodes."""
 
+from typing import Annotated
+
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Count, ListOf, Positive, Switch, Text, optional
@@ -9,6 +11,9 @@ DEFAULT_TOPICS = (
     r"|[^/]*ft_sensor[^/]*(/wrench)?|wrench|contacts)|/tf|/tf_static|/clock"
 )
 """Topics of replays, joint states and targets, commands after a guard, wrenches, contacts, TF and the clock."""
+
+_Index = Annotated[Count, Field(strict=False)]
+"""Index as a key of a ROS parameter, which is text."""
 
 
 class RecordParameters(ConfigModel):
@@ -30,3 +35,6 @@ class RecordParameters(ConfigModel):
     )
     start_button: Count | None = optional("Index of the button of `joy` with the effect of the start key.")
     discard_button: Count | None = optional("Index of the button of `joy` with the effect of the discard key.")
+    label_buttons: dict[_Index, str] = Field(
+        {}, description="Labels by the index, as text, of the button of `joy` that gives them."
+    )

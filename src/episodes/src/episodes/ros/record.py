@@ -7,10 +7,11 @@ import logging
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import genpy
 import rosbag
@@ -47,6 +48,7 @@ POLL_S = 0.01
 KEPT_COMMANDS = 4_000
 """Number of commands in a world's life beyond which a late subscriber may miss the first ones; it gets 5,000."""
 
+_Trigger = TypeVar("_Trigger", str, int)
 _log = logging.getLogger(__name__)
 
 
@@ -154,8 +156,9 @@ class RecordNode:
             rospy.Service(f"~{name}", Trigger, lambda _, action=action: TriggerResponse(*_answer(action)))
         rospy.Service("~label", SetString, self._on_label)
         self._buttons: tuple[int, ...] = ()
+        self._button_actions = self._actions_by_button()
         rospy.Subscriber("joy", Joy, self._on_joy, queue_size=10)
-        self._keys = KeyDownSubscriber(self._actions_by_key())
+        self._keys = KeyDownSubscriber({_key_code(key): action for key, action in self._actions_by_key().items()})
         WallTimer(CHECK_HZ, self._check)
         self._publish_status()
 
@@ -295,15 +298,21 @@ class RecordNode:
     def _toggle(self) -> str:
         return self.start() if self._recorder is None else self.stop()
 
-    def _actions_by_key(self) -> dict[int, Callable[[], None]]:
+    def _actions_by_key(self) -> dict[str, Callable[[], None]]:
         parameters = self._parameters
-        actions: dict[str, Callable[[], str]] = {
-            parameters.start_key: self._toggle,
-            parameters.discard_key: self.discard,
-        }
-        for key, label in parameters.label_keys.items():
-            actions[key] = partial(self.label, label)
-        return {_key_code(key): partial(_do, action) for key, action in actions.items()}
+        return self._actions(parameters.start_key, parameters.discard_key, parameters.label_keys)
+
+    def _actions_by_button(self) -> dict[int, Callable[[], None]]:
+        parameters = self._parameters
+        return self._actions(parameters.start_button, parameters.discard_button, parameters.label_buttons)
+
+    def _actions(
+        self, start: _Trigger | None, discard: _Trigger | None, labels: Mapping[_Trigger, str]
+    ) -> dict[_Trigger, Callable[[], None]]:
+        """Returns what keys or buttons do; None is neither."""
+        actions = [(start, self._toggle), (discard, self.discard)]
+        actions += [(each, partial(self.label, label)) for each, label in labels.items()]
+        return {each: partial(_do, action) for each, action in actions if each is not None}
 
     def _on_label(self, request: SetStringRequest) -> SetStringResponse:
         return SetStringResponse(*_answer(lambda: self.label(request.data)))
@@ -311,10 +320,9 @@ class RecordNode:
     def _on_joy(self, message: Joy) -> None:
         pressed = [index for index, value in enumerate(message.buttons) if value and not _at(self._buttons, index)]
         self._buttons = tuple(message.buttons)
-        if self._parameters.start_button in pressed:
-            _do(self._toggle)
-        if self._parameters.discard_button in pressed:
-            _do(self.discard)
+        for index in pressed:
+            if index in self._button_actions:
+                self._button_actions[index]()
 
 
 def _at(buttons: tuple[int, ...], index: int) -> int:
