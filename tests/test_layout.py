@@ -39,7 +39,7 @@ TABLES = (
 """Packages whose classes or commands have a file each, whoever imports them."""
 FLOORS = {
     "rpbi": (
-        {"geometry", "plain_values", "plugins"},
+        {"geometry", "linear_algebra", "plain_values", "plugins"},
         {"config", "samples"},
         {"engine", "meshes", "window"},
         {"urdf"},

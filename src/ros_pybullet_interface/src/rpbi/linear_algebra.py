@@ -7,19 +7,22 @@ machine much longer than the computation lasts.
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import lapack
 
 Array = npt.NDArray[np.float64]
 
 
 def solve(matrix: Array, right: Array) -> Array:
     """Returns x of matrix x = right, shape (n,)."""
+    from scipy.linalg import lapack  # slow to load, and most worlds solve nothing
+
     solution: Array = lapack.dposv(matrix, right)[1]
     return solution
 
 
 def inverse(matrix: Array) -> Array:
     """Returns the inverse of a matrix, shape (n, n)."""
+    from scipy.linalg import lapack
+
     root = lapack.dtrtri(lapack.dpotrf(matrix, lower=1)[0], lower=1)[0]
     inverted: Array = root.T @ root
     return inverted
