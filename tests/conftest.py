@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import resource
 import signal
 import subprocess
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -98,6 +100,15 @@ def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
         yield system
     finally:
         system.close()
+
+
+@pytest.fixture
+def file_limit(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
+    """Limits the size of files that this process and new ones write, and lifts the limit at the end."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python would keep what it could write of a module
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 @pytest.fixture

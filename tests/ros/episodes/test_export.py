@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import resource
 import shutil
 from pathlib import Path
 
+import genpy
 import h5py
 import numpy as np
 import pytest
+import rosbag
 from pyarrow import parquet
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
-from written_episodes import CAMERA, JOINTS, write_episode
+from std_msgs.msg import Float64
+from written_episodes import CAMERA, JOINTS, STATES, WRENCH, write_episode
 
-from episodes import EpisodeFolder
+from episodes import EpisodeFolder, episodes_to_dataframes
+from episodes.datasets.formats import lerobot
 from episodes.datasets.video import read_video
+from episodes.ros.export import folder as export_steps
 from rpbi_utils import bag_to_dataframes, bag_to_images
 
 VIDEO = "videos/observation.images.camera_colour/chunk-000/file-{:03d}.mp4"
@@ -150,37 +156,54 @@ def test_mcap_has_all_messages(exported, demos):
     assert list(message.name) == list(JOINTS) and stamp_ns == 1_002_000_000
 
 
-def test_bad_episodes_are_named_and_the_others_exported(tmp_path, run):
+def test_bad_episodes_are_named_and_the_others_exported(tmp_path, run, caplog):
     folder = EpisodeFolder(tmp_path / "demos")
     for index in range(5):
         write_episode(folder, "good" if index else "bad", seconds=0.5, cameras=(), has_targets=index != 2)
+    for of_record in (True, False):
+        write_episode(folder, "good", seconds=0.5, cameras=(), set_back_s=5.0, of_record=of_record)
+    write_episode(folder, "good", seconds=0.5, cameras=())
+    with rosbag.Bag(str(folder.folder_of(7) / "episode.bag"), "a") as opened:
+        opened._topic_connections.pop(WRENCH, None)
+        opened.write(WRENCH, Float64(), genpy.Time(2))
     bag = folder.folder_of(0) / "episode.bag"
     bag.write_bytes(bag.read_bytes()[:9000])
     (folder.folder_of(3) / "episode.yaml").write_text("[")
+    folder.part_of(8).mkdir()  # of a recorder that was killed at once
+    folder.part_of(9).mkdir()
+    (folder.part_of(9) / "episode.yaml").write_text("number: 9\ntopics: {/a: {messages: 1}}")
+    code, text = run("episodes", folder.path, "--repair")
+    assert code == 0 and text.count(": incomplete: the recorder was killed, no message recovered: ") == 2
+    assert "episode 9: " in text and "topics: /a: expected a mapping with 'type'" in text
+    code, text = run("episodes", folder.path)
+    assert code == 0 and len(text.splitlines()) == 11 and "  cannot be read: while parsing" in text
+    assert text.count("complete, a clock was set back by 4.99 s") == 2
+    states = episodes_to_dataframes(folder.path, STATES)[STATES]
+    assert set(states.index.get_level_values("episode")) == {1, 2, 4, 5, 6, 7}
+    assert f"left out: {bag}: has no index" in caplog.text
+    assert f"left out: {folder.folder_of(3)}/episode.yaml: cannot be read" in caplog.text
     code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "out")
     assert code == 1
     assert f"episode 0: {bag}: has no index" in text
     assert "episode 2: " in text and "no messages for 'action', which other episodes have" in text
     assert f"episode 3: {folder.folder_of(3) / 'episode.yaml'}: cannot be read" in text
+    clocks = [f"episode {each}: {folder.folder_of(each)}/episode.bag: " for each in (5, 6)]
+    for each in clocks:
+        assert f"{each}/rpbi/arm/joint_states: its clock was set back by 4.99 s at 6.242 s" in text
+    assert f"{WRENCH}: expected messages of one type, got geometry_msgs/WrenchStamped and std_msgs/Float64" in text
     assert "out has 2 episodes" in text
     with h5py.File(tmp_path / "out/dataset.hdf5") as file:
         assert list(file["data"]) == ["demo_0", "demo_1"]
     assert run("check_dataset", tmp_path / "out")[0] == 0
+    code, text = run("export", folder.path, "--to", "mcap", "--out", tmp_path / "mcap")
+    assert code == 1 and all(each in text for each in clocks) and "mcap has 3 episodes" in text
     code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "out")
     assert code == 1 and "exists already" in text
     code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "none", "--label", "perfect")
     assert code == 1 and "no episode with the label perfect can be exported" in text
     code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "none", "--state", "/wrong")
     assert code == 1 and "unknown topic '/wrong'" in text
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "out"]
-
-
-@pytest.fixture
-def file_limit():
-    """Limits the size of files that this process writes, and lifts the limit at the end."""
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "mcap", "out"]
 
 
 def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run, file_limit):
@@ -204,6 +227,35 @@ def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run,
     file_limit(resource.RLIM_INFINITY)
     assert run("check_dataset", tmp_path / "out")[0] == 0
     assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "out"]
+
+
+@pytest.mark.parametrize(
+    ("name", "owner", "step", "nth", "left_out"),
+    [
+        ("lerobot", export_steps, "write_episode", 2, "1"),
+        ("lerobot", lerobot, "_json", 1, "2"),
+        ("robomimic", export_steps, "write_episode", 2, "1"),
+        ("robomimic", export_steps, "write_export", 1, "2"),
+        ("mcap", export_steps, "write_episode", 2, "1"),
+    ],
+)
+def test_an_episode_without_room_for_its_facts_is_taken_back(
+    demos, tmp_path, run, monkeypatch, name, owner, step, nth, left_out
+):
+    calls, write = [], getattr(owner, step)
+
+    def write_until_full(*arguments):
+        calls.append(step)
+        write(*arguments)
+        if len(calls) == nth:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(owner, step, write_until_full)
+    code, text = run("export", demos.path, "--to", name, "--images", "--out", tmp_path / "out")
+    assert code == 1 and f"episode {left_out}: [Errno 28] No space left on device" in text
+    assert f"out has {left_out} episode" in text and ("episodes 2 are not exported" in text) == (left_out == "1")
+    code, text = run("check_dataset", tmp_path / "out")
+    assert code == 0, text
 
 
 def test_options_and_topics_can_be_chosen(demos, tmp_path, run):

@@ -7,7 +7,6 @@ import hashlib
 import os
 import random
 import re
-import resource
 import signal
 import socket
 import subprocess
@@ -228,14 +227,6 @@ def test_what_cannot_be_started_is_named(world, run, tmp_path):
     with pytest.raises(SystemExit, match="2"):
         run(*words(world, tmp_path, episodes=0))
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.fixture
-def file_limit() -> Iterator[Any]:
-    """Limits the size of files that this process and new ones write, and lifts the limit at the end."""
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 def test_a_full_disk_is_named_and_nothing_is_lost(world, alone, run, tmp_path, file_limit):

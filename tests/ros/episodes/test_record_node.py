@@ -28,7 +28,10 @@ from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder, episodes_to_dataframes
 from episodes.folder import git_state, versions
 from ros_pybullet_interface.msg import SimulationState
+from rpbi_utils import topic_report
 
+SPARE_MB = 1000.0
+"""Space of the disk that a test leaves free of its reserve [MB], more than others use meanwhile."""
 JOINTS = ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"]
 PAGE = (Path(__file__).resolve().parents[3] / "docs/data.md").read_text()
 RECORD = "rosrun episodes record_node.py _folder:=$HOME/demos"
@@ -86,6 +89,11 @@ class _Session:
     def now(self) -> dict[str, Any]:
         return dict(json.loads(self.status.messages[-1].data))
 
+    def has_recorded(self, number: int) -> bool:
+        """Returns whether an episode is being recorded and has messages."""
+        now = self.now()
+        return bool(now["recording"]) and now["episode"] == number and now["messages"] > 100
+
     def move(self, angle: float) -> None:
         """Moves the arm for a while."""
         with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
@@ -137,14 +145,20 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     states = tables["/rpbi/iiwa/joint_states"]
     assert states.index.names == ["episode", "time"] and set(states.index.get_level_values(0)) == {0, 2}
 
+    yamls = [each["path"] for each in first.files if each["path"].endswith(".yaml")]
+    [path] = [each for each in yamls if "baseMass" in Path(each).read_text()]
+    Path(path).write_text(f"# newer\n{Path(path).read_text()}")
     code, text = _run("verify", folder.path, "--jobs", "2")
     assert code == 0, text
     assert "episode 0 (success): same: " in text and "2 of 2 episodes are the same" in text
+    assert text.count(f"; note: {path} differs from its copy in the episode\n") == 2
 
+    (folder.folder_of(0) / "episode.yaml").write_text("[")
     [copy] = [each for each in folder.files.glob("*.yaml") if "baseMass" in each.read_text()]
     copy.write_text(copy.read_text().replace("1", "2", 1))
     code, text = _run("verify", folder.path)
-    assert code == 1 and text.count(f"files/{copy.name}, the copy of {tmp_path}/") == 2
+    assert code == 1 and text.count(f"files/{copy.name}, the copy of {tmp_path}/") == 1
+    assert f"episode 0: {folder.folder_of(0)}/episode.yaml: cannot be read" in text and "0 of 2 episodes" in text
 
 
 def test_the_session_of_the_page_with_resets_keys_and_buttons_and_a_changed_urdf(
@@ -213,7 +227,24 @@ def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_p
     code, text = _run("episodes", folder.path, "--repair")
     assert code == 0 and "episode 0: recovered: the recorder was killed, " in text
     assert folder.read(0).messages > 0 and folder.partial() == []
-    rospy.set_param("/record/disk_reserve_mb", 1e9)
+
+    rospy.set_param("/record/disk_reserve_mb", folder.free_mb() - SPARE_MB)
     ros.start(["rosrun", "episodes", "record_node.py"])
-    wait_until(lambda: "MB free on the disk" in session.call("start").message, "the start is refused")
-    assert folder.numbers() == [0]
+    wait_until(lambda: session.call("start").success, "it has the world's description")
+    wait_until(lambda: session.has_recorded(1), "messages come")
+    filler = tmp_path / "filler"
+    with filler.open("wb") as file:
+        os.posix_fallocate(file.fileno(), 0, int(2e6 * SPARE_MB))
+    wait_until(lambda: not session.now()["recording"], "the episode is ended")
+    assert "MB free on the disk" in session.call("start").message
+    filler.unlink()
+    episode = folder.read(1)
+    assert episode.state == "incomplete" and "less than the reserve" in episode.note
+    assert topic_report(folder.folder_of(1) / "episode.bag")["messages"].sum() == episode.messages > 100
+
+    _answer(session.call("start"))
+    wait_until(lambda: session.has_recorded(2), "messages come")
+    (folder.part_of(2) / ".episode.part.yaml").mkdir()  # the node cannot write there any more, its recorder can
+    wait_until(lambda: not session.now()["recording"], "the episode is ended")
+    assert topic_report(folder.part_of(2) / "episode.bag")["messages"].sum() > 100
+    assert (folder.numbers(), folder.partial()) == ([0, 1], [folder.part_of(2)])

@@ -29,7 +29,7 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder
 from episodes.folder import BAG
-from ros_pybullet_interface.msg import SimulationState
+from ros_pybullet_interface.msg import Contacts, SimulationState
 from rpbi.world import World
 from rpbi_utils import bag_to_dataframes, transforms_between
 
@@ -229,7 +229,12 @@ def test_a_bag_by_itself_with_a_soft_body(tmp_path: Path) -> None:
             state = SimulationState(tick=1000 * (seconds - 10))
             state.header.stamp = Time(seconds)
             bag.write("/rpbi/state", state, Time(seconds))
+        bag.write("/rpbi/jelly/contacts", Contacts(), Time(11))
+        bag._topic_connections.clear()  # else it would be written as Contacts
+        bag.write("/rpbi/jelly/contacts", String("a"), Time(11))
     code, text = _view(path, "--out", tmp_path / "soft.html")
+    came = "ros_pybullet_interface/Contacts and std_msgs/String"
+    assert f"note: /rpbi/jelly/contacts is not shown: expected messages of one type, got {came}" in text
     assert code == 0 and "note: jelly is not shown: it is soft" in text and ": 2.0 s, " in text
     assert _Page(tmp_path / "soft.html").plots["panels"] == []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import resource
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -84,6 +85,19 @@ def test_files(write_bag: WriteBag, tmp_path: Path) -> None:
     np.testing.assert_array_equal(PIL.Image.open(png), colour)
     np.testing.assert_array_equal(np.load(npy), depth)
     assert list(pd.read_csv(tmp_path / "rgb/times.csv")["time"]) == [1.1]
+
+
+def test_on_a_full_disk_no_file_is_half_written(
+    write_bag: WriteBag, tmp_path: Path, file_limit: Callable[[int], None]
+) -> None:
+    colour, depth = RANDOM.integers(0, 256, (64, 64, 3), np.uint8), RANDOM.random((64, 64)).astype(np.float32)
+    bag = write_bag([("/rgb", _image(colour, "rgb8")), ("/depth", _image(depth, "32FC1"))])
+    file_limit(5_000)
+    for topic in ("/rgb", "/depth"):
+        with pytest.raises(OSError, match="too large|requested and"):
+            write_images(bag, topic, tmp_path / "images")
+    file_limit(resource.RLIM_INFINITY)
+    assert list((tmp_path / "images").iterdir()) == []
 
 
 def test_a_video_shows_the_newest_image_at_each_time(write_bag: WriteBag, tmp_path: Path) -> None:

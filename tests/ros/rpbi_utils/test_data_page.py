@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import resource
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,13 +13,15 @@ from typing import Any
 import genpy
 import numpy as np
 import pytest
+import rosbag
 import written_episodes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image, JointState
-from std_msgs.msg import Header
+from std_msgs.msg import Float64, Header
 from tf2_msgs.msg import TFMessage
 
+from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 
@@ -102,3 +105,23 @@ def test_plots_are_written_beside_the_bag(recording: Path) -> None:
     assert {path.name for path in written} >= {"rpbi.kuka_lwr.joint_states.png", "rpbi.box.contacts.png", "rates.png"}
     assert all(path.parent == recording.with_name("recording_plots") for path in written)
     assert all(path.stat().st_size > 1000 for path in written)
+
+
+def test_a_plot_names_messages_of_several_types_and_no_picture_is_half_written(
+    write_bag: Callable[..., Path],
+    file_limit: Callable[[int], None],
+    caplog: pytest.LogCaptureFixture,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bag = write_bag([("/a", JointState(name=["a"], position=[index])) for index in range(3)])
+    with rosbag.Bag(str(bag), "a") as opened:
+        opened.write("/a", Float64(), genpy.Time(101))
+    command = command_of("rpbi_utils.ros.console.plot")
+    assert command is not None
+    file_limit(5_000)
+    assert command.run([str(bag)]) == 1
+    file_limit(resource.RLIM_INFINITY)
+    assert "a figure cannot be written: [Errno 27] File too large" in capsys.readouterr().err
+    assert list(bag.with_name("test_plots").iterdir()) == []
+    came = "sensor_msgs/JointState (messages: 3), std_msgs/Float64 (messages: 1)"
+    assert f"/a: expected messages of one type, got {came}" in caplog.text

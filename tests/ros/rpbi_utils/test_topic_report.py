@@ -9,10 +9,11 @@ import genpy
 import numpy as np
 import pandas as pd
 import pytest
+import rosbag
 from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import Float64, Header
 
-from rpbi_utils import topic_report
+from rpbi_utils import bag_to_dataframes, topic_report
 
 WriteBag = Callable[..., Path]
 
@@ -28,6 +29,7 @@ def test_rates_and_gaps_are_measured_by_stamps_and_sizes_are_those_of_the_messag
     assert row["rate_hz"] == pytest.approx(8.0)
     assert row["max_gap_s"] == pytest.approx(0.2)
     assert (row["first"], row["last"]) == (1.0, 1.5)
+    assert row["set_back_s"] == pytest.approx(0.1)
 
 
 def test_without_stamps_the_times_of_recording_count(write_bag: WriteBag) -> None:
@@ -35,6 +37,19 @@ def test_without_stamps_the_times_of_recording_count(write_bag: WriteBag) -> Non
     for topic in ("/a", "/unstamped"):
         assert row[topic]["rate_hz"] == pytest.approx(1000.0)
     assert row["/a"]["first"] == 100.0
+
+
+def test_a_clock_of_recording_that_was_set_back_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with rosbag.Bag(str(tmp_path / "test.bag"), "w", chunk_threshold=100) as bag:
+        for seconds in (10, 11, 12, 5, 6, 7):
+            for topic, message in (("/a", Float64()), ("/wrench", WrenchStamped())):
+                if topic == "/wrench":
+                    message.header.stamp = genpy.Time(seconds)
+                bag.write(topic, message, genpy.Time(seconds))
+    assert list(topic_report(tmp_path / "test.bag")["set_back_s"]) == [7.0, 7.0]
+    bag_to_dataframes(tmp_path / "test.bag")
+    for topic in ("/a", "/wrench"):
+        assert f"{topic}: its clock was set back by 7 s at 12 s" in caplog.text
 
 
 def test_one_message_has_no_rate(write_bag: WriteBag) -> None:

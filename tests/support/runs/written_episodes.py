@@ -30,6 +30,8 @@ def write_episode(
     phase: float = 0.0,
     cameras: tuple[str, ...] = (CAMERA,),
     has_targets: bool = True,
+    set_back_s: float = 0.0,
+    of_record: bool = True,
 ) -> int:
     """Writes an episode and returns its number.
 
@@ -40,33 +42,38 @@ def write_episode(
         phase: Phase of its motion [rad], so that episodes differ.
         cameras: Topics of images, at 25 Hz.
         has_targets: Whether there are targets.
+        set_back_s: Time by which the clock is set back in the middle [s].
+        of_record: Whether the clock of the recorder is set back, too.
     """
     episode, part = folder.begin(seeds="7")
     with rosbag.Bag(str(part / BAG), "w", compression="lz4") as bag:
         bag.write("/rpbi/world_description", String("{}"), genpy.Time(1))
         for tick in range(round(seconds * 500)):
-            stamp = genpy.Time.from_sec(1.0 + (tick + 1) * 0.002)
             time_s = (tick + 1) * 0.002
+            stamp = recorded = genpy.Time.from_sec(1.0 + set_back_s + time_s)
+            if time_s > seconds / 2:
+                stamp = genpy.Time.from_sec(1.0 + time_s)
+                recorded = stamp if of_record else recorded
             if tick % 5 == 0:
-                _write_arm(bag, stamp, time_s, phase)
+                _write_arm(bag, stamp, recorded, time_s, phase)
             if has_targets and tick % 10 == 0 and tick >= 100:
                 target = JointState(name=list(JOINTS[:2]), position=_angles(time_s + 0.05, phase)[:2])
                 target.header.stamp = stamp
-                bag.write(TARGETS, target, stamp)
+                bag.write(TARGETS, target, recorded)
             if tick % 20 == 0:
                 for number, topic in enumerate(cameras):
-                    bag.write(topic, _image(stamp, time_s + phase, number), stamp)
+                    bag.write(topic, _image(stamp, time_s + phase, number), recorded)
             if tick % 50 == 0:
                 state = SimulationState(tick=tick + 1, commands=tick // 10, state_hash=f"{hash((tick, phase)):x}")
                 state.header.stamp = stamp
-                bag.write("/rpbi/state", state, stamp)
+                bag.write("/rpbi/state", state, recorded)
     episode.state, episode.label, episode.seconds = "complete", label, seconds
     episode.topics = measure_topics(part / BAG)
     folder.complete(part, episode)
     return episode.number
 
 
-def _write_arm(bag: rosbag.Bag, stamp: genpy.Time, time_s: float, phase: float) -> None:
+def _write_arm(bag: rosbag.Bag, stamp: genpy.Time, recorded: genpy.Time, time_s: float, phase: float) -> None:
     state = JointState(name=list(JOINTS), position=_angles(time_s, phase), velocity=[0.1, 0.2, math.cos(time_s)])
     state.effort = [math.sin(9.0 * time_s + joint) for joint in range(len(JOINTS))]
     wrench = WrenchStamped()
@@ -75,13 +82,13 @@ def _write_arm(bag: rosbag.Bag, stamp: genpy.Time, time_s: float, phase: float) 
     contacts = Contacts(force=Vector3(0.0, 0.0, max(0.0, math.sin(3.0 * time_s + phase))))
     for topic, message in ((STATES, state), (WRENCH, wrench), (CONTACTS, contacts)):
         message.header.stamp = stamp
-        bag.write(topic, message, stamp)
+        bag.write(topic, message, recorded)
     box = TransformStamped(child_frame_id="rpbi/box")
     box.header.frame_id, box.header.stamp = "rpbi/world", stamp
     box.transform.translation = Vector3(0.1 * time_s, 0.2, 0.05)
     angle = 4.0 * time_s + phase  # half of it passes 180 degrees, where the sign of the quaternion is free
     box.transform.rotation.z, box.transform.rotation.w = math.sin(angle / 2), math.cos(angle / 2)
-    bag.write("/tf", TFMessage([box]), stamp)
+    bag.write("/tf", TFMessage([box]), recorded)
 
 
 def _angles(time_s: float, phase: float) -> list[float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from episodes.errors import EpisodeError
-from episodes.files import changed_files, store_files, with_stored_files
+from episodes.files import changed_files, newer_files, store_files, with_stored_files
 from episodes.folder import FACTS, EpisodeFolder
 from episodes.listing import details_of, table_of
 
@@ -71,10 +71,17 @@ def test_what_is_not_there_or_not_readable_is_named(tmp_path: Path) -> None:
         folder.discard(5)
     with pytest.raises(EpisodeError, match="expected a folder of episodes, there is none"):
         EpisodeFolder(tmp_path / "missing").numbers()
-    for text in ("[", "a: 1", "number: 0\nwrong: 1"):
+    for text, words in (
+        ("[", "while parsing"),
+        ("a: 1", "expected a mapping with 'number'"),
+        ("number: 0\nwrong: 1", "expected a mapping with 'number'"),
+        ("number: 0\nlabel: 1", "label: expected a value of the type str, got int"),
+        ("number: 0\ntopics: {/a: {messages: 1}}", "topics: /a: expected a mapping with 'type'"),
+    ):
         (tmp_path / "episode_000000" / FACTS).write_text(text)
-        with pytest.raises(EpisodeError, match="episode.yaml: (cannot be read|expected a mapping)"):
+        with pytest.raises(EpisodeError, match=f"episode.yaml: cannot be read: {words}"):
             folder.read(0)
+        assert f"  cannot be read: {words}" in table_of(folder.all())
 
 
 def test_the_table_has_lowest_rate_longest_gap_and_losses(tmp_path: Path) -> None:
@@ -123,7 +130,10 @@ def test_files_are_stored_by_content_and_worlds_read_the_copies(description: str
 def test_a_changed_or_missing_copy_is_named(description: str, tmp_path: Path) -> None:
     store = tmp_path / "files"
     files, _ = store_files(description, store)
-    assert list(changed_files(files, store)) == []
+    assert list(changed_files(files, store)) == list(newer_files(files)) == []
+    (tmp_path / "source/r.yaml").write_text("name: t")
+    (tmp_path / "source/part.stl").unlink()
+    assert list(newer_files(files)) == [f"{tmp_path}/source/r.yaml differs from its copy in the episode"]
     (copy,) = store.glob("*.yaml")
     copy.write_text("name: s")
     next(store.glob("*.stl")).unlink()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import resource
 from collections import deque
 
 import numpy as np
@@ -14,7 +15,15 @@ from PIL import Image
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi_examples.lfd.person import HALF_SIDE_M, TIP_RADIUS_M, Person
-from rpbi_examples.lfd.report import BoxError, Run, draw_paths, draw_pipeline, write_summary
+from rpbi_examples.lfd.report import (
+    BoxError,
+    Run,
+    draw_paths,
+    draw_pipeline,
+    write_picture,
+    write_summary,
+    write_tables,
+)
 from rpbi_examples.lfd.skill import PushSkill, ShownPush
 from rpbi_examples.motions import PlanarPose
 
@@ -98,6 +107,17 @@ def test_a_box_on_its_side_is_not_at_its_goal():
     assert not BoxError.of(np.array([0.025, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0])).is_good_to_learn
     assert not BoxError.of(np.array([0.02, 0.0, 0.03]), np.array([half, 0.0, 0.0, half])).is_at_goal
     assert not BoxError.of(np.array([0.031, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, -1.0])).is_at_goal
+
+
+def test_on_a_full_disk_no_table_and_no_picture_is_half_written(tmp_path, file_limit):
+    table, figure = pd.DataFrame({"a": np.random.default_rng(0).random(2_000)}), Figure()
+    figure.subplots().plot(table["a"])
+    file_limit(5_000)
+    for write in (lambda: write_tables(table, tmp_path / "t"), lambda: write_picture(figure, tmp_path / "p.png")):
+        with pytest.raises(OSError, match="File too large"):
+            write()
+    file_limit(resource.RLIM_INFINITY)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_summary_and_pictures(tmp_path):

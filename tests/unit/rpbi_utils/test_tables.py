@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from rpbi_utils.bags import tables
+from rpbi_utils.bags.clock import SetBack, clock_of
 from rpbi_utils.bags.message_type import MessageType
 from rpbi_utils.bags.tables import TableBuilder
 
@@ -166,6 +167,28 @@ def test_two_types_on_one_topic_share_a_table() -> None:
     builder.add(NUMBER, struct.pack("<d", 1.5), 1.0)
     builder.add(TEXT, _text(b"x"), 2.0)
     assert list(builder.table()["data"]) == [1.5, "x"]
+
+
+def test_a_clock_that_was_set_back_and_messages_of_several_types_are_named(
+    joint_state_type: MessageType, pack_joint_state: Pack, caplog: pytest.LogCaptureFixture
+) -> None:
+    _table(joint_state_type, [pack_joint_state(stamp, ["a"], [0.0]) for stamp in (5, 7, 6, 8)])
+    assert caplog.text == ""  # by 1 s, as several publishers might
+    _table(joint_state_type, [pack_joint_state(stamp, ["a"], [0.0]) for stamp in (5, 10, 3, 4)])
+    assert "/topic: its clock was set back by 7 s at 10 s" in caplog.text
+    builder = TableBuilder("/mixed")
+    for time_s in range(4):
+        builder.add(*((NUMBER, struct.pack("<d", 1.5)) if time_s else (TEXT, _text(b"x"))), float(time_s))
+    builder.table()
+    came = "std_msgs/Float64 (messages: 3), std_msgs/String (messages: 1)"
+    assert f"/mixed: expected messages of one type, got {came}" in caplog.text
+
+
+def test_stamps_of_several_frames_are_not_compared() -> None:
+    table = pd.DataFrame({"record_time": [1.0, 2.0, 3.0, 4.0], "child": ["b", "a", "b", "a"]}, [50.0, 10.0, 51.0, 11.0])
+    assert not clock_of(table).is_fault
+    assert clock_of(table.assign(child="a")) == SetBack(50.0, 40.0)
+    assert clock_of(table.assign(child=["b", "b", "a", "a"])) == SetBack(50.0, 40.0)
 
 
 def test_a_topic_without_messages_is_an_empty_table() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -70,6 +72,17 @@ def test_binary_columns_do_not_go_into_text_files(table: pd.DataFrame, tmp_path:
     with pytest.raises(ValueError, match="'data' is binary"):
         write_table(table, tmp_path / "t.csv")
     assert not (tmp_path / "t.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["t.parquet", "t.csv"])
+def test_on_a_full_disk_the_former_file_stays(tmp_path: Path, name: str, file_limit: Callable[[int], None]) -> None:
+    (tmp_path / name).write_text("former")
+    long = pd.DataFrame({"record_time": np.random.default_rng(0).random(10_000)}, index=pd.Index(range(10_000)))
+    file_limit(10_000)
+    with pytest.raises(OSError, match="File too large"):
+        write_table(long, tmp_path / name)
+    file_limit(resource.RLIM_INFINITY)
+    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [(name, "former")]
 
 
 @pytest.mark.parametrize("name", ["t.parquet", "t.csv"])

@@ -7,11 +7,13 @@ import json
 import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.files import atomic_file
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.files import found_mesh
 
@@ -75,11 +77,14 @@ def _store(path: str, stored: dict[str, dict[str, Any]], store: Path, faults: li
     target = stored_path(store, path, digest)
     if not target.exists():
         store.mkdir(parents=True, exist_ok=True)
-        written = target.with_name(f".{target.name}.new")
-        written.write_bytes(data)
-        written.rename(target)
+        with atomic_file(target) as part:
+            part.write_bytes(data)
     stored[path] = {"path": path, "sha256": digest}
     return digest
+
+
+def _digest(path: str | Path) -> str:
+    return hashlib.sha256(read_file(path)).hexdigest()
 
 
 def stored_path(store: Path, path: str, digest: str) -> Path:
@@ -94,10 +99,18 @@ def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[s
             continue
         copy = stored_path(store, each["path"], each["sha256"])
         try:
-            if hashlib.sha256(read_file(copy)).hexdigest() != each["sha256"]:
+            if _digest(copy) != each["sha256"]:
                 yield f"{copy.parent.name}/{copy.name}, the copy of {each['path']}, was changed"
         except OSError:
             yield f"{copy.parent.name}/{copy.name}, the copy of {each['path']}, is missing"
+
+
+def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yields a sentence for each file that is there, with another content than was stored."""
+    for each in files:
+        with suppress(OSError):  # it is not there any more
+            if each["sha256"] and _digest(each["path"]) != each["sha256"]:
+                yield f"{each['path']} differs from its copy in the episode"
 
 
 def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], store: Path, folder: Path) -> str:

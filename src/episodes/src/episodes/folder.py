@@ -6,7 +6,7 @@ import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
@@ -17,12 +17,16 @@ import rospkg
 import yaml
 
 from custom_ros_tools.console.modules import workspace
+from custom_ros_tools.files import atomic_file
 
 from .errors import EpisodeError
 
 BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
 """Files of an episode: the recording, its description, and commands that the topic no longer sends."""
 FILES, DISCARDED = "files", "discarded"
+SET_BACK = "set_back_s"
+UNREADABLE = "cannot be read"
+"""State of an episode whose description cannot be read."""
 _COMPLETE = re.compile(r"episode_(\d{6,})")
 _PARTIAL = re.compile(r"\.episode_(\d{6,})\.part")
 
@@ -45,7 +49,8 @@ class Episode:
         git: Commit of the workspace, and whether files were changed since; empty without git.
         files: Files that the world names, see `episodes.files`.
         published: Messages that publishers sent to the recorder, by topic.
-        topics: By topic the type, messages, mean rate [Hz] and longest gap [s] in the bag.
+        topics: By topic the type, messages, mean rate [Hz] and longest gap [s] in the bag; `set_back_s` if its clock
+            was set back [s].
     """
 
     number: int
@@ -78,6 +83,11 @@ class Episode:
         recorded = {topic: each["messages"] for topic, each in self.topics.items()}
         lost = {topic: sent - recorded.get(topic, 0) for topic, sent in self.published.items()}
         return {topic: count for topic, count in lost.items() if count > 0}
+
+    @property
+    def set_back_s(self) -> float:
+        """Largest time by which the clock of a topic was set back [s]; 0 if none was."""
+        return max((float(each.get(SET_BACK, 0.0)) for each in self.topics.values()), default=0.0)
 
     def joint_rhythm(self) -> tuple[float, float] | None:
         """Returns the lowest rate [Hz] and longest gap [s] of joint states; None without any."""
@@ -119,8 +129,12 @@ class EpisodeFolder:
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
-        """Yields all finished episodes."""
-        return map(self.read, self.numbers())
+        """Yields all finished episodes; the note of one that is `UNREADABLE` has the reason."""
+        for number in self.numbers():
+            try:
+                yield read_facts(self.folder_of(number))
+            except EpisodeError as error:
+                yield Episode(number, UNREADABLE, note=error.message.removeprefix(f"{UNREADABLE}: "))
 
     def read(self, number: int) -> Episode:
         """Returns an episode.
@@ -153,6 +167,7 @@ class EpisodeFolder:
 
         Raises:
             EpisodeError: If the number is used.
+            OSError: If it cannot be written; there is no folder then.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         used = self.taken() | set(_numbers(self.path, _PARTIAL))
@@ -161,7 +176,11 @@ class EpisodeFolder:
         episode = Episode(max(used, default=-1) + 1 if number is None else number, **facts)
         part = self.part_of(episode.number)
         part.mkdir()
-        write_facts(part, episode)
+        try:
+            write_facts(part, episode)
+        except OSError:
+            shutil.rmtree(part, ignore_errors=True)
+            raise
         return episode, part
 
     def complete(self, part: Path, episode: Episode) -> Path:
@@ -202,19 +221,42 @@ def read_facts(folder: Path) -> Episode:
     path = folder / FACTS
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise EpisodeError(path, f"cannot be read: {' '.join(str(error).split())}") from error
-    known = {each.name for each in fields(Episode)}
-    if not isinstance(data, Mapping) or "number" not in data or set(data) - known:
-        raise EpisodeError(path, f"expected a mapping with 'number' and of {', '.join(sorted(known))}")
+        _require(data, "", ("number",), {each.name: type(getattr(Episode(0), each.name)) for each in fields(Episode)})
+        for topic, each in data.get("topics", {}).items():
+            _require(each, f"topics: {topic}: ", _TOPIC_FACTS, {**_TOPIC_FACTS, SET_BACK: float})
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise EpisodeError(path, f"{UNREADABLE}: {' '.join(str(error).split())}") from error
     return Episode(**data)
+
+
+_TOPIC_FACTS = {"type": str, "messages": int, "rate_hz": float, "max_gap_s": float}
+
+
+def _require(data: Any, place: str, needed: Collection[str], kinds: Mapping[str, type]) -> None:
+    """Raises a ValueError unless it is a mapping with values of some types, and of these keys alone."""
+    if not isinstance(data, Mapping) or set(needed) - set(data) or set(data) - set(kinds):
+        keys = " and ".join(map(repr, needed))
+        raise ValueError(f"{place}expected a mapping with {keys} and of {', '.join(sorted(kinds))}")
+    for key, value in data.items():
+        if not isinstance(value, (float, int) if kinds[key] is float else kinds[key]):
+            expected, got = kinds[key].__name__, type(value).__name__
+            raise ValueError(f"{place}{key}: expected a value of the type {expected}, got {got}")
+
+
+def read_part(part: Path) -> Episode:
+    """Reads the description of an episode in its temporary folder; one without it has its number and state alone."""
+    try:
+        return read_facts(part)
+    except EpisodeError as error:
+        match = _PARTIAL.fullmatch(part.name)
+        assert match is not None
+        return Episode(int(match[1]), UNREADABLE, note=str(error))
 
 
 def write_facts(folder: Path, episode: Episode) -> None:
     """Writes the description of an episode into its folder; the former one stays until the new one is complete."""
-    written = folder / f".{FACTS}.new"
-    written.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
-    written.rename(folder / FACTS)
+    with atomic_file(folder / FACTS) as part:
+        part.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 
 def _numbers(folder: Path, pattern: re.Pattern[str]) -> list[int]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from .folder import Episode
+from .folder import SET_BACK, Episode
 
 _HEADER = ("episode", "label", "seconds", "messages", "joint states", "longest gap", "state")
 
@@ -20,7 +20,8 @@ def _row(episode: Episode) -> tuple[str, ...]:
     rhythm = episode.joint_rhythm()
     rate, gap = ("-", "-") if rhythm is None else (f"{rhythm[0]:.5g} Hz", f"{1e3 * rhythm[1]:.3g} ms")
     lost = sum(episode.lost.values())
-    state = episode.state + (f", {lost} messages lost" if lost else "") + (f": {episode.note}" if episode.note else "")
+    state = episode.state + (f", {lost} messages lost" if lost else "") + clock_note(episode.set_back_s)
+    state += f": {episode.note}" if episode.note else ""
     return (
         str(episode.number),
         episode.label or "-",
@@ -30,6 +31,11 @@ def _row(episode: Episode) -> tuple[str, ...]:
         gap,
         state,
     )
+
+
+def clock_note(set_back_s: float) -> str:
+    """Returns the end of a sentence on a clock that was set back [s]; empty for 0."""
+    return f", a clock was set back by {set_back_s:.3g} s" if set_back_s else ""
 
 
 def details_of(episode: Episode) -> str:
@@ -42,5 +48,5 @@ def details_of(episode: Episode) -> str:
     for topic, each in episode.topics.items():
         lost = f", {episode.lost[topic]} lost" if topic in episode.lost else ""
         rhythm = f"{each['rate_hz']:.5g} Hz, longest gap {1e3 * each['max_gap_s']:.3g} ms"
-        lines.append(f"{topic}: {each['messages']} messages{lost}, {rhythm}")
+        lines.append(f"{topic}: {each['messages']} messages{lost}, {rhythm}{clock_note(each.get(SET_BACK, 0.0))}")
     return "\n".join(lines)

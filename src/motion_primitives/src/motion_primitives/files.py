@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.files import atomic_file
 from custom_ros_tools.schema import ConfigModel, ListOf, Switch, Text
 
 from .primitive import Primitive
@@ -42,13 +42,9 @@ def save(primitive: Primitive, path: str | Path) -> None:
         orientation=primitive.space.has_orientation,
         learned=primitive.learned().model_dump(mode="json"),
     )
-    unfinished = Path(f"{path}.unfinished")
-    try:
-        text = yaml.safe_dump(content.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120)
-        unfinished.write_text(text, encoding="utf-8")
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    text = yaml.safe_dump(content.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120)
+    with atomic_file(Path(path)) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def load(path: str | Path) -> Primitive:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from abc import ABC, abstractmethod
@@ -138,7 +139,7 @@ class DatasetFormat(ABC):
     """A format of data sets: it writes episodes into a folder, recognises such folders and checks them.
 
     `open`, `add` for each episode and `close` are called in this order. Each episode that was added stays complete
-    when a later `add` fails.
+    when a later `add` fails. On a full disk, the last one may be taken back, and `close` called again.
 
     Args:
         config: Its options.
@@ -171,9 +172,21 @@ class DatasetFormat(ABC):
             OSError: If it cannot be written; nothing of it is in the folder then.
         """
 
+    def take_back(self, index: int) -> None:
+        """Removes the episode that was added last; at most once after each `add`, also after a `close` that failed.
+
+        Raises:
+            OSError: If that cannot be done, as here; there is no data set then.
+        """
+        raise OSError(errno.ENOSPC, f"no room to complete episode {index}")
+
     @abstractmethod
     def close(self) -> None:
-        """Completes the data set."""
+        """Completes the data set.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
 
     @classmethod
     @abstractmethod

@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from custom_ros_tools.files import atomic_file
+
 Array = NDArray[Any]
 
 FOLDER, EXPORT = "rpbi", "export.json"
@@ -228,12 +230,20 @@ def write_episode(folder: Path, index: int, facts: Mapping[str, Any], images: Ma
     if images:
         data = io.BytesIO()
         np.savez_compressed(data, **images)
-        path.with_suffix(".npz").write_bytes(data.getvalue())
+        with atomic_file(path.with_suffix(".npz")) as part:
+            part.write_bytes(data.getvalue())
+
+
+def remove_episode(folder: Path, index: int) -> None:
+    """Removes what `write_episode` has written of an episode."""
+    for suffix in (".json", ".npz"):
+        episode_file(folder, index).with_suffix(suffix).unlink(missing_ok=True)
 
 
 def _write(path: Path, facts: Mapping[str, Any]) -> None:
     path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(facts, indent=1), encoding="utf-8")
+    with atomic_file(path) as part:
+        part.write_text(json.dumps(facts, indent=1), encoding="utf-8")
 
 
 def is_exported(folder: Path) -> bool:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from custom_ros_tools.config import read_file
+from custom_ros_tools.files import atomic_file
 from episodes.errors import EpisodeError
 
 from .policy import Policy
@@ -62,9 +63,8 @@ class FarmJob:
             names = ", ".join(others[:5])
             raise EpisodeError(folder, f"expected an empty folder or one of a farm, it has {names}: name another one")
         folder.mkdir(parents=True, exist_ok=True)
-        written = folder / f".{FARM}.new"
-        written.write_text(yaml.safe_dump(own, sort_keys=False), encoding="utf-8")
-        written.rename(path)
+        with atomic_file(path) as part:
+            part.write_text(yaml.safe_dump(own, sort_keys=False), encoding="utf-8")
 
     def _identity(self) -> dict[str, Any]:
         keys = [each.name for each in fields(self) if each.name not in ("python_path", "facts")]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import rosbag
 
-from episodes.folder import BAG, Episode, EpisodeFolder, read_facts
+from episodes.errors import DISK_FULL
+from episodes.folder import BAG, SET_BACK, UNREADABLE, Episode, EpisodeFolder, read_part
+from rpbi_utils.bags.clock import MAX_BACK_S
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader
 from rpbi_utils.ros.bags.topic_report import topic_report
@@ -16,6 +19,8 @@ from rpbi_utils.ros.bags.topic_report import topic_report
 
 def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
     """Returns type, messages, mean rate [Hz] and longest gap [s] of each topic of a bag; a rate of 0 is unknown.
+
+    A topic whose clock was set back by more than 1 s has `set_back_s` [s], too.
 
     Raises:
         BagError: If it cannot be read.
@@ -27,9 +32,20 @@ def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
             "messages": int(row["messages"]),
             "rate_hz": 0.0 if math.isnan(row["rate_hz"]) else float(row["rate_hz"]),
             "max_gap_s": float(row["max_gap_s"]),
+            **({SET_BACK: float(row["set_back_s"])} if row["set_back_s"] > MAX_BACK_S else {}),
         }
         for topic, row in report.iterrows()
     }
+
+
+def repair_all(folder: EpisodeFolder) -> Iterator[str]:
+    """Completes all episodes whose recorder was killed, and yields a sentence for each."""
+    for part in folder.partial():
+        try:
+            episode = repair(folder, part)
+            yield f"episode {episode.number}: {episode.state}: {episode.note}"
+        except OSError as error:
+            yield f"{part} cannot be repaired: {error.strerror or error}"
 
 
 def repair(folder: EpisodeFolder, part: Path) -> Episode:
@@ -37,8 +53,12 @@ def repair(folder: EpisodeFolder, part: Path) -> Episode:
 
     Returns:
         The episode, `recovered` with the number of messages, or `incomplete` if there is no message.
+
+    Raises:
+        OSError: If it cannot be written; it stays in the temporary folder.
     """
-    episode = read_facts(part)
+    episode = read_part(part)
+    fault = f"; {episode.note}" if episode.state == UNREADABLE else ""
     bag, active = part / BAG, part / f"{BAG}.active"
     if active.exists():
         active.rename(bag)
@@ -54,8 +74,11 @@ def repair(folder: EpisodeFolder, part: Path) -> Episode:
         if sent:
             episode.note += f" of {sent} sent to it until at most 1 s before"
     except Exception as error:  # rosbag has errors of all kinds for a broken file
+        if getattr(error, "errno", None) in DISK_FULL:
+            raise
         episode.state = "incomplete"
         episode.note = f"the recorder was killed, no message recovered: {' '.join(str(error).split())}"
+    episode.note += fault
     folder.complete(part, episode)
     return episode
 

@@ -32,11 +32,12 @@ from episodes.config import RecordParameters
 from episodes.errors import EpisodeError
 from episodes.files import store_files
 from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, versions, write_facts
+from episodes.listing import clock_note
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.recorder import Recorder
 
-from .bags import measure_topics, repair
+from .bags import measure_topics, repair, repair_all
 
 CHECK_HZ = 1.0
 """Rate of checks of disk, recorder and counters, and of the status [Hz]."""
@@ -148,9 +149,8 @@ class RecordNode:
         self._episode = Episode(-1)
         self._begin_s = 0.0
         self._status = rospy.Publisher("~status", String, queue_size=1, latch=True)
-        for part in self._folder.partial():
-            episode = repair(self._folder, part)
-            rospy.logwarn("episode %d: %s: %s", episode.number, episode.state, episode.note)
+        for sentence in repair_all(self._folder):
+            rospy.logwarn("%s", sentence)
         self._simulator = _Simulator(self._parameters.namespace)
         for name, action in (("start", self.start), ("stop", self.stop), ("discard", self.discard)):
             rospy.Service(f"~{name}", Trigger, lambda _, action=action: TriggerResponse(*_answer(action)))
@@ -248,17 +248,34 @@ class RecordNode:
             notes = [episode.note, note, f"began later, not recorded: {', '.join(late)}" if late else ""]
             episode.note = "; ".join(filter(None, notes))
         except BagError as error:
-            write_facts(self._part, episode)
-            repaired = repair(self._folder, self._part)
-            self._episode = repaired
-            rospy.logerr("episode %d: %s: %s (%s)", repaired.number, repaired.state, repaired.note, error)
-            return f"episode {repaired.number} is {repaired.state}: {repaired.note}"
-        self._folder.complete(self._part, episode)
+            return self._repair(error)
+        try:
+            self._folder.complete(self._part, episode)
+        except OSError as error:
+            return self._leave(error)
         text = f"episode {episode.number} is {episode.state}: {episode.messages} messages in {episode.seconds:.1f} s"
         if lost := sum(episode.lost.values()):
             text += f", {lost} lost"
-        (rospy.loginfo if episode.state == "complete" and not lost else rospy.logwarn)("%s %s", text, episode.note)
+        text += clock_note(episode.set_back_s)
+        is_good = episode.state == "complete" and not lost and not episode.set_back_s
+        (rospy.loginfo if is_good else rospy.logwarn)("%s %s", text, episode.note)
         self._publish_status()
+        return text
+
+    def _repair(self, fault: BagError) -> str:
+        """Saves what its recorder has left of the episode, and returns a sentence."""
+        try:
+            write_facts(self._part, self._episode)
+            self._episode = repaired = repair(self._folder, self._part)
+        except OSError as error:
+            return self._leave(error)
+        rospy.logerr("episode %d: %s: %s (%s)", repaired.number, repaired.state, repaired.note, fault)
+        return f"episode {repaired.number} is {repaired.state}: {repaired.note}"
+
+    def _leave(self, fault: OSError) -> str:
+        """Leaves the episode in its temporary folder, for a later repair, and returns a sentence."""
+        text = f"episode {self._episode.number} stays in {self._part} until it is repaired: {fault}"
+        rospy.logerr("%s", text)
         return text
 
     def _check(self) -> None:
@@ -267,12 +284,20 @@ class RecordNode:
             if self._recorder is not None:
                 self._episode.published = self._recorder.published() or self._episode.published
                 self._episode.seconds = round(time.monotonic() - self._begin_s, 3)
-                write_facts(self._part, self._episode)
                 if not self._recorder.is_running:
                     self._end("incomplete", "the recorder has ended")
                 elif (free := self._folder.free_mb()) < self._parameters.disk_reserve_mb:
                     self._end("incomplete", f"{free:.0f} MB free on the disk, less than the reserve")
+                else:
+                    self._write_facts()
             self._publish_status()
+
+    def _write_facts(self) -> None:
+        """Writes the description of the episode that is recorded, or ends it if that fails."""
+        try:
+            write_facts(self._part, self._episode)
+        except OSError as error:
+            self._end("incomplete", f"its description could not be written: {error}")
 
     def _publish_status(self) -> None:
         status = {

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
-from episodes.files import changed_files, with_stored_files
+from episodes.files import changed_files, newer_files, with_stored_files
 from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_utils.ros.replay.recorded_session import read_recording
@@ -30,11 +30,15 @@ class Verdict(NamedTuple):
         number: The episode.
         is_same: Whether all states agree and all files are as stored.
         text: The comparison in words.
+        label: Label of the episode; empty if it cannot be read.
+        notes: Sentences on files that are another way on the disk by now.
     """
 
     number: int
     is_same: bool
     text: str
+    label: str = ""
+    notes: Sequence[str] = ()
 
 
 def verify_all(folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str]) -> Iterator[Verdict]:
@@ -75,13 +79,18 @@ def verify(folder: EpisodeFolder, number: int) -> Verdict:
     """Simulates an episode again in this process, with the files that are stored with it."""
     try:
         episode = folder.read(number)
+    except EpisodeError as error:
+        return Verdict(number, False, str(error))
+    notes = [f"note: {each}" for each in newer_files(episode.files)]
+    try:
         changed = list(changed_files(episode.files, folder.files))
         is_same, text = _replay(folder, episode)
     except (InterfaceError, OSError) as error:
-        return Verdict(number, False, "; ".join(str(error).splitlines()))
+        return Verdict(number, False, "; ".join(str(error).splitlines()), episode.label, notes)
     except Exception as error:  # a bag may have anything in it
-        return Verdict(number, False, f"cannot be simulated: {type(error).__name__}: {error}")
-    return Verdict(number, is_same and not changed, "; ".join([*changed, text]))
+        words = f"cannot be simulated: {type(error).__name__}: {error}"
+        return Verdict(number, False, words, episode.label, notes)
+    return Verdict(number, is_same and not changed, "; ".join([*changed, text]), episode.label, notes)
 
 
 def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str]:

@@ -74,8 +74,13 @@ def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> 
 def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size: bool) -> PageScene:
     prefix = f"/{namespace.strip('/')}/rpbi/" if namespace.strip("/") else "/rpbi/"
     with BagReader(bag, any_size) as reader:
-        types = {topic: {each.name for each in of_topic} for topic, of_topic in reader.types.items()}
-    of_type = {wanted: [each for each in types if wanted in types[each]] for wanted in (CONTACTS, WRENCHES, JOINTS, TF)}
+        kinds = {topic: sorted({each.name for each in of_topic}) for topic, of_topic in reader.types.items()}
+    types = {topic: of_topic[0] for topic, of_topic in kinds.items() if len(of_topic) == 1}
+    mixed = [
+        f"{topic} is not shown: expected messages of one type, got {' and '.join(kinds[topic])}"
+        for topic in kinds.keys() - types.keys()
+    ]
+    of_type = {wanted: [each for each in types if wanted == types[each]] for wanted in (CONTACTS, WRENCHES, JOINTS, TF)}
     state = [topic for topic in types if topic == f"{prefix}state"]
     joints = [topic for topic in of_type[JOINTS] if topic.startswith(prefix) and topic.endswith("/joint_states")]
     forces = [*of_type[CONTACTS], *of_type[WRENCHES]]
@@ -83,7 +88,7 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
     world = World.from_description(recording.description)
     try:
         at_start = list(world.bodies)
-        notes = [*recording.description.warnings, *add_later_bodies(world, recording.commands)]
+        notes = [*sorted(mixed), *recording.description.warnings, *add_later_bodies(world, recording.commands)]
         links = sum(1 + len(body.link_indices) for body in world.bodies.values())
         of_simulator = {topic: table for topic, table in tables.items() if topic.startswith(prefix)}
         start_s, times = _times(bag, of_simulator, MAX_POSES // max(1, links))

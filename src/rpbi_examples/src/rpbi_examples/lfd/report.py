@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
+from custom_ros_tools.files import atomic_file
 from custom_ros_tools.transforms import Array
 from rpbi_examples.motions import PlanarPose
 
@@ -102,9 +103,27 @@ def write_summary(path: Path, facts: dict[str, Any], shown: Sequence[Run], execu
         "executions": [run.summary() for run in executed],
         "at_goal": bool(executed) and all(run.error.is_at_goal for run in executed),
     }
-    beside = path.with_name(f".{path.name}.part")
-    beside.write_text(json.dumps(text, indent=2) + "\n")
-    beside.replace(path)
+    with atomic_file(path) as part:
+        part.write_text(json.dumps(text, indent=2) + "\n")
+
+
+def write_tables(table: pd.DataFrame, path: Path) -> None:
+    """Writes a table twice, with the endings `.parquet` and `.csv`.
+
+    Raises:
+        OSError: If one cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(path.with_suffix(".parquet")) as part:
+        table.to_parquet(part, engine="fastparquet")
+    with atomic_file(path.with_suffix(".csv")) as part:
+        table.to_csv(part, float_format="%.6g")
+
+
+def write_picture(figure: Figure, path: Path) -> None:
+    """Writes a figure; raises OSError if that fails."""
+    with atomic_file(path) as part:
+        figure.savefig(part, dpi=DPI)
 
 
 def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[Run]) -> None:

@@ -13,6 +13,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import roslz4
 
+from .clock import SetBack, set_back
 from .limits import MAX_CONNECTIONS, LimitError
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -107,14 +108,19 @@ class BagFile:
         """Uncompressed size of all chunks, according to their headers [bytes]."""
         return sum(each.size for each in self.chunks)
 
+    def clock_of(self, connections: Collection[int]) -> SetBack:
+        """Returns by how much the times of recording of some connections run back, in the order of the file."""
+        index = self._index_of(connections)
+        index = index[np.lexsort((index["offset"], index["chunk"]))]
+        return set_back(index["time_ns"] / 1e9)
+
     def messages(self, connections: Collection[int]) -> Iterator[tuple[int, bytes, float]]:
         """Yields the connection's number, the serialised message and the time of recording [s], in the order of time.
 
         Raises:
             ValueError, struct.error, KeyError, OSError, EOFError: If it is damaged.
         """
-        pieces = [piece for number in self.connections if number in connections for piece in self._index[number]]
-        index = np.concatenate([*pieces, np.empty(0, _SORTED)])
+        index = self._index_of(connections)
         index = index[np.argsort(index["time_ns"], kind="stable")]
         unfolded, data = -1, b""
         for start in range(0, len(index), _BLOCK):
@@ -122,6 +128,10 @@ class BagFile:
                 if chunk != unfolded:
                     unfolded, data = chunk, self._unfold(self.chunks[chunk])
                 yield _message(data, offset)
+
+    def _index_of(self, connections: Collection[int]) -> np.ndarray:
+        pieces = [piece for number in self.connections if number in connections for piece in self._index[number]]
+        return np.concatenate([*pieces, np.empty(0, _SORTED)])
 
     def _read(self, size: int) -> bytes:
         data = self._file.read(size) if size <= self._size else b""

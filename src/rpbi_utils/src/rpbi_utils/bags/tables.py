@@ -13,7 +13,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.files import atomic_file
 
+from .clock import clock_of
 from .layout import BYTES, NUMBER_DTYPES, Leaf
 from .limits import MAX_COLUMNS, Budget, LimitError
 from .message_type import MessageType
@@ -81,6 +83,7 @@ class TableBuilder:
         self._pieces = self._merged_rows = 0
         self._appeared: dict[str, tuple[int, int]] = {}
         self._notes: Counter[str] = Counter()
+        self._types: Counter[str] = Counter()
 
     def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
         """Adds a serialised message with the time at which it was recorded [s].
@@ -98,11 +101,15 @@ class TableBuilder:
         """Returns all rows in the order of time; to be called once, after the last message.
 
         The index `time` is the stamp of the header [s], or the record time where there is none or it is 0.
-        The column `record_time` [s] is the first; the others are grouped by field.
+        The column `record_time` [s] is the first; the others are grouped by field. A warning names a clock that was
+        set back, and messages of several types.
         """
         self._read_batch()
         for note, times in self._notes.items():
             _log.warning("%s: %s (messages: %d)", self._topic, note, times)
+        if len(self._types) > 1:
+            came = ", ".join(f"{name} (messages: {count})" for name, count in sorted(self._types.items()))
+            _log.warning("%s: expected messages of one type, got %s", self._topic, came)
         time = np.concatenate([*self._time, np.empty(0)])
         record_time = np.concatenate([*self._record_time, np.empty(0)])
         order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
@@ -111,7 +118,10 @@ class TableBuilder:
         places = {field: place for place, field in enumerate(fields)}
         names.sort(key=lambda name: places[name.split("/")[0]])  # stable
         columns = {name: _join(self._columns.pop(name), self._rows)[order] for name in names}
-        return pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
+        table = pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
+        if (clock := clock_of(table)).is_fault:
+            _log.warning("%s: %s", self._topic, clock)
+        return table
 
     def _read_batch(self) -> None:
         """Reads the messages that are waiting, sorted by type and size."""
@@ -119,6 +129,7 @@ class TableBuilder:
         for index, (message_type, raw, _) in enumerate(self._batch):
             groups.setdefault((message_type, len(raw)), []).append(index)
         for (message_type, size), indices in groups.items():
+            self._types[message_type.name] += len(indices)
             joined = b"".join(self._batch[index][1] for index in indices)
             matrix = np.frombuffer(joined, np.uint8).reshape(len(indices), size)
             for block in self._split_by_layout(message_type, matrix, np.array(indices)):
@@ -284,17 +295,20 @@ def write_table(table: pd.DataFrame, path: Path) -> None:
     Raises:
         ValueError: If binary columns were to go into a text file, or an HDF5 file cannot have a column.
         MissingDependency: If fastparquet or h5py is not installed.
-        OSError: If the file cannot be written.
+        OSError: If the file cannot be written; a former one stays as it was.
     """
-    if path.suffix == ".hdf5":
-        _write_hdf5(table, path)
-        return
-    if path.suffix == ".csv":
-        binary = [name for name in table.columns if _encoding(table[name]) == "bytes"]
-        if binary:
-            raise ValueError(f"'{binary[0]}' is binary and cannot be written as CSV: use Parquet")
-        table.to_csv(path)
-        return
+    with atomic_file(path) as part:
+        _WRITERS[path.suffix](table, part)
+
+
+def _write_csv(table: pd.DataFrame, path: Path) -> None:
+    binary = [name for name in table.columns if _encoding(table[name]) == "bytes"]
+    if binary:
+        raise ValueError(f"'{binary[0]}' is binary and cannot be written as CSV: use Parquet")
+    table.to_csv(path)
+
+
+def _write_parquet(table: pd.DataFrame, path: Path) -> None:
     try:
         import fastparquet  # noqa: F401  (slow to load, and not needed for CSV)
     except ImportError as error:
@@ -324,6 +338,9 @@ def _write_hdf5(table: pd.DataFrame, path: Path) -> None:
                 file.create_dataset(str(name), data=values, dtype=kinds.get(str(encoding)))
             except (ValueError, TypeError) as error:
                 raise ValueError(f"'{name}' cannot be a data set of an HDF5 file: {error}; use Parquet") from error
+
+
+_WRITERS = {".parquet": _write_parquet, ".csv": _write_csv, ".hdf5": _write_hdf5}
 
 
 def _rows_of(cells: list[Array]) -> Array:

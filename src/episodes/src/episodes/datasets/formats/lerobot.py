@@ -60,6 +60,8 @@ class LeRobot(DatasetFormat):
         """Writes the videos of an episode and keeps its rows until a data file is full."""
         if sum(each.nbytes for each in self._pending) > MAX_DATA_BYTES:
             self._write_rows()
+            self._pending = []
+            self._data_file += 1
         count = len(episode.times)
         films, values = self._write_videos(index, episode)
         task = self._tasks.setdefault(episode.task, len(self._tasks))
@@ -75,6 +77,16 @@ class LeRobot(DatasetFormat):
         }
         images = {key: film.coarse for key, film in films.items()}
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "images": images}
+
+    def take_back(self, index: int) -> None:
+        """Removes the episode that was added last, whose rows are never in a full file yet."""
+        self._frames -= len(self._pending.pop())
+        self._episodes.pop()
+        for key, found in self._image_statistics.items():
+            found.pop()
+            (self._folder / layout.video_file(key, index)).unlink()
+        if not self._pending:
+            (self._folder / layout.data_file(self._data_file)).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Writes the rows that are left and all metadata."""
@@ -160,11 +172,9 @@ class LeRobot(DatasetFormat):
 
     def _write_rows(self) -> None:
         _parquet(self._folder / layout.data_file(self._data_file), self._pending)
-        self._pending = []
-        self._data_file += 1
 
     def _all_statistics(self) -> dict[str, Any]:
-        files = [self._folder / layout.data_file(number) for number in range(self._data_file)]
+        files = [self._folder / layout.data_file(number) for number in range(self._data_file + bool(self._pending))]
         found = {}
         for key in (*(each.key for each in self._schema.features), *layout.ROW_COLUMNS):
             columns = [layout.matrix(parquet.read_table(file, columns=[key]).column(key)) for file in files]

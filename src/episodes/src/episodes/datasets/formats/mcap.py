@@ -62,6 +62,10 @@ class Mcap(DatasetFormat):
             raise
         return {"topics": topics}
 
+    def take_back(self, index: int) -> None:
+        """Removes the recording that was added last."""
+        shutil.rmtree(self._folder / f"episode_{index:06d}")
+
     def close(self) -> None:
         """There is nothing to complete."""
 

@@ -57,6 +57,8 @@ class Robomimic(DatasetFormat):
         self._data = self._file.create_group("data")
         self._success: list[str] = []
         self._total = 0
+        self._room_bytes = ROOM_BYTES
+        self._is_closing = False
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
         """Writes an episode, after all of it has been read and there is room for it on the disk."""
@@ -91,8 +93,21 @@ class Robomimic(DatasetFormat):
         count = len(episode.times)
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
+    def take_back(self, index: int) -> None:
+        """Removes the episode that was added last; its room in the file is there for the rest."""
+        if self._is_closing:
+            super().take_back(index)
+        name = f"demo_{index}"
+        self._total -= int(self._data[name].attrs["num_samples"])
+        self._success = [each for each in self._success if each != name]
+        del self._data[name]
+        self._room_bytes = 0
+
     def close(self) -> None:
         """Scales all actions, and writes the facts on the whole data set."""
+        if self._room_bytes:
+            require_room(self._folder, self._room_bytes)  # see `add`
+        self._is_closing = True
         demos = list(self._data.values())
         low = np.min([demo[ACTIONS][:].min(axis=0) for demo in demos], axis=0)
         high = np.max([demo[ACTIONS][:].max(axis=0) for demo in demos], axis=0)

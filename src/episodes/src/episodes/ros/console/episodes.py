@@ -9,7 +9,7 @@ from episodes.errors import EpisodeError
 from episodes.farm.job import FARM
 from episodes.folder import EpisodeFolder
 from episodes.listing import details_of, table_of
-from episodes.ros.bags import repair as repair_bag
+from episodes.ros.bags import repair_all
 
 
 def episodes(
@@ -44,10 +44,7 @@ def episodes(
             raise EpisodeError(
                 folder, "expected episodes of a recorder, these are of a farm: it makes them again itself"
             )
-        repaired = [repair_bag(given, part) for part in given.partial()]
-        return (
-            "\n".join(f"episode {each.number}: {each.state}: {each.note}" for each in repaired) or "nothing to repair"
-        )
+        return "\n".join(repair_all(given)) or "nothing to repair"
     text = table_of(given.all())
     left = len(given.partial())
     return f"{text}\n{left} more: being recorded, or its recorder was killed (--repair)" if left else text

@@ -17,8 +17,8 @@ def verify(
 ) -> int:
     """Simulates recorded episodes again and compares their states, with the files that are stored with them.
 
-    It prints a line an episode: the same, or the first tick that differs, and files that were changed. It ends with 1
-    unless all are the same; needs no ROS master.
+    It prints a line an episode: the same, or the first tick that differs, and files that were changed. Files that are
+    another way on the disk by now are noted. It ends with 1 unless all are the same; needs no ROS master.
 
     Args:
         folder: of the episodes
@@ -31,8 +31,8 @@ def verify(
     numbers = episodes.numbers()
     same = 0
     for verdict in verify_all(episodes, numbers, jobs, trust):
-        label = episodes.read(verdict.number).label
-        print(f"episode {verdict.number}{f' ({label})' if label else ''}: {verdict.text}", flush=True)
+        label = f" ({verdict.label})" if verdict.label else ""
+        print("; ".join([f"episode {verdict.number}{label}: {verdict.text}", *verdict.notes]), flush=True)
         same += verdict.is_same
     print(f"{same} of {len(numbers)} episodes are the same")
     return 0 if numbers and same == len(numbers) else 1

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.files import atomic_file
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
@@ -46,11 +47,10 @@ def view(
         scene = scene_of_bag(recording, ns, any_size=any_size)
     page, scene = page_of(scene)
     target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
-    written = target.with_name(f".{target.name}.new")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        written.write_text(page, encoding="utf-8")
-        written.rename(target)
+        with atomic_file(target) as part:
+            part.write_text(page, encoding="utf-8")
     except OSError as error:
         raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
     lines = [f"note: {note}" for note in scene.all_notes]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from episodes.datasets.format import (
     Feature,
     Schema,
 )
-from episodes.datasets.provenance import write_episode, write_export
+from episodes.datasets.provenance import remove_episode, write_episode, write_export
 from episodes.errors import DISK_FULL, EpisodeError
 from episodes.folder import BAG, Episode, EpisodeFolder
 
@@ -91,8 +91,9 @@ def export_folder(
         report: Is called with a sentence for each episode.
 
     Raises:
-        EpisodeError: If there is no such folder, the target exists, or no episode can be exported.
-        OSError: If the data set cannot be written; there is none then.
+        EpisodeError: If there is no such folder, the target exists, no episode can be exported, or the data set cannot
+            be completed; there is none then.
+        OSError: If the data set cannot be begun.
     """
     if target.exists():
         raise DatasetError(target, "exists already: name a folder that does not")
@@ -107,8 +108,10 @@ def export_folder(
         _add_all(part, format_, plan, wish.disk_reserve_mb, result, report)
         if not result.exported:
             raise EpisodeError(folder.path, "\n".join(["no episode was exported", *result.faults]))
-        format_.close()
-        write_export(part, _facts(folder, name, wish, plan, result))
+        try:
+            _complete(part, format_, result, lambda: _facts(folder, name, wish, plan, result))
+        except OSError as error:
+            raise DatasetError(target, f"cannot be completed: {error}") from error
         part.rename(target)
     finally:
         shutil.rmtree(part, ignore_errors=True)
@@ -128,6 +131,8 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
             if format_.has_rows:
                 source.signals, source.cameras  # noqa: B018 (reads the bag)
                 _forget(source)
+            elif episode.set_back_s:
+                raise EpisodeError(source.bag, f"a clock was set back by {episode.set_back_s:.6g} s")
             sources.append(source)
         except (InterfaceError, OSError, ValueError) as error:
             result.faults.append(_fault(number, error))
@@ -186,16 +191,45 @@ def _add_all(
         except (InterfaceError, OSError, ValueError) as error:
             result.faults.append(_fault(number, error))
             if getattr(error, "errno", None) in DISK_FULL:
-                left = ", ".join(str(each.episode.number) for each in plan.sources[position + 1 :])
-                result.faults += [f"episodes {left} are not exported"] if left else []
+                result.faults += _not_exported(plan.sources[position + 1 :])
                 return
             continue
         finally:
             _forget(source)
         images = facts.pop("images", {})
-        write_episode(part, index, facts, images)
+        try:
+            write_episode(part, index, facts, images)
+        except OSError as error:
+            _take_back(part, format_, index)
+            result.faults += [_fault(number, error), *_not_exported(plan.sources[position + 1 :])]
+            return
         result.exported.append(number)
         report(_line(source, index, facts))
+
+
+def _not_exported(sources: Sequence[SourceEpisode]) -> list[str]:
+    numbers = ", ".join(str(each.episode.number) for each in sources)
+    return [f"episodes {numbers} are not exported"] if numbers else []
+
+
+def _complete(part: Path, format_: DatasetFormat, result: Result, facts: Callable[[], dict[str, object]]) -> None:
+    """Completes the data set; if the disk is full, without the last episode, whose place is free then."""
+    try:
+        write_export(part, facts())
+        format_.close()
+    except OSError as error:
+        if error.errno not in DISK_FULL or len(result.exported) < 2:
+            raise
+        result.faults.append(_fault(result.exported.pop(), error))
+        _take_back(part, format_, len(result.exported))
+        write_export(part, facts())
+        format_.close()
+
+
+def _take_back(part: Path, format_: DatasetFormat, index: int) -> None:
+    """Removes the episode that was added last."""
+    format_.take_back(index)
+    remove_episode(part, index)
 
 
 def _line(source: SourceEpisode, index: int, facts: dict[str, object]) -> str:

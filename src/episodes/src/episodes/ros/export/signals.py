@@ -94,14 +94,24 @@ def wanted_topics(types: Mapping[str, str], choice: Choice) -> list[str]:
     named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
     for topic in sorted(named - types.keys()):
         raise UnknownNameError("topic", topic, types)
-    derived = {
-        topic
-        for topic, kind in types.items()
-        if kind in (JOINTS, WRENCH, CONTACTS)
-        or (kind == TRANSFORMS and topic == "/tf")
-        or (kind in OTHER_ACTIONS and ACTION_NAME.fullmatch(topic))
-    }
+    derived = {topic for topic, kind in types.items() if _has_features(topic, kind)}
     return sorted((derived | named) - {topic for topic in types if is_image(types[topic])})
+
+
+def _has_features(topic: str, kind: str) -> bool:
+    return (
+        kind in (JOINTS, WRENCH, CONTACTS)
+        or (kind == TRANSFORMS and topic == "/tf")
+        or (kind in OTHER_ACTIONS and ACTION_NAME.fullmatch(topic) is not None)
+    )
+
+
+def is_used(topic: str, kinds: Collection[str], choice: Choice) -> bool:
+    """Returns whether messages of a topic, of one type or several, would be a feature."""
+    named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
+    return topic in named or any(
+        _has_features(topic, kind) or (is_image(kind) and choice.images is None) for kind in kinds
+    )
 
 
 def is_image(kind: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -29,6 +30,7 @@ from episodes.datasets.provenance import file_digest, hash_chain
 from episodes.files import URDF, stored_path
 from episodes.folder import BAG, Episode, EpisodeFolder
 from robot_model.urdf.document import UrdfDocument
+from rpbi_utils.bags.clock import SetBack, clock_of
 from rpbi_utils.bags.images import decode_image
 from rpbi_utils.bags.resampling import TIME_ERROR as RESAMPLING_ERROR
 from rpbi_utils.bags.resampling import resample
@@ -36,7 +38,7 @@ from rpbi_utils.ros.bags.bag_reader import BagReader
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
 from rpbi_utils.ros.bags.topic_report import message_time
 
-from .signals import Choice, Signal, by_frame, derive, image_topics, wanted_topics
+from .signals import Choice, Signal, by_frame, derive, image_topics, is_used, wanted_topics
 
 
 class SourceEpisode(ExportedEpisode):
@@ -205,12 +207,33 @@ class SourceEpisode(ExportedEpisode):
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
         topics = wanted_topics(self._types, self._choice)
-        return by_frame(bag_to_dataframes(self.bag, topics, any_size=True)) if topics else {}
+        tables = bag_to_dataframes(self.bag, topics, any_size=True) if topics else {}
+        for topic, table in tables.items():
+            self._require_steady(topic, clock_of(table))
+        return by_frame(tables)
 
     @cached_property
     def _types(self) -> dict[str, str]:
+        """Types of messages by topic.
+
+        Raises:
+            DatasetError: If a topic with features has several, or its clock was set back.
+        """
+        found = {}
         with BagReader(self.bag, any_size=True) as bag:
-            return {topic: "|".join(sorted(each.name for each in types)) for topic, types in bag.types.items()}
+            for topic, types in bag.types.items():
+                kinds = sorted({each.name for each in types})
+                if is_used(topic, kinds, self._choice):
+                    self._require_steady(topic, bag.clock_of(topic))
+                    if len(kinds) > 1:
+                        message = f"{topic}: expected messages of one type, got {' and '.join(kinds)}"
+                        raise DatasetError(self.bag, message)
+                found[topic] = "|".join(kinds)
+        return found
+
+    def _require_steady(self, topic: str, clock: SetBack) -> None:
+        if clock.is_fault:
+            raise DatasetError(self.bag, f"{topic}: {clock}")
 
     @cached_property
     def _image_topics(self) -> dict[str, str]:
@@ -219,8 +242,12 @@ class SourceEpisode(ExportedEpisode):
     def _images(self, topic: str) -> Iterator[tuple[Any, float]]:
         """Yields a function that returns the pixels, and the stamp [s], of each image."""
         with BagReader(self.bag, any_size=True) as bag:
+            latest_s = -math.inf
             for message in bag.messages([topic]):
-                yield (lambda message=message: decode_image(message.type, message.raw)), message_time(message)
+                stamp_s = message_time(message)
+                self._require_steady(topic, SetBack(latest_s, latest_s - stamp_s))
+                latest_s = max(latest_s, stamp_s)
+                yield (lambda message=message: decode_image(message.type, message.raw)), stamp_s
 
     def _states(self) -> Iterator[dict[str, Any]]:
         topic = f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, shortened
+from custom_ros_tools.files import atomic_file
 
 from .command_log import RecordedCommand
 from .commands import apply_command
@@ -41,13 +42,8 @@ class WorldState(NamedTuple):
             OSError: If it cannot be written; then no file of that name is left half-written.
         """
         data = {"format": FORMAT, **self._asdict()}
-        target = Path(path)
-        part = target.with_name(f".{target.name}.part")
-        try:
+        with atomic_file(Path(path)) as part:
             part.write_bytes(zlib.compress(json.dumps(data).encode()))
-            part.rename(target)
-        finally:
-            part.unlink(missing_ok=True)
 
     @classmethod
     def read(cls, path: str | Path) -> WorldState:

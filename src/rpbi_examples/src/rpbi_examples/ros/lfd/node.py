@@ -24,7 +24,7 @@ from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from custom_ros_tools.transforms import Array
 from rpbi_examples.lfd.person import HALF_SIDE_M, TIP_RADIUS_M
-from rpbi_examples.lfd.report import DPI, SIZE, Run, draw_paths, draw_pipeline, write_summary
+from rpbi_examples.lfd.report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_summary
 from rpbi_examples.lfd.skill import PushSkill
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.ros.human_interaction import interrupt_roslaunch
@@ -240,7 +240,7 @@ class Lesson:
         for name, make in draw.items():
             figure = self._figure(name)
             make(figure)
-            figure.savefig(self._out / f"{name}.png", dpi=DPI)
+            write_picture(figure, self._out / f"{name}.png")
 
     def _figure(self, name: str) -> Figure:
         """Returns an empty figure, with a window if wanted."""

@@ -13,7 +13,7 @@ from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.transforms import yaw_of
 from episodes import EpisodeFolder
 from episodes.folder import BAG
-from rpbi_examples.lfd.report import BoxError, Run
+from rpbi_examples.lfd.report import BoxError, Run, write_tables
 from rpbi_examples.lfd.skill import PushPlan
 from rpbi_utils import bag_to_dataframes, transforms_between
 
@@ -47,12 +47,9 @@ def finish_episode(out: Path, error: BoxError, plan: PushPlan | None = None) -> 
     call_service("record/stop", Trigger)
     call_service("record/label", SetString, "success" if error.is_at_goal else "failure")
     folder = EpisodeFolder(out / "episodes")
-    number = max(each.number for each in folder.all())
+    number = max(folder.numbers())
     table = read_episode(folder.folder_of(number) / BAG)
-    path = out / "tables" / f"episode_{number:06d}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    table.to_parquet(path.with_suffix(".parquet"), engine="fastparquet")
-    table.to_csv(path.with_suffix(".csv"), float_format="%.6g")
+    write_tables(table, out / "tables" / f"episode_{number:06d}")
     return Run(number, table, error, plan)
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from custom_ros_tools.errors import shortened
 from rpbi_utils.bags.bag_file import BagFile, NotABagError
+from rpbi_utils.bags.clock import SetBack
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.limits import MAX_ALL_DEFINITIONS_BYTES, MAX_TOPICS, Budget, LimitError
 from rpbi_utils.bags.message_type import MessageType
@@ -93,6 +94,10 @@ class BagReader:
                 raise BagError(self.path, message) from error
             self.budget.check_time(topic)
             yield BagMessage(topic, message_type, raw, record_time_s)
+
+    def clock_of(self, topic: str) -> SetBack:
+        """Returns by how much the times of recording of a topic run back, in the order of the file."""
+        return self._bag.clock_of([number for number, each in self._types.items() if each[0] == topic])
 
     def _open(self) -> BagFile:
         try:

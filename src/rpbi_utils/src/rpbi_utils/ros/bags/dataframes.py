@@ -32,7 +32,7 @@ def bag_to_dataframes(
     The index `time` is the stamp of the message's header in seconds of ROS time (float64, as `stamp.to_sec()`
     gives it), or the time of recording where a message has no header or its stamp is 0. Tables of one bag
     share this clock, so they can be joined by it. Rows are in the order of `time`; the column `record_time`
-    [s] keeps when each was recorded.
+    [s] keeps when each was recorded. A warning names topics whose clock was set back by more than 1 s.
 
     The other columns are the fields, named by their path: `pose/position/x`, `data/0`, `header/frame_id`.
     Those of joint states are `position/JOINT`, `velocity/JOINT` and `effort/JOINT`, by name. A value that a
@@ -129,6 +129,8 @@ def _read(bag: BagReader, builders: dict[str, TableBuilder], progress: bool = Fa
         tables = {}
         for topic in chosen:
             tables[topic] = builders.pop(topic).table()
+            if (clock := bag.clock_of(topic)).is_fault:
+                _log.warning("%s: %s", topic, clock)
     except LimitError as error:
         raise BagError(bag.path, f"{shortened(topic)}: {error}; other topics can be read by their names") from error
     return tables

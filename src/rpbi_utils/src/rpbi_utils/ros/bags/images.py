@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
+from custom_ros_tools.files import atomic_file
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.images import decode_image
 
@@ -53,7 +54,7 @@ def bag_to_images(
 def write_images(path: str | Path, topic: str, folder: str | Path, *, any_size: bool = False) -> list[Path]:
     """Writes the images of a topic as `000000.png`, `000001.png` ..., and their stamps [s] as `times.csv`.
 
-    Images of floats, such as depths [m], become `.npy` files, which keep every bit.
+    Images of floats, such as depths [m], become `.npy` files, which keep every bit. `times.csv` comes last.
 
     Raises:
         BagError, UnknownNameError: See `bag_to_images`.
@@ -66,13 +67,15 @@ def write_images(path: str | Path, topic: str, folder: str | Path, *, any_size: 
     written, times = [], []
     for number, (time_s, pixels) in enumerate(bag_to_images(path, topic, any_size=any_size)):
         file = folder / f"{number:06}{'.npy' if pixels.dtype.kind == 'f' else '.png'}"
-        if file.suffix == ".npy":
-            np.save(file, pixels)
-        else:
-            Image.fromarray(pixels).save(file)
+        with atomic_file(file) as part:
+            if part.suffix == ".npy":
+                np.save(part, pixels)
+            else:
+                Image.fromarray(pixels).save(part)
         written.append(file)
         times.append(f"{file.name},{time_s!r}\n")
-    (folder / "times.csv").write_text("file,time\n" + "".join(times))
+    with atomic_file(folder / "times.csv") as part:
+        part.write_text("file,time\n" + "".join(times))
     return written
 
 
@@ -107,14 +110,8 @@ def write_video(
         hz = hz if np.isfinite(hz) else 1.0
     video = Path(video)
     video.parent.mkdir(parents=True, exist_ok=True)
-    partial = video.with_name(f".{video.name}.partial{video.suffix}")
-    try:
-        with closing(bag_to_images(path, topic, any_size=any_size)) as images:
-            frames = _encode(Path(path), topic, images, hz, partial)
-        partial.replace(video)
-    finally:
-        partial.unlink(missing_ok=True)
-    return frames
+    with atomic_file(video) as part, closing(bag_to_images(path, topic, any_size=any_size)) as images:
+        return _encode(Path(path), topic, images, hz, part)
 
 
 def _encode(path: Path, topic: str, images: Iterator[tuple[float, Array]], hz: float, video: Path) -> int:

@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rpbi_utils.bags.clock import SetBack, set_back
+
 from .bag_reader import BagMessage, BagReader
 
 _STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
-_COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last")
+_COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "first", "last")
 
 
 class TopicReport(pd.DataFrame):
@@ -29,8 +31,9 @@ def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
     Returns:
         A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
         (serialised, before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the
-        same time), `max_gap_s` (longest time without a message in between), `first` and `last` [s of ROS time].
-        Times are the stamps of headers, or of recording where there is none, as for `/tf`.
+        same time), `max_gap_s` (longest time without a message in between), `set_back_s` (largest time by which a
+        message is before an earlier one, in the order of recording), `first` and `last` [s of ROS time]. Times are the
+        stamps of headers, or of recording where there is none, as for `/tf`.
 
     Raises:
         BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
@@ -42,7 +45,12 @@ def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
             times[message.topic].append(message_time(message))
             sizes[message.topic] += len(message.raw)
         rows = [
-            ("|".join(sorted(each.name for each in types)), len(times[topic]), sizes[topic], *_rhythm(times[topic]))
+            (
+                "|".join(sorted({each.name for each in types})),
+                len(times[topic]),
+                sizes[topic],
+                *_rhythm(times[topic], bag.clock_of(topic)),
+            )
             for topic, types in bag.types.items()
         ]
         return TopicReport(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
@@ -56,9 +64,10 @@ def message_time(message: BagMessage) -> float:
     return seconds + nanoseconds / 1e9 or message.record_time_s
 
 
-def _rhythm(times: list[float]) -> tuple[float, float, float, float]:
-    """Returns mean rate [Hz], longest gap, first and last time [s]."""
+def _rhythm(times: list[float], clock: SetBack) -> tuple[float, float, float, float, float]:
+    """Returns mean rate [Hz], longest gap, largest time by which times run back, first and last time [s]."""
+    back_s = max(set_back(np.array(times)).back_s, clock.back_s)
     ordered = np.sort(times)
     first, last = ordered[0], ordered[-1]
     rate_hz = (len(ordered) - 1) / (last - first) if last > first else np.nan
-    return rate_hz, np.diff(ordered).max(initial=0.0), first, last
+    return rate_hz, np.diff(ordered).max(initial=0.0), back_s, first, last

@@ -9,6 +9,7 @@ from typing import Annotated
 from matplotlib.figure import Figure
 
 from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.files import atomic_file
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.plots import plot_tables
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
@@ -46,7 +47,8 @@ def plot(
         folder.mkdir(parents=True, exist_ok=True)
         for name, figure in plot_tables(tables, Figure):
             written.append(folder / f"{name}.png")
-            figure.savefig(written[-1], dpi=100)
+            with atomic_file(written[-1]) as part:
+                figure.savefig(part, dpi=100)
     except OSError as error:
         raise BagError(bag, f"a figure cannot be written: {error}") from error
     return "\n".join(map(str, written)) or f"{bag}: nothing to draw"

@@ -14,6 +14,7 @@ from PyQt5.QtCore import QPointF, QRectF, Qt, QTimer
 from PyQt5.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
 from PyQt5.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
+from custom_ros_tools.files import atomic_file
 from rpbi_utils.live_plot.plot import Line, LivePlot, thinned, ticks
 
 TITLE = "Live plot"
@@ -226,11 +227,10 @@ class LivePlotWindow(QMainWindow):
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
         """Writes what is shown into a new file, beside its name first."""
         path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
-        part = path.with_name(f".{path.name}.new")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            write(part)
-            part.rename(path)
+            with atomic_file(path) as part:
+                write(part)
         except OSError as error:
             self._message.setText(f"{path}: not saved: {error.strerror or error}")
             return
