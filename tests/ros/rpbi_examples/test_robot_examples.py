@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rosgraph
+import rosnode
 import rospy
 import tf2_ros
 from cob_srvs.srv import SetString
@@ -16,11 +17,13 @@ from geometry_msgs.msg import WrenchStamped
 from node_world import publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ros_pybullet_interface.msg import Contacts, ControllerState
 from ros_pybullet_interface.srv import ResetJointState, SwitchControllers
 from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS
+from safe_robot.msg import Status, Violation
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -58,8 +61,9 @@ def position(ros) -> Callable[[str], tuple[float, float, float] | None]:
     return look
 
 
-def test_two_hands_draw_mirrored_circles(ros, position):
-    launch(ros, "basic_example_dual_iiwa", real_time_factor=4)
+def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ros, position):
+    statuses = ros.listen("/robot_safety/status", Status)
+    launch(ros, "basic_example_dual_iiwa", real_time_factor=2)
     hands = {1.0: "rpbi/left/lbr_iiwa_link_7", -1.0: "rpbi/right/lbr_iiwa_link_7"}
     x, y, z = CIRCLE_CENTRE
 
@@ -84,6 +88,20 @@ def test_two_hands_draw_mirrored_circles(ros, position):
 
     wait_until(drawn, "the hands went round, within 1 cm of their circles")
     assert sorted(both)[len(both) // 2] < 0.1, "both are at the same place of their circle most of the time"
+    safe = [each.is_safe for each in list(statuses.messages)]
+    assert sum(safe) > 0.9 * len(safe), "circles pass"
+
+    rosnode.kill_nodes(["/dual_arm_example"])
+    wait_until(lambda: ros.call("/robot_safety/start_subscriber", Trigger).success, "the arms rest", every_s=0.2)
+    violations = ros.listen("/robot_safety/violation", Violation)
+    ros.start(["rosrun", "rpbi_examples", "dual_arm_example_node.py", "left", "right", "_distance:=0.3"])
+
+    def met() -> bool:
+        """Tells whether the guard kept a link of the left arm and one of the right from coming nearer."""
+        found = [each.subject for each in list(violations.messages) if each.check == "self_collision"]
+        return any("left_" in each and "right_" in each for each in found)
+
+    wait_until(met, "targets that cross the arms are not safe")
 
 
 def test_panda_works_the_ros_way(ros, position):

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import text_of
-from rpbi.urdf.copies import description_for_ros, files_of, for_pybullet
+from robot_model.urdf.files import write_description
+from rpbi.urdf.copies import description_for_ros, files_of, for_pybullet, joined_for_ros
 
 
 def urdf(folder: Path, inner: str) -> str:
@@ -75,3 +78,21 @@ def test_characters_that_are_no_xml_are_left_out(tmp_path):
     path = urdf(tmp_path, "\0" + mesh("a.obj"))
     assert len(meshes(description_for_ros(path))) == 1
     assert UrdfDocument(path).joint_types == {}
+
+
+def test_two_robots_of_one_file_stand_in_one_description_with_names_of_their_own(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        "<robot name='arm'><link name='foot'/><link name='hand'/><link name='finger'/>"
+        "<joint name='lift' type='prismatic'><parent link='foot'/><child link='hand'/><axis xyz='0 0 1'/>"
+        "<limit lower='0' upper='1' velocity='1' effort='1'/></joint>"
+        "<joint name='grip' type='prismatic'><parent link='hand'/><child link='finger'/>"
+        "<mimic joint='lift'/></joint></robot>"
+    )
+    half_turn = Pose((1.0, 2.0, 3.0), (0.0, 1.0, 0.0, 0.0))
+    text = joined_for_ros({"left": (str(path), Pose((0.0, 0.5, 0.0))), "right": (str(path), half_turn)})
+    robot = RobotModel(write_description(text))
+    assert robot.joint_names == ("left_lift", "right_lift")
+    assert robot.pose((0.2, 0.3), "left_hand").position == pytest.approx((0.0, 0.5, 0.2))
+    assert robot.pose((0.2, 0.3), "right_hand").position == pytest.approx((1.0, 2.0, 2.7))
+    assert robot.pose((0.2, 0.3), "right_finger").position == pytest.approx((0.7, 2.0, 2.7)), "it mimics its own arm's"

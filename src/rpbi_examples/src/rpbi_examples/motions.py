@@ -17,7 +17,7 @@ CIRCLE_RADIUS = 0.12
 CIRCLE_PERIOD_S = 6.0
 """Time of one round [s]."""
 CIRCLE_CENTRE = (0.55, 0.30, 0.85)
-"""Centre of the left hand's circle in the world [m]; the right hand's has the opposite y."""
+"""Lowest point of the left hand's circle in the world [m]; the right hand's has the opposite y."""
 WIPED_M = 0.3
 """Length of the line that is wiped [m]."""
 WIPING_PERIOD_S = 4.0
@@ -74,11 +74,15 @@ class FigureEight(StartParameters):
         return "/".join(part for part in (self.tf_ns.strip("/"), name) if part)
 
 
-def hand_position(time_s: float, side: float) -> Vector:
-    """Returns where the left (`side` 1) or right hand (-1) is to be [m] at a time since the start [s]."""
+def hand_position(time_s: float, side: float, distance: float = 2.0 * CIRCLE_CENTRE[1]) -> Vector:
+    """Returns where the left (`side` 1) or right hand (-1) is to be [m] at a time since the start [s].
+
+    Args:
+        distance: Distance between the centres of both circles [m].
+    """
     angle = 2.0 * math.pi * time_s / CIRCLE_PERIOD_S
-    x, y, z = CIRCLE_CENTRE
-    return x, side * (y + CIRCLE_RADIUS * math.sin(angle)), z + CIRCLE_RADIUS * (1.0 - math.cos(angle))
+    x, _, z = CIRCLE_CENTRE
+    return x, side * (distance / 2.0 + CIRCLE_RADIUS * math.sin(angle)), z + CIRCLE_RADIUS * (1.0 - math.cos(angle))
 
 
 def wiped(time_s: float) -> float:

@@ -17,6 +17,7 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import UnknownNameError
 from robot_model.geometry import Pose
 from rpbi_examples.ros.console import score as command
+from rpbi_examples.scenes import score
 from rpbi_examples.scenes.parts.arm import between, smooth
 from rpbi_examples.scenes.score import run_seeds, summary, write_failures
 from rpbi_examples.scenes.task import make_env, run_episode
@@ -64,13 +65,15 @@ def test_an_episode_that_takes_too_long_has_failed(env, monkeypatch):
 def test_scores_are_tables_json_and_pictures(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(writing_scene, "TOLERANCE_M", 0.0)
+    monkeypatch.setattr(score, "MAX_PICTURES", 1)
     assert command.score(SCENE, seeds="7-8", json=tmp_path / "score.json", jobs=1) == 0
     printed = capsys.readouterr().out
     assert f"{SCENE}: 0 of 2" in printed and printed.count("failed") >= 2
+    assert "ends of failed episodes, the first 1 of 2: " in printed
     found = json.loads((tmp_path / "score.json").read_text())
     assert (found["success"], found["of"]) == (0, 2) and [row["seed"] for row in found["rows"]] == [7, 8]
     sheet = Image.open(tmp_path / "out/score/writing_scene.Writing_failures.png")
-    assert sheet.size == (640, 240) and np.asarray(sheet).std() > 10.0
+    assert sheet.size == (320, 240) and np.asarray(sheet).std() > 10.0
 
 
 def test_a_good_score_leaves_no_pictures_of_failures(tmp_path):

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
+from custom_ros_tools.transforms import rpy_of
+from robot_model.geometry import Pose
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import (
     READ,
@@ -23,6 +25,8 @@ from rpbi.meshes.copies import with_textures_that_exist
 
 log = logging.getLogger(__name__)
 
+WORLD_LINK = "world"
+"""Name of the link that PyBullet treats as the world: without inertia it has no mass, and as a root it is fixed."""
 Files = tuple[tuple[tuple[str, str], str], ...]
 """Absolute names of files by the tag and the `filename` of the elements that name them."""
 
@@ -85,17 +89,45 @@ def description_for_ros(path: str) -> str:
     Raises:
         ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
     """
-    document = UrdfDocument(path)
+    return text_of(_for_ros(UrdfDocument(path)))
+
+
+def joined_for_ros(robots: Mapping[str, tuple[str, Pose]]) -> str:
+    """Returns the text of one URDF of several robots, which are fixed to a root link `world`.
+
+    Args:
+        robots: File and pose of the root by name of the robot; names of links and joints get `NAME_` before them.
+
+    Raises:
+        ConfigError: If a file is no URDF, or a mesh belongs to an unknown package.
+    """
+    whole = new_element("robot", new_element("link", name=WORLD_LINK), name="_".join(robots))
+    for name, (path, pose) in robots.items():
+        document = UrdfDocument(path)
+        robot = _for_ros(document)
+        named = [(part, "name") for tag in ("link", "joint") for part in robot.findall(tag)]
+        named += [(part, "link") for end in ("parent", "child") for part in robot.iterfind(f"joint/{end}")]
+        named += [(part, "joint") for part in robot.iterfind("joint/mimic")]
+        for part, key in named:
+            part.set(key, f"{name}_{part.get(key)}")
+        x, y, z = rpy_of(pose.quat_xyzw).tolist()
+        mount = UrdfJoint(
+            f"{name}_base", "fixed", WORLD_LINK, f"{name}_{document.root_link()}", pose.position, (x, y, z)
+        )
+        whole.append(joint_element(mount))
+        whole.extend(part for part in robot if part.tag in ("link", "joint", "material"))
+    return text_of(whole)
+
+
+def _for_ros(document: UrdfDocument) -> Element:
     robot = copy.deepcopy(document.root)
     for tag in ("mesh", "texture"):
         for element in robot.iterfind(f".//{tag}[@filename]"):
             found = found_by_ros(element.get("filename", ""), document.source)
             element.set("filename", found if isinstance(found, str) else f"file://{with_textures_that_exist(found)}")
-    return text_of(robot)
+    return robot
 
 
-WORLD_LINK = "world"
-"""Name of the link that PyBullet treats as the world: without inertia it has no mass, and as a root it is fixed."""
 LEAST_KG = "1e-06"
 """Mass of a floating root that is a mere frame [kg]: PyBullet would fix one without mass to the world."""
 

@@ -2,23 +2,35 @@
 
 import contextlib
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from custom_ros_tools.config import load_config, replace_package
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.asset_files import ROBOT_DESCRIPTION, find_file, find_folder
+from robot_model.geometry import Pose
 from rpbi.bodies.file_checks import file_problems, parts_with_files
+from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.object_entry import ObjectEntry, parse_object_entry
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.config.world import WorldConfig, main_file_model
+from rpbi.urdf.copies import joined_for_ros
 
 from .legacy import MAIN
 from .objects import ObjectConfig, load_object, name_in, object_sections, parse_section, type_of
 
-__all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
+__all__ = [
+    "LoadedWorld",
+    "ObjectConfig",
+    "WorldConfig",
+    "load_object",
+    "load_world",
+    "load_world_dict",
+    "robots_description",
+    "type_of",
+]
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +90,29 @@ def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str |
     A file of the name `"~config"`, which has no folder, came from the parameter server.
     """
     return _Reader(data, file, file, robot_description).read()
+
+
+def robots_description(path: str, names: Sequence[str]) -> str:
+    """Returns the text of one URDF with robots of a world, where their bases are at its start.
+
+    Args:
+        path: The world's main file.
+        names: The robots. Names of links and joints have `NAME_` before them; the root is the link `world`.
+
+    Raises:
+        ConfigError: If the world is wrong.
+        UnknownNameError: If it has no such robot.
+    """
+    configs = (each.config for each in load_world(path).objects)
+    bases = {each.name: each.loadURDF for each in configs if isinstance(each, RobotConfig)}
+    here, robots = Pose(), {}
+    for name in names:
+        if name not in bases:
+            raise UnknownNameError("robot", name, bases)
+        base = bases[name]
+        pose = Pose(base.basePosition or here.position, base.baseOrientation or here.quat_xyzw)
+        robots[name] = base.fileName, pose
+    return joined_for_ros(robots)
 
 
 class _Reader:

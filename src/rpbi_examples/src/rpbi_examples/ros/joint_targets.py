@@ -30,34 +30,45 @@ def wait_until_ready() -> None:
 class JointTargets:
     """Sends targets to all joints of a robot that move, as long as the world runs; see also `wait_until_ready`.
 
+    Targets of several robots go out together on `joint_states/target`, where names of joints begin with `NAME_`.
+
     Attributes:
-        positions: Where the joints were at the start [rad or m].
+        names: Names of the n joints in the targets.
+        positions: Where the joints were at the start, n [rad or m].
         limits: Lower and upper limit of each, infinite where there is none.
     """
 
-    def __init__(self, robot_name: str) -> None:
+    def __init__(self, *robot_names: str) -> None:
         wait_until_ready()
-        info: RobotInfoResponse = get_srv_handler(f"rpbi/{robot_name}/robot_info", RobotInfo)()
-        joints = [joint for joint in info.joint_info if not joint.is_fixed]
-        state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
-        self._names = [joint.jointName for joint in joints]
-        self.positions: tuple[float, ...] = tuple(state[name] for name in self._names)
-        self.limits = [_limits(joint) for joint in joints]
-        self._publisher = rospy.Publisher(f"rpbi/{robot_name}/joint_states/target", JointState, queue_size=10)
+        self.names: list[str] = []
+        self.positions: tuple[float, ...] = ()
+        self.limits: list[tuple[float, float]] = []
+        is_one = len(robot_names) == 1
+        for robot in robot_names:
+            info: RobotInfoResponse = get_srv_handler(f"rpbi/{robot}/robot_info", RobotInfo)()
+            joints = [joint for joint in info.joint_info if not joint.is_fixed]
+            state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
+            self.names += [joint.jointName if is_one else f"{robot}_{joint.jointName}" for joint in joints]
+            self.positions += tuple(state[joint.jointName] for joint in joints)
+            self.limits += [_limits(joint) for joint in joints]
+        topic = f"rpbi/{robot_names[0]}/joint_states/target" if is_one else "joint_states/target"
+        self._publisher = rospy.Publisher(topic, JointState, queue_size=10)
+        self._stamp = rospy.Time()
         self._running = threading.Event()
         rospy.Subscriber("rpbi/status", Int64, self._on_status, queue_size=1)
         self._rate = rospy.Rate(HZ)
 
     def send(self, positions: Sequence[float]) -> None:
-        """Sends positions [rad or m], and returns when the next ones are due.
+        """Sends positions [rad or m] with a stamp later than the one before, and returns when the next ones are due.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.
         """
-        while not self._running.is_set():
+        while not self._running.is_set() or rospy.Time.now() <= self._stamp:
             self._sleep()
-        target = JointState(name=self._names, position=positions)
-        target.header.stamp = rospy.Time.now()
+        self._stamp = rospy.Time.now()
+        target = JointState(name=self.names, position=positions)
+        target.header.stamp = self._stamp
         self._publisher.publish(target)
         self._sleep()
 

@@ -7,23 +7,21 @@ import threading
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Twist
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.tf import TfInterface
-from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, Contacts
-from ros_pybullet_interface.srv import ResetEffState
-from rpbi_examples.motions import POINTING_DOWN, SWING_AMPLITUDE, PlanarPose, Route, Swing, hand_position, wiped
+from robot_model.urdf.files import write_description
+from ros_pybullet_interface.msg import Contacts
+from rpbi_examples.motions import CIRCLE_CENTRE, SWING_AMPLITUDE, PlanarPose, Route, Swing, wiped
+from rpbi_examples.two_hands import MirroredHands
 
 from .joint_targets import HZ, JointTargets
 
-LINK = "lbr_iiwa_link_7"
 SETTLING_S = 0.5
 """Time for which the arm presses before it wipes [s]."""
-APPROACH_S = 3.0
-"""Time for the way to the circles [s]."""
 
 
 def basic_robot_example() -> None:
@@ -40,7 +38,11 @@ def drive_around() -> None:
 
 
 def dual_arm_example() -> None:
-    """Draws mirrored circles with the hands of two robots, which the arguments name, the left one first."""
+    """Draws mirrored circles with the hands of two robots, which the arguments name, the left one first.
+
+    The parameter `robot_description` has both. Targets of all joints go out on `joint_states/target`. The centres of
+    the circles are `~distance` apart [m]; with 0.3 the targets cross the arms.
+    """
     run_node("dual_arm_example", _draw)
 
 
@@ -92,24 +94,19 @@ def _draw() -> None:
     names = rospy.myargv(sys.argv)[1:]
     if len(names) != 2:
         raise InterfaceError(f"expected the names of two robots, got {len(names)}")
-    sides = dict(zip(names, (1.0, -1.0)))
-    for name, side in sides.items():
-        call_service(f"rpbi/{name}/move_to_eff_state", ResetEffState, _problem(0.0, side), APPROACH_S)
-    problem = CalculateInverseKinematicsProblem
-    publishers = {name: rospy.Publisher(f"rpbi/{name}/ik", problem, queue_size=1) for name in sides}
-    rate = rospy.Rate(HZ)
-    start = rospy.Time.now()
-    while not rospy.is_shutdown():
-        time_s = (rospy.Time.now() - start).to_sec()
-        for name, side in sides.items():
-            publishers[name].publish(_problem(time_s, side))
-        rate.sleep()
-
-
-def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
-    return CalculateInverseKinematicsProblem(
-        link_name=LINK, targetPosition=hand_position(time_s, side), targetOrientation=POINTING_DOWN
-    )
+    arms = JointTargets(*names)
+    urdf = write_description(str(rospy.get_param("robot_description")))
+    distance = float(rospy.get_param("~distance", 2.0 * CIRCLE_CENTRE[1]))
+    hands = MirroredHands(urdf, names, dict(zip(arms.names, arms.positions)), distance)
+    reached: set[str] = set()
+    for name in names:
+        rospy.Subscriber(f"rpbi/{name}/joint_states/target", JointState, lambda _, name=name: reached.add(name))
+    while len(reached) < len(names):  # a guard takes only a first target that is where the arms are
+        arms.send(arms.positions)
+    time_s = 0.0
+    while True:
+        arms.send(hands.at(time_s))
+        time_s += 1.0 / HZ
 
 
 def _wipe() -> None:

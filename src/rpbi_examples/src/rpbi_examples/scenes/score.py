@@ -125,12 +125,17 @@ def write_json(path: Path, found: dict[str, Any]) -> None:
     path.write_text(json.dumps(found, indent=1) + "\n")
 
 
-def write_failures(path: Path, results: Sequence[SeedResult]) -> bool:
-    """Writes a picture of the ends of failed episodes; returns whether there are any."""
-    failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None][:MAX_PICTURES]
+def write_failures(path: Path, results: Sequence[SeedResult]) -> str:
+    """Writes a picture of the ends of failed episodes, of `MAX_PICTURES` at most.
+
+    Returns:
+        A line with the file, and how many it shows of how many; empty if none failed.
+    """
+    all_failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None]
+    failed = all_failed[:MAX_PICTURES]
     if not failed:
         path.unlink(missing_ok=True)
-        return False
+        return ""
     width, height = PICTURE_PX
     sheet = Image.new("RGB", (width * min(COLUMNS, len(failed)), height * -(-len(failed) // COLUMNS)))
     draw = ImageDraw.Draw(sheet)
@@ -140,4 +145,5 @@ def write_failures(path: Path, results: Sequence[SeedResult]) -> bool:
         draw.text((corner[0] + 6, corner[1] + 4), f"seed {each.seed}: {each.result.reason or 'failed'}", "red")
     path.parent.mkdir(parents=True, exist_ok=True)
     sheet.save(path)
-    return True
+    shown = f"{len(failed)}" if len(failed) == len(all_failed) else f"the first {len(failed)} of {len(all_failed)}"
+    return f"ends of failed episodes, {shown}: {path}"

@@ -18,13 +18,15 @@ from .live_obstacles import LiveObstacles
 
 QUEUE_SIZE = 100
 NEVER_S = float("-inf")
+NEVER = 0.0, NEVER_S
 
 
 class Measurements:
     """Receives measured states and wrenches, and bodies of the environment; the last ones count.
 
-    A state without all guarded joints, or with values that are not finite, is refused with a warning: then the one
-    before counts, and gets older. Wrenches are in N and N m of their own frame. A missing value is infinitely old.
+    A state may have some of the guarded joints, as that of one of several arms: the newest position of each joint
+    counts, and the oldest of these is their age. A state without any guarded joint, or with values that are not finite,
+    is refused with a warning. Wrenches are in N and N m of their own frame. A missing value is infinitely old.
 
     Args:
         joint_names: The n guarded joints.
@@ -35,7 +37,8 @@ class Measurements:
     def __init__(self, joint_names: Sequence[str], base_frame: str | None, left_out: Sequence[str]) -> None:
         self._joint_names = tuple(joint_names)
         self._around = None if base_frame is None else LiveObstacles(base_frame, left_out)
-        self._measured: tuple[Mapping[str, float], float] = {}, NEVER_S
+        self._measured: Mapping[str, tuple[float, float]] = {}
+        """Position [rad or m] and time [s] by joint."""
         self._has_measured = threading.Event()
         self._wrench: tuple[tuple[float, ...], float] = (0.0,) * 6, NEVER_S
         self._warn = ThrottledWarning()
@@ -61,13 +64,14 @@ class Measurements:
             stamp_step_s: Difference to the stamp before [s].
         """
         now_s = time.monotonic()
-        (measured, measured_s), (wrench, wrench_s) = self._measured, self._wrench
+        measured, (wrench, wrench_s) = self._measured, self._wrench
+        measured_s = min((measured.get(name, NEVER)[1] for name in self._joint_names), default=NEVER_S)
         return CheckContext(
             now_s=now_s,
             age_s=age_s,
             stamp_step_s=stamp_step_s,
             since_command_s=now_s - sent_s,
-            measured=measured,
+            measured={name: position for name, (position, _) in measured.items()},
             measured_age_s=now_s - measured_s,
             wrench=wrench,
             wrench_age_s=now_s - wrench_s,
@@ -77,12 +81,15 @@ class Measurements:
     def _on_measured(self, message: JointState) -> None:
         try:
             values = values_in(message)
-            values.in_order(self._joint_names)
+            if not set(values.names).intersection(self._joint_names):
+                values.in_order(self._joint_names)
         except (InterfaceError, ValueError) as error:
             self._warn(rospy.resolve_name("joint_states/measured"), f"message refused: {error}")
             return
-        self._measured = dict(zip(values.names, values.position)), time.monotonic()
-        self._has_measured.set()
+        now_s = time.monotonic()
+        self._measured = {**self._measured, **{name: (q, now_s) for name, q in zip(values.names, values.position)}}
+        if all(name in self._measured for name in self._joint_names):
+            self._has_measured.set()
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         force, torque = message.wrench.force, message.wrench.torque

@@ -8,7 +8,7 @@ import pybullet_data
 import rospy
 from geometry_msgs.msg import Point, Quaternion
 
-from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import JointInfo
@@ -19,6 +19,7 @@ from rpbi.ros.publishers.sample_topics import joint_state_message
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.urdf.copies import description_for_ros
 from rpbi.urdf.joints import Joint
+from rpbi.world.loading import robots_description
 
 
 def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
@@ -64,10 +65,21 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
 def main() -> None:
     """Prints a robot description; launch files need it before the simulator is up: robot_state_publisher does."""
     parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
-    parser.add_argument("urdf", help="file; {package}/path is resolved, and PyBullet's data is looked in")
-    name = parser.parse_args().urdf
+    parser.add_argument("file", help="the URDF; {package}/path is resolved, and PyBullet's data is looked in")
+    parser.add_argument(
+        "--robots",
+        nargs="+",
+        metavar="NAME",
+        help="FILE is the main file of a world: prints these robots of it in one URDF, with names of links and joints"
+        " that begin with NAME_",
+    )
+    given = parser.parse_args()
     try:
-        print(description_for_ros(find_file(name, ".", (pybullet_data.getDataPath(),))))
-    except (ConfigError, OSError, ValueError) as error:
-        print(f"{name}: {error}", file=sys.stderr)
+        print(robots_description(given.file, given.robots) if given.robots else _description_of(given.file))
+    except (InterfaceError, OSError, ValueError) as error:
+        print(f"{given.file}: {error}", file=sys.stderr)
         sys.exit(1)
+
+
+def _description_of(name: str) -> str:
+    return description_for_ros(find_file(name, ".", (pybullet_data.getDataPath(),)))

@@ -61,8 +61,8 @@ def score(
     if json:
         write_json(json, found)
     pictures = out / f"{scene.replace(':', '.')}_failures.png"
-    if write_failures(pictures, results):
-        print(f"ends of failed episodes: {pictures}")
+    if line := write_failures(pictures, results):
+        print(line)
     return 0
 
 
