@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 from ros_system import wait_until
 
+from custom_ros_tools.console.modules import command_of
 from rpbi_utils import bag_to_dataframes
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -95,17 +96,23 @@ def test_the_camera_sees_something(demo):
     assert len(colours) > 200
 
 
-def test_bad_arguments_are_named():
-    run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--seconds", "0"], capture_output=True, text=True)
-    assert run.returncode == 2
-    assert "--seconds: expected 2 to 3600, got 0" in run.stderr
+@pytest.fixture
+def command(monkeypatch):
+    """The command in this process, which keeps its own handlers of signals."""
+    monkeypatch.setattr("rpbi_examples.ros.console.demo.ENDINGS", ())
+    return command_of("rpbi_examples.ros.console.demo")
 
 
-def test_a_place_that_cannot_be_written_is_told_in_one_line():
-    run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--out", "/proc/x"], capture_output=True, text=True)
-    assert run.returncode == 1
-    line = run.stderr.splitlines()[-1]  # PyBullet says before when it was built
-    assert line.startswith("demo: ") and "'/proc/x'" in line and "Traceback" not in run.stderr
+def test_bad_arguments_are_named(command, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        command.run(["--seconds", "0"])
+    assert "--seconds: expected 2 to 3600, got 0" in capsys.readouterr().err
+
+
+def test_a_place_that_cannot_be_written_is_told_in_one_line(command, capsys):
+    assert command.run(["--out", "/proc/x"]) == 1
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("demo: ") and "'/proc/x'" in line
 
 
 def _processes_with_master(port: str) -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from node_world import objects
 from PIL import Image
 from ros_system import RosSystem, wait_until
 
@@ -24,13 +25,13 @@ COMMANDS = [
 LAUNCH = " launch "
 
 
-def _has_ended_or_answers(launched: subprocess.Popen) -> bool:
-    return launched.poll() is not None or subprocess.run([ROOT / "rpbi", "list"], capture_output=True).returncode == 0
+def _has_ended_or_answers(launched: subprocess.Popen, system: RosSystem) -> bool:
+    return launched.poll() is not None or bool(objects(system))
 
 
 @pytest.fixture(scope="module")
 def followed(ros_master, tmp_path_factory):
-    """The folder after all commands of the page, four times as fast as there; and what each command printed."""
+    """The folder after all commands of the page, twice as fast as there; and what each command printed."""
     folder = tmp_path_factory.mktemp("lab")
     for name, text in FILES.items():
         (folder / name).write_text(text)
@@ -39,8 +40,8 @@ def followed(ros_master, tmp_path_factory):
     try:
         for command in COMMANDS:
             if LAUNCH in command:
-                launched = system.start(["bash", "-c", f"cd {folder} && exec {command} real_time_factor:=4"])
-                wait_until(partial(_has_ended_or_answers, launched), "the world runs")
+                launched = system.start(["bash", "-c", f"cd {folder} && exec {command} real_time_factor:=2"])
+                wait_until(partial(_has_ended_or_answers, launched, system), "the world runs")
                 assert launched.poll() is None, system.output(launched)
                 continue
             done = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=120.0)

@@ -13,9 +13,14 @@ from rpbi_examples.scenes.task import make_env, run_episode
 ENDED = re.compile(r"seed (\d+) (\w+), after ([^;]*); (.*), real-time factor.* state: (\w+)")
 BOUNDS = {
     "cup": {"off [mm]": (0.0, 5.0), "largest tilt [deg]": (0.0, 5.0)},
-    "wiping": {"way within 10 % [%]": (95.0, 100.0), "stains gone [%]": (99.0, 100.0)},
+    "wiping": {
+        "way within 10 % [%]": (95.0, 100.0),
+        "stains gone [%]": (100.0, 100.0),
+        "coverage [%]": (99.0, 100.0),
+        "mean force [N]": (17.44, 17.79),  # within 1 % of the 17.62 N of the seed
+    },
     "handover": {"held by the robot alone [s]": (5.0, 20.0), "largest force on the person [N]": (1.0, 20.0)},
-    "talos": {"hand error [mm]": (0.0, 10.0), "largest lean [deg]": (1.0, 10.0)},
+    "talos": {"hand error [mm]": (0.0, 10.0), "largest lean [deg]": (1.0, 10.0), "feet slip [mm]": (0.0, 5.0)},
     "factory": {"parts placed": (6.0, 6.0), "smallest distance of the arms [mm]": (50.0, 500.0)},
 }
 """Least and largest value of some figures."""
@@ -31,7 +36,12 @@ def _ends(ros, *arguments):
 def test_an_episode_ends_as_in_the_score(ros):
     ends = _ends(ros, "dual_arm.launch", "seed:=4", "episodes:=1")
     env = make_env("dual_arm")
-    assert run_episode(env, 4).success
+    result = run_episode(env, 4)
+    assert result.success, result
+    figures = result.figures
+    assert figures["error [mm]"] < 5.0 and figures["largest tilt [deg]"] < 1.0
+    assert 70.0 < figures["force from [N]"] < figures["to [N]"] < 95.0
+    assert 25.0 < figures["left carries [%]"] < 75.0
     assert [(seed, verdict, state) for seed, verdict, _, _, state in ends] == [
         ("4", "succeeded", env.world.state_hash())
     ]
