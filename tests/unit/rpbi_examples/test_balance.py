@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ pytest.importorskip("daqp")
 
 from robot_model.geometry import Pose, quaternion_of
 from rpbi_examples.balance.dynamics import FrameMotion
+from rpbi_examples.balance.largest_push import DIRECTIONS, draw, pushes_in
 from rpbi_examples.balance.program import wrench_cone
 from rpbi_examples.balance.tasks import Approach, capture
 
@@ -80,3 +82,13 @@ def test_the_capture_point_comes_to_its_goal():
         velocity = velocity + 0.001 * np.array((*task.wanted, 0.0))
         centre = centre + 0.001 * velocity
     assert centre[:2] == pytest.approx((0.0, 0.0), abs=1e-3)
+
+
+def test_pushes_are_drawn_from_the_table_of_the_docs(tmp_path):
+    text = (Path(__file__).resolve().parents[3] / "docs/examples.md").read_text()
+    pushes = pushes_in(text)
+    assert pushes.keys() == set(DIRECTIONS) and min(pushes.values()) >= 10.0, "as large as in the scene"
+    draw(pushes, tmp_path / "pushes.png")
+    assert (tmp_path / "pushes.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match="'| back | N s |'"):
+        pushes_in(text.replace("| back |", "| behind |"))

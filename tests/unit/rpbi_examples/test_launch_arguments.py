@@ -31,3 +31,13 @@ def test_every_example_hands_them_to_its_simulators(path):
             "connect/connection_mode": "GUI",
             **({"tf_prefix": node.namespace.strip("/")} if node.namespace != "/" else {}),
         }
+
+
+def test_a_scene_of_ones_own_has_a_world_anywhere():
+    path = LAUNCH_FILES[0].parent / "include/scene.launch"
+    given = ["scene:=my_lab.lift:Lift", "config:={my_lab}/lift.yaml", "rviz_config:=lift.rviz", "rviz:=true"]
+    loaded = load_config_default([(str(path), given)], None, assign_machines=False)
+    values = {name: each.value for name, each in loaded.params.items()}
+    assert values["/ros_pybullet_interface/config_file"] == "{my_lab}/lift.yaml"
+    assert values["/scene/scene"] == "my_lab.lift:Lift"
+    assert any("lift.rviz" in node.args for node in loaded.nodes if node.package == "rviz")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -48,6 +49,16 @@ def test_the_tip_goes_where_the_scene_leads_it(env):
     result = run_episode(env, 5)
     assert result.success and result.figures["error [mm]"] < 2.0
     assert result.time_s == pytest.approx(0.02 + 2.0 + 0.02, abs=0.05)
+
+
+def test_the_scene_of_the_docs_succeeds(tmp_path, monkeypatch):
+    text = (CONSOLE.parents[3] / "docs/examples.md").read_text()
+    (code,) = re.findall(r"```python\n# my_lab/lift.py\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "lift.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = make_env("lift:Lift")
+    assert run_episode(found, 1).success
+    found.close()
 
 
 def test_a_target_out_of_reach_fails_with_its_place(env, monkeypatch):

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from rpbi.gym.env import WorldEnv
 from rpbi_examples.scenes.scene import run_scene
-from rpbi_examples.scenes.talos import Talos
+from rpbi_examples.scenes.talos import IMPULSE, Talos
 from rpbi_examples.scenes.task import EnvStage, SceneTask, make_env
 
 DIRECTIONS = ("forward", "forward left", "left", "back left", "back", "back right", "right", "forward right")
@@ -60,12 +64,53 @@ def table(seed: int) -> Iterator[str]:
     env.close()
 
 
+def pushes_in(text: str) -> dict[str, float]:
+    """Returns the largest impulse by direction [N s] in a text with the lines of `table`.
+
+    Raises:
+        ValueError: If a direction is missing.
+    """
+    found = {name: re.search(rf"^\| {name} \| ([\d.]+) \|$", text, re.MULTILINE) for name in DIRECTIONS}
+    if missing := [name for name, match in found.items() if match is None]:
+        raise ValueError(f"expected a row '| {missing[0]} | N s |' as the command prints it, found none")
+    return {name: float(match[1]) for name, match in found.items() if match}
+
+
+def draw(pushes: Mapping[str, float], path: Path) -> None:
+    """Draws the largest impulses by direction [N s], as seen from above the robot, which faces up."""
+    figure = Figure(figsize=(4.8, 4.8), layout="constrained")
+    axes = figure.add_subplot(projection="polar")
+    axes.set_theta_zero_location("N")
+    angles = [math.radians(45.0 * DIRECTIONS.index(name)) for name in pushes]
+    impulses = list(pushes.values())
+    axes.fill(angles, impulses, alpha=0.25)
+    axes.plot([*angles, angles[0]], [*impulses, impulses[0]], "o-")
+    axes.plot([math.radians(each) for each in range(361)], [IMPULSE] * 361, "--", color="grey", label="in the scene")
+    axes.set_xticks(angles, [f"{name}\n{impulse:g}" for name, impulse in pushes.items()])
+    axes.tick_params(axis="x", pad=16)
+    axes.set_yticks([10, 20, 30, 40])
+    axes.set_rlabel_position(112.5)
+    axes.set_title("Largest push that a Talos withstands [N s]")
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.15))
+    figure.savefig(path, dpi=120)
+
+
 def main() -> None:
-    """Prints the table."""
+    """Prints the table, and draws it."""
     parser = argparse.ArgumentParser(description="Finds the largest push that Talos withstands, by direction.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the start and the target (default: 1)")
-    for line in table(parser.parse_args().seed):
-        print(line, flush=True)
+    parser.add_argument("--out", type=Path, help="picture of the table")
+    parser.add_argument("--table", type=Path, help="file with a table that was printed before, instead of pushes")
+    chosen = parser.parse_args()
+    lines = []
+    if chosen.table:
+        lines = [chosen.table.read_text()]
+    else:
+        for line in table(chosen.seed):
+            print(line, flush=True)
+            lines.append(line)
+    if chosen.out:
+        draw(pushes_in("\n".join(lines)), chosen.out)
 
 
 if __name__ == "__main__":
