@@ -17,6 +17,7 @@ import rosbag
 import written_episodes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
+from matplotlib import font_manager  # noqa: F401 (it writes a cache, which a limit of files would cut off)
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Float64, Header
 from tf2_msgs.msg import TFMessage
