@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Reads the rosbag2 recordings of ./rpbi export --to mcap with the packages of MCAP, which check its CRCs, and compares
-# every message with the bag that it came from.
+# Reads the rosbag2 recordings of ./rpbi export --to mcap with the packages of MCAP, and compares every message with the
+# bag that it came from. CRCs are checked where the file has them.
 #
 #     tools/mcap/check.sh DIR
 #
