@@ -96,7 +96,7 @@ class GuardNode:
         try:
             return self._answer(message)
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            if not rospy.core.is_shutdown_requested():  # from then on topics are closed
                 raise
             return False
 
@@ -109,7 +109,7 @@ class GuardNode:
             if decision.command is not None:
                 self._send(message, decision)
         except Exception as error:
-            if rospy.is_shutdown():
+            if rospy.core.is_shutdown_requested():
                 return False
             decision = Decision(None, violation_of("input", f"it cannot be judged: {error!r}"), True)
         if decision.is_halted:
