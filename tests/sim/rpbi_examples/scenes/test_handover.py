@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from scene_policies import act_at_random
 
 from rpbi_examples.scenes import handover
 from rpbi_examples.scenes.task import make_env, run_episode
@@ -30,6 +31,17 @@ def test_a_palm_beyond_reach_is_told(env, monkeypatch):
     monkeypatch.setattr(handover, "PLACES_M", ((0.9, -0.2, 1.1), (0.9, -0.2, 1.1)))
     result = run_episode(env, 205)
     assert not result.success and result.reason.startswith("human: (") and "is out of reach" in result.reason
+
+
+def test_a_policy_moves_the_robot_alone_and_a_lost_thing_ends_its_episode(env, monkeypatch):
+    monkeypatch.setattr(handover, "DYNAMICS", ((0.3, 0.0), (0.3, 0.001)))
+    act_at_random(env, 3)
+    arm = env.world.bodies["human"].joint_positions()
+    assert env.action_space.shape == (8,)
+    while not (found := env.step(env.action_space.sample()))[2] and env.task.scene.seen.time_s < 10.0:
+        pass
+    assert found[2] and not found[4]["is_success"]
+    assert env.world.bodies["human"].joint_positions() != arm
 
 
 def test_the_person_has_the_arms_of_the_other_examples():
