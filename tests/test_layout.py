@@ -18,6 +18,7 @@ from import_graph import ImportGraph, circles_of
 ROOT = Path(__file__).resolve().parent.parent
 MAX_MODULES = 12
 MAX_SMALL = 25
+MAX_SCENE_LINES = 150
 SMALL_LINES = 80
 TABLES = (
     "rpbi.bodies",
@@ -162,6 +163,19 @@ def shared_class_names(src: Path) -> list[str]:
     ]
 
 
+def long_scenes(src: Path) -> list[str]:
+    """Scenes that are too long to be read and copied; what several may use has files of its own, as in `parts`."""
+    table = src / "rpbi_examples/src/rpbi_examples/scenes/__init__.py"
+    names = (
+        sorted(set(re.findall(r"rpbi_examples\.scenes\.(\w+):(?!Scene\b)", table.read_text())))
+        if table.exists()
+        else []
+    )
+    lines = {name: len((table.parent / f"{name}.py").read_text().splitlines()) for name in names}
+    rule = f"at most {MAX_SCENE_LINES} lines a scene"
+    return [f"{rule}, {name}.py has {count}" for name, count in sorted(lines.items()) if count > MAX_SCENE_LINES]
+
+
 RULES: tuple[Callable[[Path], list[str]], ...] = (
     circles,
     circles_of_rooms,
@@ -171,6 +185,7 @@ RULES: tuple[Callable[[Path], list[str]], ...] = (
     ros_in_the_core,
     repeated,
     shared_class_names,
+    long_scenes,
 )
 
 
@@ -180,6 +195,7 @@ def test_layout_keeps(rule):
 
 
 RPBI = "ros_pybullet_interface/src/rpbi"
+SCENES = "../../../rpbi_examples/src/rpbi_examples/scenes"
 BREAKS = {
     circles: (
         {"engine/clock.py": "from .mailbox import Mailbox", "engine/mailbox.py": "from .clock import Clock"},
@@ -199,6 +215,10 @@ BREAKS = {
     ros_in_the_core: ({"engine/pacer.py": "def late():\n    from rpbi.ros.node import main"}, "rpbi.engine.pacer"),
     repeated: ({"engine/pacer.py": "import xml.etree.ElementTree"}, "rpbi.engine.pacer"),
     shared_class_names: ({"engine/pacer.py": "class Mailbox:\n    pass"}, "rpbi.engine.pacer"),
+    long_scenes: (
+        {f"{SCENES}/__init__.py": "'rpbi_examples.scenes.new:New'", f"{SCENES}/new.py": "\n" * 150},
+        "new.py has 152",
+    ),
 }
 """What to add to which files, so that a rule is broken; and what the message names."""
 
@@ -211,7 +231,9 @@ def test_a_broken_rule_is_told_with_its_file(rule, tmp_path):
         shutil.copytree(ROOT / "src" / package / "src", src / package / "src", ignore=others)
     additions, named = BREAKS[rule]
     for name, text in additions.items():
-        with open(src / RPBI / name, "a") as file:
+        path = (src / RPBI / name).resolve()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "a") as file:
             file.write(f"\n{text}\n")
     told = rule(src)
     assert len(told) == 1 and named in told[0], told

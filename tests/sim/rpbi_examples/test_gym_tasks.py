@@ -123,7 +123,7 @@ def test_nor_in_scenes_whose_robots_move(name):
     env = gymnasium.make(name).unwrapped
     check(env)
     before, _ = env.reset(seed=1)
-    for _ in range(5):
+    for _ in range(10):
         after, *_ = env.step(np.ones(env.action_space.shape, np.float32))
     for robot in env.task._kind.watch.robots:
         assert np.abs(after[f"{robot}/joints"] - before[f"{robot}/joints"]).max() > 0.003

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+
+import numpy as np
 
 from robot_model.geometry import Pose, minus, norm, plus
 from rpbi_examples.scenes.parts.arm import LedArm
@@ -10,6 +13,8 @@ from rpbi_examples.scenes.scene import Scene, Watched
 
 WAY = (0.0, 0.1, 0.05)
 TOLERANCE_M = 0.005
+BEGUN = "WRITING_BEGUN"
+"""Variable that names a file in which each scene that is made leaves a line."""
 
 
 class Writing(Scene):
@@ -18,6 +23,12 @@ class Writing(Scene):
     world = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
     watch = Watched(robots=("kuka_lwr",))
     longest_s = 5.0
+
+    def __init__(self, random: np.random.Generator) -> None:
+        super().__init__(random)
+        if BEGUN in os.environ:
+            with open(os.environ[BEGUN], "a") as file:
+                file.write("begun\n")
 
     def act(self) -> Iterator[None]:
         self._arm = LedArm(self, "kuka_lwr", "{rpbi_examples}/robots/kuka_lwr.urdf", "base", "end_effector_ball")

@@ -8,8 +8,14 @@ import pytest
 from roslaunch.config import load_config_default
 
 LAUNCH_FILES = sorted((Path(__file__).parents[3] / "src/rpbi_examples/launch").glob("*.launch"))
+SCENES = [path for path in LAUNCH_FILES if "include/scene.launch" in path.read_text()]
+SWINGING = [path for path in LAUNCH_FILES if "include/swinging_robot.launch" in path.read_text()]
 WITHOUT_WORLD = "mvn"
 GIVEN = ["start:=false", "real_time_factor:=0.5", "gui:=true", "headless:=true"]
+
+
+def load(path, *given):
+    return load_config_default([(str(path), list(given))], None, assign_machines=False)
 
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.stem)
@@ -18,7 +24,7 @@ def test_every_example_hands_them_to_its_simulators(path):
         assert "simulator.launch" not in path.read_text()
         return
     given = [*GIVEN, "config:=world.yaml"] if path.stem == "world" else GIVEN
-    loaded = load_config_default([(str(path), given)], None, assign_machines=False)
+    loaded = load(path, *given)
     simulators = [node for node in loaded.nodes if node.package == "ros_pybullet_interface"]
     assert len(simulators) == (2 if path.stem == "tracking_example" else 1)
     for node in simulators:
@@ -36,8 +42,27 @@ def test_every_example_hands_them_to_its_simulators(path):
 def test_a_scene_of_ones_own_has_a_world_anywhere():
     path = LAUNCH_FILES[0].parent / "include/scene.launch"
     given = ["scene:=my_lab.lift:Lift", "config:={my_lab}/lift.yaml", "rviz_config:=lift.rviz", "rviz:=true"]
-    loaded = load_config_default([(str(path), given)], None, assign_machines=False)
+    loaded = load(path, *given)
     values = {name: each.value for name, each in loaded.params.items()}
     assert values["/ros_pybullet_interface/config_file"] == "{my_lab}/lift.yaml"
     assert values["/scene/scene"] == "my_lab.lift:Lift"
     assert any("lift.rviz" in node.args for node in loaded.nodes if node.package == "rviz")
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_a_scene_that_ends_ends_its_world_and_the_other_way_round(path):
+    required = {node.name for node in load(path, "headless:=true").nodes if node.required}
+    assert required >= {"scene", "ros_pybullet_interface"}
+
+
+@pytest.mark.parametrize("path", SWINGING, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    ("given", "swings"), [((), True), (("controls:=true",), False), (("controls:=true", "move:=true"), True)]
+)
+def test_nothing_swings_what_sliders_move_but_on_demand(path, given, swings):
+    names = {node.name for node in load(path, "headless:=false", *given).nodes}
+    assert ("basic_robot_example" in names, "rpbi_controls_node" in names) == (swings, bool(given))
+
+
+def test_scenes_and_robots_that_swing_are_found():
+    assert (len(SCENES), len(SWINGING)) == (6, 4)

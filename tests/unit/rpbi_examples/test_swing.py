@@ -9,6 +9,8 @@ import pybullet_data
 import pytest
 import yaml
 
+from robot_model.asset_files import find_file
+from robot_model.model import RobotModel
 from rpbi_examples.motions import SWING_PERIOD_S, TO_MIDDLE_S, Swing
 from safe_robot.checks.self_collision import pairs_that_may_meet
 from safe_robot.geometry.distances import LinkDistances
@@ -86,3 +88,15 @@ def test_the_panda_stays_out_of_its_own_way():
         distances.place(np.array(swing.at(time_s)))
         near = [pair for pair in pairs if distances.distance(pair, 1.0) < MARGIN_M]
         assert not near, f"{near} after {time_s:.1f} s"
+
+
+@pytest.mark.parametrize("robot", ["kinova", "talos", "nextage", "human_model"])
+def test_all_joints_of_a_robot_swing(robot):
+    folder = EXAMPLES / "configs" / f"basic_example_{robot}"
+    config = next(yaml.safe_load(path.read_text()) for path in folder.glob("*.yaml") if path.stem != "config")
+    model = RobotModel(find_file(config["loadURDF"]["fileName"], str(folder)))
+    start = np.radians([config.get("initial_joint_position", {}).get(name, 0.0) for name in model.joint_names])
+    swing = Swing(start, model.limits.lower, model.limits.upper, start, 0.3)
+    turns = [swing.at(TO_MIDDLE_S + (index + 0.25) * SWING_PERIOD_S) for index in range(len(start))]
+    ways = [abs(positions[index] - start[index]) for index, positions in enumerate(turns)]
+    assert [name for name, way in zip(model.joint_names, ways) if way < 0.1] == []

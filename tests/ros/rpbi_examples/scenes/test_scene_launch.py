@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import pytest
-from ros_system import wait_until
+from ros_system import stop_group, wait_until
 
 from rpbi_examples.scenes import SCENES
 from rpbi_examples.scenes.task import make_env, run_episode
 
 ENDED = re.compile(r"seed (\d+) (\w+), after ([^;]*); (.*), real-time factor.* state: (\w+)")
+OPTIONS = "headless:=true", "real_time_factor:=0"
 BOUNDS = {
     "cup": {"off [mm]": (0.0, 5.0), "largest tilt [deg]": (0.0, 5.0)},
     "wiping": {
@@ -28,13 +30,17 @@ BOUNDS = {
 
 def _ends(ros, *arguments):
     """Launches a scene and returns seed, verdict, time, figures and state hash of each episode, once all have ended."""
-    process = ros.start(["roslaunch", "rpbi_examples", *arguments, "headless:=true", "real_time_factor:=0"])
+    process = ros.start(["roslaunch", "rpbi_examples", *arguments, *OPTIONS])
     wait_until(lambda: process.poll() is not None, "all episodes have ended", 240.0)
     return ENDED.findall(ros.output(process))
 
 
-def test_an_episode_ends_as_in_the_score(ros):
-    ends = _ends(ros, "dual_arm.launch", "seed:=4", "episodes:=1")
+def test_an_episode_ends_as_in_the_score_and_an_interrupt_ends_all(ros):
+    process = ros.start(["roslaunch", "rpbi_examples", "dual_arm.launch", "seed:=4", *OPTIONS])
+    wait_until(lambda: process.poll() is not None or "seed 5" in ros.output(process), "an episode has ended", 240.0)
+    stop_group(process)
+    output = ros.output(process)
+    assert not re.search("FATAL|ERROR|Traceback|has died", output), output
     env = make_env("dual_arm")
     result = run_episode(env, 4)
     assert result.success, result
@@ -42,10 +48,22 @@ def test_an_episode_ends_as_in_the_score(ros):
     assert figures["error [mm]"] < 5.0 and figures["largest tilt [deg]"] < 1.0
     assert 70.0 < figures["force from [N]"] < figures["to [N]"] < 95.0
     assert 25.0 < figures["left carries [%]"] < 75.0
-    assert [(seed, verdict, state) for seed, verdict, _, _, state in ends] == [
-        ("4", "succeeded", env.world.state_hash())
-    ]
+    seed, verdict, _, _, state = ENDED.findall(output)[0]
+    assert (seed, verdict, state) == ("4", "succeeded", env.world.state_hash())
     env.close()
+
+
+def test_without_the_extra_all_ends_with_a_line_that_names_it(ros, tmp_path):
+    (tmp_path / "pinocchio.py").write_text("raise ImportError('none here', name='pinocchio')\n")
+    modules = os.pathsep.join((str(tmp_path), os.environ["PYTHONPATH"]))
+    process = ros.start(["roslaunch", "rpbi_examples", "talos.launch", *OPTIONS], PYTHONPATH=modules)
+    wait_until(lambda: process.poll() is not None, "all has ended", 120.0)
+    output = ros.output(process)
+    named = [line for line in output.splitlines() if "not installed" in line]
+    assert len(named) == 1 and "'pinocchio' is not installed: ./rpbi setup ik" in named[0] and "FATAL" in named[0], (
+        output
+    )
+    assert "Traceback" not in output and output.count("FATAL") == 1, output
 
 
 @pytest.mark.parametrize("scene", BOUNDS)

@@ -32,6 +32,7 @@ def test_the_cup_comes_onto_the_shelf_with_its_balls(env):
     env.world.act("ball_3", "teleport", Pose((0.5, 0.0, 0.6)))
     env.step(None)
     assert env.task.scene.figures()["balls inside"] == 4 and not env.task.scene.has_succeeded()
+    assert env.task.scene.fault() == "1 of 5 balls spilled"
 
 
 def test_a_slippery_cup_stays_on_the_table(env, monkeypatch):

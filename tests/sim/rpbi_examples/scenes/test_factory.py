@@ -8,8 +8,8 @@ from robot_model.geometry import Pose
 from rpbi_examples.scenes import factory
 from rpbi_examples.scenes.cell.line import PARTS, grasp_yaw, is_in_box, on_belt
 from rpbi_examples.scenes.cell.two_arms import DOWN, TwoArms
-from rpbi_examples.scenes.scene import Put, Seen
-from rpbi_examples.scenes.task import make_env, run_episode
+from rpbi_examples.scenes.scene import Put, Seen, run_scene
+from rpbi_examples.scenes.task import EnvStage, make_env
 
 LEFT_OUT, RIGHT_OUT = Pose((0.3, 0.25, 1.04), DOWN), Pose((0.3, -0.25, 1.04), DOWN)
 
@@ -81,9 +81,28 @@ def test_parts_count_in_the_compartment_of_their_kind_alone():
     assert not is_in_box("cube_2", (0.20, 0.05, 0.02)), "on the floor"
 
 
-def test_a_grasp_that_misses_is_tried_again_and_then_left(env, monkeypatch):
+class RoughStage(EnvStage):
+    """Pushes a part that an arm works with off the belt, once both do."""
+
+    lost = ""
+
+    def cycle(self):
+        super().cycle()
+        scene = self._env.task.scene
+        if not self.lost and all(scene._busy.values()):
+            self.lost = scene._busy["right"]
+            self._env.world.act(self.lost, "teleport", Pose((0.9, 0.0, 0.02)))
+
+
+def test_a_grasp_that_misses_is_tried_again_and_a_part_that_falls_is_left_and_named(env, monkeypatch):
     monkeypatch.setattr(factory, "HELD_M", 1.0)
     monkeypatch.setattr(factory.Factory, "longest_s", 7.0)
-    result = run_episode(env, 202)
-    tries = env.task.scene._tries.values()
-    assert (result.done, result.reason) == (0, "not done after 7 s") and max(tries) > 1
+    env.task.seed = 202
+    env.reset()
+    scene, stage = env.task.scene, RoughStage(env)
+    result = run_scene(scene, stage)
+    assert (result.done, result.of, result.reason) == (0, 6, "not done after 7 s")
+    assert scene._tries.pop(stage.lost) == 1 and max(scene._tries.values()) > 1
+    inside = {part: Pose((kind.x_m, 0.0, 0.9)) for part, kind in PARTS.items() if part != stage.lost}
+    scene.look(scene.seen._replace(poses={**scene.seen.poses, **inside}))
+    assert (scene.fault(), scene.score()) == (f"not in the box: {stage.lost}", (5, 6))

@@ -6,7 +6,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from scene_policies import act_at_random
 
+from robot_model.geometry import Pose
 from rpbi_examples.scenes import handover
 from rpbi_examples.scenes.task import make_env, run_episode
 
@@ -30,6 +32,16 @@ def test_a_palm_beyond_reach_is_told(env, monkeypatch):
     monkeypatch.setattr(handover, "PLACES_M", ((0.9, -0.2, 1.1), (0.9, -0.2, 1.1)))
     result = run_episode(env, 205)
     assert not result.success and result.reason.startswith("human: (") and "is out of reach" in result.reason
+
+
+def test_a_policy_moves_the_robot_alone_and_a_lost_thing_ends_its_episode(env):
+    assert env.action_space.shape == (8,)
+    *_, has_ended, _, _ = act_at_random(env, 30)
+    scene = env.task.scene
+    assert not has_ended and scene.seen.joints["human"]["jLeftShoulder_roty"] < -0.1, "the person raises an arm"
+    env.world.act(scene.thing, "teleport", Pose((0.5, 0.5, 0.1)))
+    ends = [env.step(env.action_space.sample())[2] for _ in range(10)]
+    assert ends[-1] and not scene.has_succeeded()
 
 
 def test_the_person_has_the_arms_of_the_other_examples():

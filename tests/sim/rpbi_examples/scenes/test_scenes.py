@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,15 +15,18 @@ import numpy as np
 import pytest
 import writing_scene
 from PIL import Image
+from ros_system import wait_until
 
 from custom_ros_tools.console.argument import UsageError
-from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.errors import InterfaceError, PhysicsError, UnknownNameError
 from robot_model.geometry import Pose
+from rpbi.gym.env import WorldEnv
 from rpbi_examples.ros.console import score as command
 from rpbi_examples.scenes import score
 from rpbi_examples.scenes.parts.arm import between, smooth
-from rpbi_examples.scenes.score import run_seeds, summary, write_failures
-from rpbi_examples.scenes.task import make_env, run_episode
+from rpbi_examples.scenes.scene import SceneResult
+from rpbi_examples.scenes.score import SeedResult, summary, write_failures
+from rpbi_examples.scenes.task import do, make_env, run_episode
 
 CONSOLE = Path(__file__).resolve().parents[4] / "src/custom_ros_tools/nodes/console"
 SCENE = "writing_scene:Writing"
@@ -34,15 +39,49 @@ def env():
     found.close()
 
 
-def test_a_seed_leads_to_the_same_episode_in_any_order_and_process(env, tmp_path, monkeypatch):
+def has_processes(group: int) -> bool:
+    """Returns whether a process of a group runs."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def start_score(folder: Path, path: Path, *options: str, **environment: str) -> subprocess.Popen[str]:
+    """Starts a score in a folder and in a process group of its own, with a folder of modules before all others."""
+    variables = {**os.environ, **environment, "PYTHONPATH": os.pathsep.join((str(path), *sys.path))}
+    command = [sys.executable, str(CONSOLE), "score", *options, "--jobs", "2"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=folder, env=variables, start_new_session=True, **pipes)
+
+
+def test_a_seed_leads_to_the_same_episode_in_any_order_and_process_until_an_interrupt(env, tmp_path):
     first = run_episode(env, 5), env.world.state_hash()
     run_episode(env, 6)
     assert (run_episode(env, 5), env.world.state_hash()) == first
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(Path(writing_scene.__file__).parent), *sys.path)))
-    options = ["--seeds", "5-6", "--jobs", "2", "--json", "found.json"]
-    subprocess.run([sys.executable, str(CONSOLE), "score", SCENE, *options], cwd=tmp_path, check=True)
-    row, _ = json.loads((tmp_path / "found.json").read_text())["rows"]
-    assert (row["state_hash"], row["time_s"]) == (first[1], first[0].time_s)
+    begun = tmp_path / "begun"
+    options = [SCENE, "--seeds", "5-500", "--json", "found.json"]
+    process = start_score(tmp_path, Path(writing_scene.__file__).parent, *options, WRITING_BEGUN=str(begun))
+    made = 2 + 5  # environments of both processes, and episodes
+    wait_until(lambda: begun.exists() and len(begun.read_text().splitlines()) >= made, "episodes have ended")
+    os.killpg(process.pid, signal.SIGINT)
+    printed, complaints = process.communicate(timeout=60.0)
+    assert process.returncode == 130 and "Traceback" not in complaints, complaints
+    found = json.loads((tmp_path / "found.json").read_text())
+    row = found["rows"][0]
+    assert (row["seed"], row["state_hash"], row["time_s"]) == (5, first[1], first[0].time_s)
+    assert f"{SCENE}: {found['success']} of {found['of']} ({found['seeds']} of 496 seeds)" in printed
+    wait_until(lambda: not has_processes(process.pid), "no process of it is left")
+
+
+def test_a_score_without_an_extra_names_it_in_one_line(tmp_path):
+    (tmp_path / "pinocchio.py").write_text("raise ImportError('none here', name='pinocchio')\n")
+    process = start_score(tmp_path, tmp_path, "talos", "--seeds", "1-2")
+    printed, complaints = process.communicate(timeout=120.0)
+    lines = [line for line in complaints.splitlines() if line.strip()]
+    assert process.returncode == 1 and not printed
+    assert "'pinocchio' is not installed: ./rpbi setup ik" in lines[-1] and "Traceback" not in complaints, complaints
 
 
 def test_the_tip_goes_where_the_scene_leads_it(env):
@@ -87,12 +126,39 @@ def test_scores_are_tables_json_and_pictures(tmp_path, monkeypatch, capsys):
     assert sheet.size == (320, 240) and np.asarray(sheet).std() > 10.0
 
 
+def test_a_seed_whose_world_fails_is_a_failed_row_and_the_next_has_a_new_world(tmp_path, monkeypatch, capsys):
+    worlds, step = set(), WorldEnv.step
+
+    def fail_first(self, action):
+        worlds.add(self.world)
+        if len(worlds) == 1 and self.world.clock.tick > 100:
+            raise PhysicsError("not finite any more: the tip")
+        return step(self, action)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(WorldEnv, "step", fail_first)
+    assert command.score(SCENE, seeds="4-5", json=tmp_path / "score.json", jobs=1) == 0
+    assert "failed: not finite any more: the tip" in capsys.readouterr().out
+    found = json.loads((tmp_path / "score.json").read_text())
+    assert (found["success"], found["of"], len(worlds)) == (1, 2, 2)
+    broken, whole = found["rows"]
+    assert (broken["success"], broken["done"], broken["of"]) == (False, 0, 1) and "error [mm]" not in broken
+    assert whole["success"] and whole["state_hash"]
+
+
+def test_a_deed_that_the_world_refuses_is_named(env):
+    env.reset(seed=5)
+    env.task.scene.put("kuka_lwr/target", {"lwr_arm_0_joint": math.nan})
+    with pytest.raises(InterfaceError, match="^Put kuka_lwr/target: .*finite"):
+        do(env.world, *env.task.scene.take_deeds())
+
+
 def test_a_good_score_leaves_no_pictures_of_failures(tmp_path):
     path = tmp_path / "failures.png"
     path.touch()
-    results = list(run_seeds(SCENE, [5], 1))
-    assert not write_failures(path, results) and not path.exists()
-    assert summary(SCENE, results)["success"] == 1
+    good = SeedResult(5, SceneResult(True, 1, 1, 2.0, {}), "", None)
+    assert not write_failures(path, [good]) and not path.exists()
+    assert summary(SCENE, [good])["success"] == 1
 
 
 @pytest.mark.parametrize("seeds", ["", "a", "9-8", "1-", "-3"])

@@ -9,8 +9,11 @@ import pytest
 pytest.importorskip("pinocchio")
 pytest.importorskip("daqp")
 
+from scene_policies import act_at_random
+
 from rpbi_examples.balance.largest_push import stands
 from rpbi_examples.scenes.scene import run_scene
+from rpbi_examples.scenes.talos import HAND
 from rpbi_examples.scenes.task import EnvStage, make_env
 
 
@@ -42,3 +45,15 @@ def test_a_target_out_of_reach_is_told_of(env):
     assert result.figures["largest lean [deg]"] < 20.0 and result.figures["feet slip [mm]"] < 2.0
     efforts = env.world.bodies["talos"].motors.applied_efforts
     assert len(efforts) == 32 and max(map(abs, efforts.values())) > 20.0  # torques hold it, not motors
+
+
+def test_a_policy_moves_the_hand_while_the_controller_balances(env):
+    observation, *_ = act_at_random(env, 25)
+    scene = env.task.scene
+    assert env.action_space.shape == (6,) and tuple(observation["goal"]) == pytest.approx(scene.target.position)
+    ball, robot = (env.world.bodies[name].base_pose().position for name in ("ball", "talos"))
+    assert ball == pytest.approx(scene.target.position) and robot[2] > 0.95
+    hand = scene.pose(HAND).position
+    for _ in range(25):
+        env.step([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert scene.pose(HAND).position[1] - hand[1] > 0.03

@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from scene_policies import act_at_random
 
 from rpbi_examples.scenes import wiping
 from rpbi_examples.scenes.task import make_env, run_episode
@@ -38,6 +39,18 @@ def test_another_force_than_that_asked_for_fails_in_one_line(env, monkeypatch):
     result = run_episode(env, 203)
     assert not result.success and result.reason.startswith("expected to press with 22.8 N, got ")
     assert result.figures["stains gone [%]"] == 0.0
+
+
+def test_a_policy_wipes_where_it_leads_the_sponge_that_is_pressed(env):
+    observation, *_ = act_at_random(env, 3)
+    scene = env.task.scene
+    assert env.action_space.shape == (6,) and list(observation["goal"]) == pytest.approx([scene.force])
+    assert not scene.stamps, "the arm is on its way to the board"
+    for _ in range(300):
+        env.step([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
+        if len(scene.stamps) >= 50:
+            break
+    assert scene.stamps[-1].y - scene.stamps[0].y == pytest.approx(0.05, abs=0.02)
 
 
 def test_the_arm_is_that_of_the_other_examples():

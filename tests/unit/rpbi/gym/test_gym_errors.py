@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 
 import numpy as np
@@ -53,3 +54,5 @@ def test_without_gymnasium_the_extra_is_named(monkeypatch):
     assert "reach" in TASKS and TASKS.summaries()
     with pytest.raises(MissingDependency, match="'gymnasium' is not installed: ./rpbi setup gym"):
         TASKS.find("reach")
+    with pytest.raises(MissingDependency, match="'gymnasium' is not installed: ./rpbi setup gym"):
+        importlib.import_module("rpbi.gym.env")

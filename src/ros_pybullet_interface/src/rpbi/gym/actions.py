@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from robot_model.geometry import rotation_between
+from robot_model.geometry import normalized, quaternion_of, quaternion_product, rotation_between
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.linear_algebra import solve
@@ -71,7 +71,9 @@ class JointAction:
 
 
 class PoseAction:
-    """Moves the target of a controller that leads a link, in the axes of the world, and keeps its orientation.
+    """Moves the target of a controller that leads a link, by ways along x, y and z of the world and turns about them.
+
+    It begins where the controlled point is. While the controller is not active, actions have no effect.
 
     Args:
         controller: The controller, as `ROBOT/CONTROLLER`; it has a `point` of the link, and its `target` is a pose.
@@ -79,30 +81,44 @@ class PoseAction:
         low: Lower corner of the box that the target stays in [m].
         high: Upper corner [m].
         step: Largest change in an action along each axis [m].
+        turn: Largest change in an action about each axis [rad].
     """
 
-    size = 3
+    size = 6
 
     def __init__(
-        self, world: World, controller: str, link: str, low: Sequence[float], high: Sequence[float], step: float
+        self,
+        world: World,
+        controller: str,
+        link: str,
+        low: Sequence[float],
+        high: Sequence[float],
+        step: float,
+        turn: float,
     ) -> None:
         self._world, self._slot = world, f"{controller}/target"
-        self._robot, _, name = controller.partition("/")
+        self._robot, _, self._controller = controller.partition("/")
         robot = robot_of(world, self._robot)
-        config: Any = robot.controllers.config(name)
+        config: Any = robot.controllers.config(self._controller)
         self._link, self._point = link_index(robot, link), Pose(config.point)
-        self._low, self._high, self._step = low, high, step
-        self._goal = Pose()
+        self._low, self._high, self._step, self._turn = low, high, step, turn
+        self.goal = Pose()
+        """Where the point is to be, in the world."""
 
     def reset(self) -> None:
         """Begins at the present pose."""
-        self._goal = robot_of(self._world, self._robot).link_pose(self._link) @ self._point
+        self.goal = robot_of(self._world, self._robot).link_pose(self._link) @ self._point
 
     def apply(self, values: Values) -> None:
-        """Moves the target."""
-        moved = np.clip(self._goal.position + self._step * values, self._low, self._high)
-        self._goal = self._goal._replace(position=tuple(moved.tolist()))
-        self._world.put(self._slot, self._goal)
+        """Moves the target, which stays in the box."""
+        if not robot_of(self._world, self._robot).controllers.is_active(self._controller):
+            self.reset()
+            return
+        x, y, z = np.clip(self.goal.position + self._step * values[:3], self._low, self._high).tolist()
+        about_x, about_y, about_z = (self._turn * values[3:]).tolist()
+        turned = quaternion_product(quaternion_of((about_x, about_y, about_z)), self.goal.quat_xyzw)
+        self.goal = Pose((x, y, z), normalized(turned))
+        self._world.put(self._slot, self.goal)
 
 
 class HandAction:

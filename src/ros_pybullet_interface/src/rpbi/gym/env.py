@@ -7,15 +7,19 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
-import gymnasium
 import pybullet
-from gymnasium import spaces
 
 from custom_ros_tools.config import load_config
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, InterfaceError, MissingDependency, Problem, UnknownNameError
 from custom_ros_tools.schema.type_names import shown
 from rpbi.plugins import plugin_errors
 from rpbi.world import World
+
+try:
+    import gymnasium
+    from gymnasium import spaces
+except ImportError:
+    raise MissingDependency("gymnasium", "./rpbi setup gym") from None
 
 from .checks import CheckedTask
 from .randomization import Randomization, Randomizer

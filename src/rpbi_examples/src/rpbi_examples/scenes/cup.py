@@ -44,6 +44,7 @@ class Cup(Scene):
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)
         self._goal = Pose((*random.uniform((-0.12, -0.03), (0.12, 0.03)).tolist(), 0.0))
+        self.goal_numbers = self._goal.position  # in the frame of the shelf
         self._largest_tilt_deg, self._moved_m, self._last = 0.0, math.inf, ZERO
 
     def prepare(self) -> None:
@@ -94,6 +95,11 @@ class Cup(Scene):
         is_there = self._off_m() < MAX_OFF_M and self._touching() - {*BALLS} == {"shelf"}
         stands = self._moved_m < AT_REST_M and self._tilt_deg() < MAX_TILT_DEG
         return is_there and stands and self._balls_inside() == len(BALLS)
+
+    def fault(self) -> str:
+        """Returns how many balls are not in the cup, if any."""
+        spilled = len(BALLS) - self._balls_inside()
+        return f"{spilled} of {len(BALLS)} balls spilled" if spilled else ""
 
     def figures(self) -> dict[str, float]:
         """Returns how many balls are in the cup, how far it is from its goal, its tilt and the largest on the way."""

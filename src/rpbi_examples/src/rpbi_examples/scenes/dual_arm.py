@@ -7,16 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from robot_model.geometry import (
-    Pose,
-    Vector,
-    angle_between,
-    dot,
-    minus,
-    norm,
-    plus,
-    rotated,
-)
+from robot_model.geometry import Pose, Vector, angle_between, dot, minus, norm, plus, rotated
 
 from .parts.arm import about_z, between, smooth, tilt_deg
 from .scene import Scene, Touch, Watched
@@ -54,6 +45,7 @@ class DualArm(Scene):
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)
         self.goal = _on_table(random)
+        self.goal_numbers = (*self.goal.position, *self.goal.quat_xyzw)
         self._tilt_deg, self._is_carrying = 0.0, False
         self._forces: list[float] = []
         self._shares: list[float] = []
@@ -81,6 +73,12 @@ class DualArm(Scene):
             self._hold(self.goal, -(1.0 - share) * FORCE_N / STIFFNESS + 0.12 * smooth(share))
             yield
 
+    def beside(self) -> Iterator[None]:
+        """Takes a box that does not touch the table for one that is carried."""
+        while True:
+            self._is_carrying = "table" not in self._touching()
+            yield
+
     def note(self) -> None:
         """Notes the tilt of the box, and the forces on it while it is carried."""
         self._tilt_deg = max(self._tilt_deg, tilt_deg(self.seen.poses["box"]))
@@ -92,10 +90,14 @@ class DualArm(Scene):
     def has_succeeded(self) -> bool:
         """Returns whether the box stands at its goal alone, never tilted, and was pressed with a constant force."""
         off_m, off_rad = self._error()
-        touched = {touch.other for touch in self.seen.contacts["box"]}
-        is_there = off_m < NEAR_M and off_rad < NEAR_RAD and touched == {"table"}
+        is_there = off_m < NEAR_M and off_rad < NEAR_RAD and self._touching() == {"table"}
         is_held = np.quantile(np.abs(np.array(self._forces or [0.0]) - FORCE_N), 0.95) < MAX_CHANGE * FORCE_N
         return bool(is_there and is_held) and self._tilt_deg < MAX_TILT_DEG
+
+    def fault(self) -> str:
+        """Returns how far the box is from its goal, if the hands lost it."""
+        off_m, _ = self._error()
+        return "" if off_m < NEAR_M else f"the box slipped: it is {1e3 * off_m:.0f} mm from its goal"
 
     def figures(self) -> dict[str, float]:
         """Returns the error, the largest tilt, the internal force, and who carries."""
@@ -127,6 +129,9 @@ class DualArm(Scene):
         """Returns the force of an arm on the box, along the way between both flanges [N]."""
         axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
         return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in self._touches(robot)))
+
+    def _touching(self) -> set[str]:
+        return {touch.other for touch in self.seen.contacts["box"]}
 
     def _touches(self, robot: str) -> list[Touch]:
         return [touch for touch in self.seen.contacts["box"] if touch.other == robot]

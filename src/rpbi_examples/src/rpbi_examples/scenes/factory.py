@@ -10,12 +10,11 @@ import numpy as np
 from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose
 
-from .cell.line import BELT_X_M, BELT_Z_M, PARTS, RIM_Z_M, Belt, Kind, grasp_yaw, is_in_box, on_belt
+from .cell.line import BELT_X_M, BELT_Z_M, PARTS, RIM_Z_M, Belt, Kind, grasp_yaw, missing, on_belt
 from .cell.two_arms import Gripper, TwoArms, Zone
 from .scene import Scene, Watched
 
-URDF = "{rpbi_examples}/robots/nextage_gripper.urdf"
-CHEST = Pose((0.0, 0.0, 0.85))
+URDF, CHEST = "{rpbi_examples}/robots/nextage_gripper.urdf", Pose((0.0, 0.0, 0.85))
 STATION_M, REACH_M = 0.18, 0.32
 """The belt stops when a part is that far past the middle; parts within reach of it are taken."""
 MIDDLE_M, LEAST_M = 0.16, 0.05
@@ -36,6 +35,7 @@ class Factory(Scene):
 
     world = "{rpbi_examples}/configs/factory/config.yaml"
     watch = Watched(robots=("nextage", "conveyor"), bodies=tuple(PARTS), tags=("tag_detections",))
+    of = len(PARTS)
     longest_s = 90.0
 
     def __init__(self, random: np.random.Generator) -> None:
@@ -43,8 +43,7 @@ class Factory(Scene):
         self._arms: TwoArms | None = None
         self._nearest_m = math.inf
         self._busy = dict.fromkeys(SIDES, "")  # the part that each arm works with
-        self._middle = Zone()
-        self._tries = dict.fromkeys(PARTS, 0)
+        self._middle, self._tries = Zone(), dict.fromkeys(PARTS, 0)
         self._placed: list[tuple[str, Kind]] = []
 
     def prepare(self) -> None:
@@ -80,16 +79,19 @@ class Factory(Scene):
 
     def has_succeeded(self) -> bool:
         """Returns whether all parts are in the box."""
-        return self.score()[0] == len(PARTS)
+        return not missing(self.seen.poses)
 
     def score(self) -> tuple[int, int]:
         """Returns how many parts are in the compartment of their kind, of how many."""
-        return sum(is_in_box(part, self.seen.poses[part].position) for part in PARTS), len(PARTS)
+        return self.of - len(missing(self.seen.poses)), self.of
+
+    def fault(self) -> str:
+        """Returns the parts that are not in the compartment of their kind."""
+        return f"not in the box: {', '.join(missing(self.seen.poses))}"
 
     def figures(self) -> dict[str, float]:
         """Returns how many parts are in the box, the smallest distance between the arms, and the time for each part."""
-        done, nearest_mm = self.score()[0], 1e3 * self._nearest_m
-        time_s = self.seen.time_s / max(done, 1)
+        time_s, nearest_mm = self.seen.time_s / max(done := self.score()[0], 1), 1e3 * self._nearest_m
         return {"parts placed": done, "time a part [s]": time_s, "smallest distance of the arms [mm]": nearest_mm}
 
     def _reachable(self, side: str) -> list[str]:
@@ -101,8 +103,8 @@ class Factory(Scene):
     def _has_brought(self) -> bool:
         """Returns whether the belt has brought the next parts, or all that are left."""
         places = [tag.position[1] for tag in on_belt(self.seen.tags).values()]
-        left = len(PARTS) - len(self._placed)
-        return min(places, default=1.0) < -STATION_M or (len(places) >= left and sum(places) <= 0.0)
+        are_last = len(places) + len(self._placed) >= self.of
+        return min(places, default=1.0) < -STATION_M or (are_last and sum(places) <= 0.0)
 
     def _work(self, side: str, hand: Gripper, belt: Belt) -> Iterator[Pose]:
         """Yields the targets of a hand: it takes one part after the other."""

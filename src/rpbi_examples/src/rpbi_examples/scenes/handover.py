@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -12,7 +11,7 @@ from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose, Vector
 
 from .parts.arm import about_z, tilt_deg
-from .parts.holding import Holders, PandaArm, Still, above, until, yaw_to
+from .parts.holding import BEFORE, Holders, PandaArm, Still, above, until, upright_grasp, yaw_to
 from .parts.person import SwayingPerson, together
 from .scene import Scene, SceneFailedError, Watched
 
@@ -25,9 +24,6 @@ REST, PLACES_M = Pose((0.31, -0.24, 1.08)), ((0.37, -0.34, 1.05), (0.45, -0.16, 
 OFF_M, OFF_RAD, PAUSES_S = 0.008, 0.1, (0.2, 1.5)
 """Largest errors of the person: of a thing on the palm, of the palm's direction to the robot; and pauses."""
 BASE = Pose((1.18, -0.2, 0.6), (0.0, 0.0, 1.0, 0.0))
-APPROACH = Pose(quat_xyzw=(0.0, math.sin(math.radians(-55.0)), 0.0, math.cos(math.radians(-55.0))))
-BEFORE = Pose((0.0, 0.0, -0.14))
-"""The gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, seen from there."""
 GRASP_M, LIFT_M, OPEN_M = 0.09, 0.1, 0.04
 """Height of a grasp above the base of a thing, height above the palm, way of each finger."""
 SHOWN_M, ALONE_S = (0.66, -0.2, 1.24), 1.0
@@ -44,6 +40,7 @@ class Handover(Scene):
 
     world = "{rpbi_examples}/configs/handover/config.yaml"
     watch = Watched(("human", "panda"), bodies=tuple(HALF_HEIGHTS_M), contacts=("human", *HALF_HEIGHTS_M))
+    others = ("human",)
     longest_s = 45.0
 
     def __init__(self, random: np.random.Generator) -> None:
@@ -70,10 +67,11 @@ class Handover(Scene):
 
     def act(self) -> Iterator[None]:
         """Has the person and the robot act side by side."""
-        for _ in together(self._person_acts(), self._robot_acts()):
-            if not self._holders.all_names <= HANDS:
-                raise SceneFailedError(f"the {self.thing} has fallen")
-            yield
+        yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
+
+    def beside(self) -> Iterator[None]:
+        """Has the person act."""
+        yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:
         """Waves, holds out the thing until the robot has it, and the palm until the thing is back."""
@@ -120,8 +118,7 @@ class Handover(Scene):
 
     def _grasp(self) -> Pose:
         """Returns the gripper at the thing, where that is now."""
-        thing = self._where()
-        return Pose(above(thing.position, GRASP_M - self._half_m), about_z(yaw_of(thing.quat_xyzw))) @ APPROACH
+        return upright_grasp(self._where(), GRASP_M - self._half_m)
 
     def note(self) -> None:
         """Notes waves, who holds the thing, how it and the palm move, and forces on the person."""

@@ -151,20 +151,26 @@ class Scene(ABC):
         world: Main YAML file of the world.
         watch: What it sees.
         hands: Links that controllers lead to poses, by `ROBOT/CONTROLLER`; joints of other robots have targets.
+        others: Robots that no policy moves, such as a person, see `beside`.
+        of: Number of parts of the task.
         cycle_ticks: Ticks of a cycle.
         longest_s: Time after which an episode ends [s].
         seen: The newest view of the world, before the first cycle an empty one.
+        goal_numbers: Numbers of the episode that a policy has to know beside what is seen, such as a place [m].
     """
 
     world: ClassVar[str]
     watch: ClassVar[Watched]
     hands: ClassVar[Mapping[str, str]] = {}
+    others: ClassVar[tuple[str, ...]] = ()
+    of: ClassVar[int] = 1
     cycle_ticks: ClassVar[int] = 20
     longest_s: ClassVar[float] = 30.0
 
     def __init__(self, random: np.random.Generator) -> None:
         self.random = random
         self.seen = Seen()
+        self.goal_numbers: tuple[float, ...] = ()
         self._deeds: list[Deed] = []
 
     # --- What a subclass has
@@ -180,6 +186,14 @@ class Scene(ABC):
             SceneFailedError: If the robots cannot go on.
         """
 
+    def beside(self) -> Iterator[None]:
+        """Acts for all but the robots that a policy moves in place of `act`, such as a person; by default nothing.
+
+        Raises:
+            SceneFailedError: If the task cannot be done any more.
+        """
+        yield from ()
+
     def note(self) -> None:  # noqa: B027 (some scenes look at the end alone)
         """Notes what happened in a cycle, for figures and success."""
 
@@ -192,8 +206,12 @@ class Scene(ABC):
         return {}
 
     def score(self) -> tuple[int, int]:
-        """Returns how many of how many parts of the task are done; by default the task is one."""
-        return int(self.has_succeeded()), 1
+        """Returns how many of how many parts of the task are done; by default all or none."""
+        return self.of * self.has_succeeded(), self.of
+
+    def fault(self) -> str:
+        """Returns in a few words why it has not succeeded, as far as it shows at the end, or nothing."""
+        return ""
 
     # --- What it does to the world
 
@@ -250,7 +268,7 @@ class Stage(ABC):
         """Does something to the world, before its next tick.
 
         Raises:
-            InterfaceError, UnknownNameError or ValueError: If the world refuses it.
+            InterfaceError: If the world refuses it.
         """
 
     @abstractmethod
@@ -267,7 +285,7 @@ class SceneResult(NamedTuple):
         of: Number of all parts.
         time_s: How long it took [s].
         figures: Numbers that tell how well it worked.
-        reason: Why the robots could not go on; empty if they could.
+        reason: Why it has failed; empty if that is not known.
     """
 
     success: bool
@@ -291,7 +309,11 @@ def tag_in_world(camera: Pose, tag: Pose) -> Pose:
 
 
 def run_scene(scene: Scene, stage: Stage) -> SceneResult:
-    """Runs an episode of a scene that was prepared, until it has acted or its time is over."""
+    """Runs an episode of a scene that was prepared, until it has acted or its time is over.
+
+    Raises:
+        InterfaceError: If the world fails, or refuses something.
+    """
     reason = ""
 
     def cycle() -> None:
@@ -309,4 +331,10 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
     except SceneFailedError as error:
         reason = str(error)
     success = scene.has_succeeded() and not reason
+    reason = reason or ("" if success else scene.fault())
     return SceneResult(success, *scene.score(), scene.seen.time_s, scene.figures(), reason)
+
+
+def broken_off(scene: Scene, error: InterfaceError) -> SceneResult:
+    """Returns the result of an episode that an error of its world has ended: nothing is done."""
+    return SceneResult(False, 0, scene.of, scene.seen.time_s, {}, " ".join(str(error).split()))

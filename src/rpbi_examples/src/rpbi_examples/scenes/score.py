@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-from collections.abc import Iterator, Sequence
+import signal
+import threading
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,8 +20,8 @@ from PIL import Image, ImageDraw
 from custom_ros_tools.errors import InterfaceError
 from rpbi.gym.env import WorldEnv
 
-from .scene import SceneResult
-from .task import make_env, run_episode
+from .scene import SceneResult, broken_off
+from .task import SceneTask, make_env, run_episode
 
 COLUMNS, MAX_PICTURES = 4, 24
 """Columns and largest number of pictures of failures."""
@@ -31,7 +34,7 @@ class SeedResult(NamedTuple):
     Attributes:
         seed: The seed.
         result: How it ended.
-        state_hash: Hash of the world's state at its end.
+        state_hash: Hash of the world's state at its end; empty after an error of the world.
         picture: What the camera then saw, if it failed: uint8, shape (height, width, 3).
     """
 
@@ -56,8 +59,10 @@ class SeedResult(NamedTuple):
         }
 
 
-def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Iterator[SeedResult]:
-    """Runs a scene with some seeds, and yields the results as they come.
+def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Generator[SeedResult, None, None]:
+    """Runs a scene with some seeds, and yields the results as they come; its processes end when it is closed.
+
+    An error of the world ends the episode alone, as failed; the next one has a new world.
 
     Args:
         scene: A name of `SCENES`, or `module:Class`.
@@ -65,46 +70,77 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Iterator[SeedResul
         jobs: Number of processes.
 
     Raises:
-        InterfaceError: If a process has ended.
+        InterfaceError: If the world cannot be made, or a process has ended.
     """
     if jobs == 1:
-        _open(scene)
         try:
-            yield from map(_run, seeds)
+            for seed in seeds:
+                yield _run(scene, seed)
         finally:
             _close()
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of small matrices would contend for the processors
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, initializer=_open, initargs=(scene,)) as pool:
-        running = [pool.submit(_run, seed) for seed in seeds]
-        try:
-            for done in as_completed(running):
-                yield done.result()
-        except BrokenProcessPool:
-            raise InterfaceError("a process that ran the scene has ended: its memory may have run out") from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(jobs, context, initializer=_end_with_parent)
+    try:
+        with _interrupts_blocked():
+            running = [pool.submit(_run, scene, seed) for seed in seeds]
+        for done in as_completed(running):
+            yield done.result()
+    except BrokenProcessPool:
+        raise InterfaceError("a process that ran the scene has ended: its memory may have run out") from None
+    finally:
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()  # in the middle of an episode, after an error or Ctrl-C
+        pool.shutdown()
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Blocks SIGINT meanwhile, and for good in processes that start here: Ctrl-C is for the one that started them."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent() -> None:
+    """Has this process end with the one that started it, whatever that one ends by."""
+
+    def wait() -> None:
+        parent = multiprocessing.parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 _env: WorldEnv | None = None
 """The environment of this process."""
 
 
-def _open(scene: str) -> None:
-    global _env
-    _env = make_env(scene, "rgb_array")
-
-
 def _close() -> None:
-    assert _env is not None
-    _env.close()
+    global _env
+    if _env is not None:
+        _env.close()
+    _env = None
 
 
-def _run(seed: int) -> SeedResult:
-    assert _env is not None
-    result = run_episode(_env, seed)
-    return SeedResult(seed, result, _env.world.state_hash(), None if result.success else _env.render())
+def _run(scene: str, seed: int) -> SeedResult:
+    """Runs an episode in the environment of this process, which is made for the first one and after an error."""
+    global _env
+    _env = _env or make_env(scene, "rgb_array")
+    try:
+        result = run_episode(_env, seed)
+        return SeedResult(seed, result, _env.world.state_hash(), None if result.success else _env.render())
+    except InterfaceError as error:
+        assert isinstance(_env.task, SceneTask)
+        result = broken_off(_env.task.scene, error)
+        _close()
+        return SeedResult(seed, result, "", None)
 
 
 def summary(scene: str, results: Sequence[SeedResult]) -> dict[str, Any]:

@@ -59,12 +59,13 @@ class Talos(Scene):
         self._start = Pose((x, y, HEIGHT_M + abs(above)), quaternion_product(yaw, tilt))
         in_front: Vector = tuple(random.uniform(NEAREST, FARTHEST).tolist())
         self.target = Pose((x, y, 0.0), yaw) @ Pose(in_front, FORWARD)
+        self.goal_numbers = self.target.position
         self._yaw, self.push_angle = turn[2], float(random.uniform(-math.pi, math.pi))
         self.impulse = IMPULSE
         self._until_push_s = float(random.uniform(0.0, 1.0))
         self._feet: list[Vector] = []
         self._lean_deg = self._most_lean_deg = self._slip_m = self._late_error_m = 0.0
-        self._is_late = False
+        self._is_late = self._has_stayed = False
 
     def prepare(self) -> None:
         """Puts the robot onto the floor, not quite upright."""
@@ -73,9 +74,13 @@ class Talos(Scene):
     def act(self) -> Iterator[None]:
         """Stands, reaches, is pushed and brings its hand back."""
         yield from self._stand(0.5)
+        self.put("talos/balance/target", self.target)
+        yield from self.beside()
+
+    def beside(self) -> Iterator[None]:
+        """Shows the ball, and pushes the robot once its hand is there."""
         self._feet = [self.pose(sole).position for sole in SOLES]
         self.place("ball", self.target)
-        self.put("talos/balance/target", self.target)
         yield from self._stand(REACHED_S)
         if self._error_m() > NEAR_M:
             raise SceneFailedError(f"the hand does not reach the ball: it is {1e3 * self._error_m():.0f} mm away")
@@ -84,6 +89,7 @@ class Talos(Scene):
         yield from self._stand(BACK_S - PUSH_S)
         self._is_late = True
         yield from self._stand(STAYS_S)
+        self._has_stayed = True
 
     def note(self) -> None:
         """Notes lean, way of the feet and error of the hand."""
@@ -99,7 +105,7 @@ class Talos(Scene):
         """Returns whether it stands upright on both feet, where they were, and the hand has come back and stayed."""
         on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
         stands = on_floor == FEET and self._slip_m < MAX_SLIP_M and self._lean_deg < MAX_LEAN_DEG
-        return stands and self._is_late and self._late_error_m < NEAR_M
+        return stands and self._has_stayed and self._late_error_m < NEAR_M
 
     def figures(self) -> dict[str, float]:
         """Returns the error of the hand after it is back, the largest lean and the way of the feet."""

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from pydantic import Field
 
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import Fraction, Position, Positive, Text
 from robot_model.geometry import Pose
 from rpbi.gym.actions import ActionPart, JointAction, PoseAction
 from rpbi.gym.env import WorldEnv
-from rpbi.gym.parts import ObservationPart, pose_part, robot_of
+from rpbi.gym.parts import FARTHEST, ObservationPart, pose_part, robot_of
 from rpbi.gym.task import WorldTask, WorldTaskConfig
 from rpbi.sensors.tracking.april_tags import AprilTagsSensor
 from rpbi.world import World
@@ -22,6 +23,7 @@ from .scene import (
     Deed,
     Put,
     Scene,
+    SceneFailedError,
     SceneResult,
     Seen,
     SeenWrench,
@@ -47,6 +49,7 @@ class SceneTaskConfig(WorldTaskConfig):
     high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
     speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
     hand_speed: Positive = Field(0.25, description="Largest speed of hands along each axis [m/s].")
+    turn_speed: Positive = Field(1.0, description="Largest speed of hands about each axis [rad/s].")
 
 
 class SceneTask(WorldTask):
@@ -62,42 +65,52 @@ class SceneTask(WorldTask):
         self.seed: int | None = None
         """Seed of scenes from now on; without one, their random numbers are those of the environment."""
         self._start_tick = 0
+        self._beside: Iterator[None] | None = None
+        self._has_failed = False
 
     def actions(self) -> Sequence[ActionPart]:
         """Returns motions of all joints of its robots, or of hands where controllers drive them."""
         config, period_s, hands = self.config, self.period_s, self._kind.hands
-        led = {controller.partition("/")[0] for controller in hands}
-        step = config.hand_speed * period_s
+        led = {*self._kind.others, *(controller.partition("/")[0] for controller in hands)}
+        step, turn = config.hand_speed * period_s, config.turn_speed * period_s
         moved = [robot for robot in self._kind.watch.robots if robot not in led]
         return [
             *(JointAction(self.world, each, (), config.speed, period_s) for each in moved),
-            *(PoseAction(self.world, each, link, config.low, config.high, step) for each, link in hands.items()),
+            *(PoseAction(self.world, each, link, config.low, config.high, step, turn) for each, link in hands.items()),
         ]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the poses of its bodies."""
+        """Adds the poses of its bodies, and the goal of the episode."""
         yield from super().parts()
         for name in self._kind.watch.bodies:
             yield pose_part(self.world, name, self.config.low, self.config.high)
+        if count := len(self.scene.goal_numbers):
+            yield ObservationPart("goal", (-FARTHEST,) * count, (FARTHEST,) * count, lambda: self.scene.goal_numbers)
 
     def reset(self, random: np.random.Generator) -> None:
         """Prepares an episode of the scene."""
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
+        self._beside, self._has_failed = None, False
         self.scene.prepare()
         self._do_all()
         self.scene.seen = self._see()
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves joints; None leaves that to the scene."""
+        """Moves robots, and has the scene act for all others; None leaves all to the scene."""
         if action is not None:
+            self._beside = self._beside or self.scene.beside()
             super().act(action)
 
     def reward(self) -> float:
         """Returns the share of the task that was done in the last action."""
         before, _ = self.scene.score()
         self.scene.look(self._see())
+        try:
+            next(self._beside or iter(()), None)
+        except SceneFailedError:
+            self._has_failed = True
         self._do_all()
         done, of = self.scene.score()
         return (done - before) / of
@@ -105,6 +118,10 @@ class SceneTask(WorldTask):
     def has_succeeded(self) -> bool:
         """Returns whether the scene has worked."""
         return self.scene.has_succeeded()
+
+    def has_ended(self) -> bool:
+        """Returns whether the scene has worked, or cannot any more."""
+        return self._has_failed or self.has_succeeded()
 
     def _see(self) -> Seen:
         time_s = (self.world.clock.tick - self._start_tick) * self.world.clock.dt_s
@@ -145,7 +162,11 @@ def make_env(scene: str, render_mode: str | None = None) -> WorldEnv:
 
 
 def run_episode(env: WorldEnv, seed: int) -> SceneResult:
-    """Runs an episode of a scene in its environment; it is that of the same seed in the scene's launch file."""
+    """Runs an episode of a scene in its environment; it is that of the same seed in the scene's launch file.
+
+    Raises:
+        InterfaceError: If the world fails, or refuses something.
+    """
     assert isinstance(env.task, SceneTask)
     env.task.seed = seed
     env.reset(seed=seed)
@@ -192,8 +213,15 @@ def do(world: World, deed: Deed) -> None:
     """Does something to a world, before its next tick.
 
     Raises:
-        InterfaceError, UnknownNameError or ValueError: If the world refuses it.
+        InterfaceError: If the world refuses it.
     """
+    try:
+        _do(world, deed)
+    except ValueError as error:
+        raise InterfaceError(f"{type(deed).__name__} {deed[0]}: {error}") from None
+
+
+def _do(world: World, deed: Deed) -> None:
     if isinstance(deed, Put):
         world.put(deed.slot, deed.value)
     elif isinstance(deed, Teleport):

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
 from robot_model.geometry import Pose, dot, plus, quaternion_of, quaternion_product, rotated
 
 from .parts.arm import LedArm
-from .parts.lanes import Stamp, lanes, middles, ways_along
+from .parts.lanes import Stamp, lanes, middles, share_of_way
 from .scene import Scene, SceneFailedError, Watched
 
-URDF = "{rpbi_examples}/robots/kuka_lwr_sponge.urdf"
-BASE = Pose((0.5, 0.0, 0.0))
-"""Of the arm in the world, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
+URDF, SPONGE = "{rpbi_examples}/robots/kuka_lwr_sponge.urdf", "end_effector_sponge"
+ARM = "kuka_lwr", URDF, "lwr_arm_0_link", SPONGE, Pose((0.5, 0.0, 0.0))
+"""The arm, its chain and its base in the world, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
 SPONGE_M, STAIN_M = (0.06, 0.03), 0.009
 """Half the extents of the sponge, as in the URDF, and radius of a stain, as in configs/wiping/stain.yaml."""
 FACING = (1.0, 0.0, 0.0, 0.0)
@@ -48,10 +47,12 @@ class Wiping(Scene):
 
     world = "{rpbi_examples}/configs/wiping/config.yaml"
     watch = Watched(robots=("kuka_lwr",), bodies=("board",), contacts=("board",))
+    hands = {"kuka_lwr/wipe": SPONGE}
 
     def __init__(self, random: np.random.Generator) -> None:
         super().__init__(random)
         self.force = float(random.uniform(*FORCES_N))
+        self.goal_numbers = (self.force,)
         self.stains = {
             f"stain_{number:02d}": middle + random.uniform(-0.4, 0.4, 2) * SIZE_M / STAINS
             for number, middle in enumerate(middles(SIZE_M, STAINS).reshape(-1, 2))
@@ -70,25 +71,27 @@ class Wiping(Scene):
         for name, place in self.stains.items():
             self.place(name, board @ Pose((*place.tolist(), 0.0005)))
         self.change("board", lateralFriction=friction)
-        self.change("kuka_lwr/end_effector_sponge", contactStiffness=stiffness, contactDamping=100.0)
+        self.change(f"kuka_lwr/{SPONGE}", contactStiffness=stiffness, contactDamping=100.0)
 
     def act(self) -> Iterator[None]:
         """Goes over the board, presses, wipes lane by lane, and goes away."""
-        board = self.seen.poses["board"]
-        path = lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
-        arm = self._arm()
-        yield from arm.go(board @ Pose((*path[0], OVER_M), FACING), 2.0)
-        self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
-        self.switch("kuka_lwr", start=("wipe",))
-        yield from self._press()
+        board, path = self.seen.poses["board"], lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
+        arm = yield from self._press(*path[0])
         for x, y in path:
             self.put("kuka_lwr/wipe/target", board @ Pose((x, y, 0.0), FACING))
             yield
             self._wipe(board.inverse() @ arm.pose())
         self.switch("kuka_lwr", stop=("wipe",))
         yield
-        arm = self._arm()
+        arm = LedArm(self, *ARM)
         yield from arm.go(arm.target @ Pose((0.0, 0.0, -OVER_M)), 1.0)
+
+    def beside(self) -> Iterator[None]:
+        """Presses the sponge onto the corner where lanes begin, and notes how a policy moves it from then on."""
+        arm = yield from self._press(*lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02)[0].tolist())
+        while True:
+            yield
+            self._wipe(self.seen.poses["board"].inverse() @ arm.pose())
 
     def has_succeeded(self) -> bool:
         """Returns whether the force was held along the way, and the stains are gone."""
@@ -104,23 +107,23 @@ class Wiping(Scene):
             "coverage [%]": 100.0 * float(self.covered.mean()),
         }
 
-    def _arm(self) -> LedArm:
-        """Returns the arm as it stands now."""
-        return LedArm(self, "kuka_lwr", URDF, "lwr_arm_0_link", "end_effector_sponge", BASE)
-
-    def _press(self) -> Iterator[None]:
-        """Waits until the sponge presses."""
+    def _press(self, x: float, y: float) -> Generator[None, None, LedArm]:
+        """Goes over a place of the board [m], and presses there; returns the arm."""
+        board, arm = self.seen.poses["board"], LedArm(self, *ARM)
+        yield from arm.go(board @ Pose((x, y, OVER_M), FACING), 2.0)
+        self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
+        self.switch("kuka_lwr", start=("wipe",))
         end_s = self.seen.time_s + PATIENCE_S
         while not self._is_held(self._normal_force()):
             if self.seen.time_s > end_s:
                 raise SceneFailedError(f"expected to press with {self.force:.1f} N, got {self._normal_force():.1f} N")
             yield
         yield from self.wait(0.3)
+        return arm
 
     def _wipe(self, sponge: Pose) -> None:
         """Notes where the sponge is on the board and how it presses; what is wholly under it then vanishes."""
-        x, y, _ = rotated(sponge.quat_xyzw, (1.0, 0.0, 0.0))
-        stamp, force = Stamp(*sponge.position[:2], math.atan2(y, x)), self._normal_force()
+        stamp, force = Stamp.of(sponge), self._normal_force()
         self.stamps.append(stamp)
         self.forces.append(force)
         if self._is_held(force):
@@ -140,10 +143,7 @@ class Wiping(Scene):
 
     def _held(self) -> float:
         """Returns the share of the way along which the force was held."""
-        if len(self.stamps) < 2:
-            return 0.0
-        is_held = [self._is_held(force) for force in self.forces]
-        return float(np.average(is_held[1:], weights=np.diff(ways_along(self.stamps))))
+        return share_of_way(self.stamps, [self._is_held(force) for force in self.forces])
 
     def _gone(self) -> float:
         """Returns the share of the stains that are gone."""

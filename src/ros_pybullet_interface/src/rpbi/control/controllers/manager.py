@@ -136,6 +136,14 @@ class ControllerManager:
         """
         return self._named(name).controller
 
+    def is_active(self, name: str) -> bool:
+        """Returns whether a controller drives its joints.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        return self._named(name).active
+
     def check_switch(self, switch: ControllerSwitch) -> None:
         """Checks that controllers can be started and stopped.
 

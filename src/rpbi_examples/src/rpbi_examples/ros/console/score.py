@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +13,9 @@ from tqdm import tqdm
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import UnknownNameError
 from rpbi_examples.scenes import SCENES
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of a shell."""
 
 
 def score(
@@ -28,7 +32,7 @@ def score(
 
     It needs no ROS master. Success is judged by the state of the simulation. A seed leads to the same episode in any
     process, and in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed episodes are
-    in FOLDER/SCENE_failures.png; see docs/examples.md.
+    in FOLDER/SCENE_failures.png. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
 
     Usage:
         ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--jobs N]
@@ -48,22 +52,29 @@ def score(
     from rpbi_examples.scenes.score import run_seeds, summary, write_failures, write_json  # needs Gymnasium
 
     SCENES.find(scene)  # here, where what is missing is named
-    results = []
-    with tqdm(
-        total=len(numbers), unit=" episodes", leave=False, mininterval=0.1 if sys.stderr.isatty() else 10.0
-    ) as bar:
-        for each in run_seeds(scene, numbers, min(jobs or os.cpu_count() or 1, len(numbers))):
-            results.append(each)
-            bar.update()
+    results, code = [], 0
+    period_s = 0.1 if sys.stderr.isatty() else 10.0
+    try:
+        with (
+            tqdm(total=len(numbers), unit=" episodes", leave=False, mininterval=period_s) as bar,
+            closing(run_seeds(scene, numbers, min(jobs or os.cpu_count() or 1, len(numbers)))) as running,
+        ):
+            for each in running:
+                results.append(each)
+                bar.update()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    if not results:
+        return code
     found = summary(scene, results)
     _print(found["rows"])
-    print(f"{scene}: {found['success']} of {found['of']}")
+    print(f"{scene}: {found['success']} of {found['of']}", *[f"({len(results)} of {len(numbers)} seeds)"] * (code > 0))
     if json:
         write_json(json, found)
     pictures = out / f"{scene.replace(':', '.')}_failures.png"
     if line := write_failures(pictures, results):
         print(line)
-    return 0
+    return code
 
 
 def _numbers(text: str) -> range:
@@ -80,8 +91,8 @@ def _numbers(text: str) -> range:
 def _print(rows: list[dict[str, Any]]) -> None:
     """Prints the rows as a table, without hashes."""
     hidden = {"reason", "state_hash", "success", "done", "of"}
-    names = [name for name in rows[0] if name not in hidden]
-    lines = [[*(f"{row[name]:g}" for name in names), _verdict(row)] for row in rows]
+    names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in hidden]
+    lines = [[*(f"{row[name]:g}" if name in row else "-" for name in names), _verdict(row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(names, *(line[:-1] for line in lines))]
     for line in [[*names, "result"], *lines]:
         print("  ".join(f"{each:>{width}}" for each, width in zip(line, widths)) + f"  {line[-1]}")

@@ -8,11 +8,12 @@ import numpy as np
 import rospy
 from pydantic import Field
 
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Text
 from rpbi_examples.scenes import SCENES
-from rpbi_examples.scenes.scene import SceneResult, run_scene
+from rpbi_examples.scenes.scene import SceneResult, broken_off, run_scene
 
 from .stage import SimulatorStage
 
@@ -37,7 +38,10 @@ def _run() -> None:
         scene = kind(np.random.default_rng(seed))
         rospy.loginfo("seed %d", seed)
         stage.begin(scene)
-        result = run_scene(scene, stage)
+        try:
+            result = run_scene(scene, stage)
+        except InterfaceError as error:  # the reset of the next episode may mend its cause
+            result = broken_off(scene, error)
         succeeded += result.success
         _report(seed, result, stage)
         if number == config.episodes:

@@ -53,7 +53,7 @@ class SimulatorStage(Stage):
     """Steps the simulator, and waits for what the scene sees of it.
 
     Since the world waits for the scene, an episode goes as that of the same seed in another process, however slow the
-    computer is.
+    computer is. When ROS shuts down, all methods raise a ROSInterruptException.
 
     Args:
         watch: What scenes see.
@@ -110,13 +110,13 @@ class SimulatorStage(Stage):
         try:
             found = self._listener.wait_for_tick(answer.stamp, PATIENCE_S)
         except TimeoutError as error:
+            _raise_if_shut_down()
             raise InterfaceError(str(error)) from None
         self._scene.look(self._seen(answer.tick * self._dt_s, found))
         if self._factor:
             self._due_s = max(self._due_s + self._ticks * self._dt_s / self._factor, time.monotonic() - LATE_S)
             time.sleep(max(0.0, self._due_s - time.monotonic()))
-        if rospy.is_shutdown():
-            raise rospy.ROSInterruptException("ROS shuts down")
+        _raise_if_shut_down()
 
     def reached_factor(self) -> float:
         """Returns the simulated seconds a second of this episode."""
@@ -136,6 +136,7 @@ class SimulatorStage(Stage):
             self._services[name] = get_srv_handler(name, kind, persistent=True)
         answer = self._services[name](*arguments)
         if not answer.success:
+            _raise_if_shut_down()
             raise InterfaceError(f"{name}: {answer.message}")
         return answer
 
@@ -167,6 +168,11 @@ class SimulatorStage(Stage):
                 raise InterfaceError(f"no TF of the camera from '{WORLD}' to '{frame}' within {PATIENCE_S:g} s")
             self._cameras[frame] = _pose(as_pose(message.transform))
         return self._cameras[frame]
+
+
+def _raise_if_shut_down() -> None:
+    if rospy.is_shutdown():
+        raise rospy.ROSInterruptException("ROS shuts down")
 
 
 def _input(deed: Put) -> PlannedInput:

@@ -52,6 +52,11 @@ def is_in_box(part: str, position: Vector) -> bool:
     return abs(x - PARTS[part].x_m) < HALF_X_M and abs(y) < HALF_Y_M and FLOOR_Z_M < z < RIM_Z_M
 
 
+def missing(poses: Mapping[str, Pose]) -> list[str]:
+    """Returns the parts that are not in the compartment of their kind, by where all of them are in the world."""
+    return [part for part in PARTS if not is_in_box(part, poses[part].position)]
+
+
 def grasp_yaw(kind: Kind, yaw: float, wanted: float) -> float:
     """Returns the yaw of a hand that grasps a part at a yaw, of those that do the nearest to a wanted one [rad]."""
     return yaw + kind.turn * round((wanted - yaw) / kind.turn) if kind.turn else wanted

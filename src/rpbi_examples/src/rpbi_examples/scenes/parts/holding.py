@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
+from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose, Vector, minus, norm, plus
 from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
-from .arm import LedArm, between, smooth
+from .arm import LedArm, about_z, between, smooth
 
 CYCLE_S = 0.02
 """Time of a cycle [s]."""
@@ -17,6 +18,9 @@ STILL_S = 0.5
 """Time after which something is still that has not moved [s]."""
 FINGER, FINGER_LINKS = "panda_finger_joint1", {"panda_leftfinger", "panda_rightfinger"}
 """The finger of a Panda that the other one mimics, which opens from 0 on; and the links of both."""
+APPROACH = Pose(quat_xyzw=(0.0, math.sin(math.radians(-55.0)), 0.0, math.cos(math.radians(-55.0))))
+BEFORE = Pose((0.0, 0.0, -0.14))
+"""The gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, seen from there."""
 FINGER_SPEED, PRESS_S = 0.04, 0.3
 """Speed of each finger [m/s], and for how long the fingers press before they are taken to hold."""
 
@@ -50,6 +54,17 @@ class Holders:
         if len(names) == 1:
             (name,) = names
             self.alone_s[name] = max(self.alone_s.get(name, 0.0), self.has_lasted_s())
+
+    def watch(self, act: Iterator[None], hands: Collection[str]) -> Iterator[None]:
+        """Goes on with an act while nothing but hands has touched the thing.
+
+        Raises:
+            SceneFailedError: If something else touches it.
+        """
+        for _ in act:
+            if not self.all_names <= set(hands):
+                raise SceneFailedError(f"the {self._thing} has fallen")
+            yield
 
     def has_lasted_s(self) -> float:
         """Returns for how long the same bodies have touched it [s]."""
@@ -143,6 +158,11 @@ class PandaArm(LedArm):
 def above(place: Vector, height_m: float) -> Vector:
     """Returns the place that is higher by a height [m]."""
     return plus(place, (0.0, 0.0, height_m))
+
+
+def upright_grasp(thing: Pose, height_m: float) -> Pose:
+    """Returns a gripper at a height above the origin of a thing that stands [m], from where its x axis points."""
+    return Pose(above(thing.position, height_m), about_z(yaw_of(thing.quat_xyzw))) @ APPROACH
 
 
 def yaw_to(place: Vector, goal: Pose) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+from robot_model.geometry import Pose, rotated
 
 
 class Stamp(NamedTuple):
@@ -20,6 +23,12 @@ class Stamp(NamedTuple):
     x: float
     y: float
     yaw: float
+
+    @classmethod
+    def of(cls, tool: Pose) -> Stamp:
+        """Returns the stamp of a tool whose pose is in the frame of the plane."""
+        x, y, _ = rotated(tool.quat_xyzw, (1.0, 0.0, 0.0))
+        return cls(*tool.position[:2], math.atan2(y, x))
 
     def covers(self, points: np.ndarray, half: tuple[float, float]) -> np.ndarray:
         """Returns whether points of the plane are under a tool of half the extents `half` [m].
@@ -84,3 +93,13 @@ def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
     """
     steps = np.linalg.norm(np.diff(np.array(places)[:, :2], axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def share_of_way(places: Sequence[Sequence[float]], holds: Sequence[bool]) -> float:
+    """Returns the share of the way along which something holds, by whether it does at the end of each step.
+
+    Args:
+        places: x and y [m] of each come first.
+        holds: For each place.
+    """
+    return float(np.average(holds[1:], weights=np.diff(ways_along(places)))) if len(places) > 1 else 0.0
