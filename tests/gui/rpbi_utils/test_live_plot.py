@@ -78,7 +78,9 @@ class _Window:
         """Returns the file that a key saves."""
         before = set(self.folder.glob(f"live_plot*.{suffix}"))
         self.screen.run("xdotool", "key", key)
-        return wait_until(lambda: set(self.folder.glob(f"live_plot*.{suffix}")) - before, f"a {suffix} file is there").pop()
+        return wait_until(
+            lambda: set(self.folder.glob(f"live_plot*.{suffix}")) - before, f"a {suffix} file is there"
+        ).pop()
 
     def data(self) -> dict[str, pd.Series]:
         """Returns the lines that the window saves, by name."""

@@ -13,7 +13,9 @@ from rpbi_mpc.msg import MpcStatus
 
 
 def test_the_arm_brings_the_box_to_its_mark(ros):
-    launched = ros.start(["roslaunch", "rpbi_examples", "sampling_mpc.launch", "headless:=true", "start_on_init:=false"])
+    launched = ros.start(
+        ["roslaunch", "rpbi_examples", "sampling_mpc.launch", "headless:=true", "start_on_init:=false"]
+    )
     status, frames = ros.listen("mpc/status", MpcStatus), ros.listen_to_tf()
     assert ros.call("mpc/step", Trigger).message == "cycle 0: solved"
 

@@ -171,7 +171,7 @@ class SimulatorStage(Stage):
 
 
 def _raise_if_shut_down() -> None:
-    if rospy.is_shutdown():
+    if rospy.core.is_shutdown_requested():
         raise rospy.ROSInterruptException("ROS shuts down")
 
 
