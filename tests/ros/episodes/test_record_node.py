@@ -244,7 +244,7 @@ def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_p
 
     _answer(session.call("start"))
     wait_until(lambda: session.has_recorded(2), "messages come")
-    (folder.part_of(2) / ".episode.part.yaml").mkdir()  # the node cannot write there any more, its recorder can
+    (folder.part_of(2) / ".episode.yaml.part").touch()  # the node cannot write there any more, its recorder can
     wait_until(lambda: not session.now()["recording"], "the episode is ended")
     assert topic_report(folder.part_of(2) / "episode.bag")["messages"].sum() > 100
     assert (folder.numbers(), folder.partial()) == ([0, 1], [folder.part_of(2)])

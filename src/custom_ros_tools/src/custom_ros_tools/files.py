@@ -1,5 +1,6 @@
 """Files that are whole whenever they have their name."""
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,14 +8,15 @@ from pathlib import Path
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Yields a path beside a file to write to, with the same ending.
+    """Yields a path of the same name to write to, in a hidden folder beside the file; `*.csv` does not match it.
 
-    What is written there gets the name of the file at the end of the context, in place of the former one. If the
-    context fails, it is removed, and the former file stays as it was.
+    What is written there becomes the file at the end of the context, in place of the former one. If the context fails,
+    it is removed, and the former file stays as it was.
     """
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    folder = path.with_name(f".{path.name}.part")
+    folder.mkdir(exist_ok=True)
     try:
-        yield part
-        part.replace(path)
+        yield folder / path.name
+        (folder / path.name).replace(path)
     finally:
-        part.unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
