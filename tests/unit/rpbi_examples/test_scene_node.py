@@ -67,7 +67,7 @@ def test_a_shutdown_while_the_world_is_asked_or_waited_for_is_no_error(monkeypat
     stage = object.__new__(SimulatorStage)
     stage._ticks, stage._services, stage._listener, stage._scene = 1, {"rpbi/reset": lambda: Answer}, stage, object()
     stage.wait_for_tick, stage._step = wait_for_tick, lambda ticks: Answer
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: is_shutdown)
+    monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: is_shutdown)
     expected = rospy.ROSInterruptException if is_shutdown else InterfaceError
     with pytest.raises(expected):
         stage.cycle()

@@ -127,7 +127,8 @@ def _assets() -> Path:
     folders = (Path(entry) / "cmeel.prefix" / "share" / ASSETS for entry in sys.path)
     found = next((folder for folder in folders if folder.is_dir()), None)
     if found is None:
-        raise ValueError(str(MissingDependency(ASSETS, "./rpbi setup assets")))
+        missing = MissingDependency(ASSETS, "./rpbi setup assets")
+        raise ValueError(str(missing)) from missing
     return found
 
 
