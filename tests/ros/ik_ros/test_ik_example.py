@@ -40,7 +40,8 @@ def poses(listener, frame):
 def test_arm_tracks_the_figure(ros, solver):
     moving, still = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
     real = RealRobot(ros) if solver == LEADING else None
-    arguments = (f"ik:={solver}", "headless:=true", f"real_robot:={real is not None}")
+    rate = "ik_hz:=50" if real is None else "ik_hz:=100"  # the driver of the real robot wants a smooth motion
+    arguments = (f"ik:={solver}", rate, "headless:=true", f"real_robot:={real is not None}")
     process = ros.start(["roslaunch", "rpbi_examples", "kuka_lwr_ik_example.launch", *arguments])
 
     def places():

@@ -43,7 +43,6 @@ def _pose(transform):
 def test_ball_flies_boxes_come_and_go_and_the_camera_sees_the_ball_where_tf_has_it(example):
     name, system = example
     moving = system.listen("/tf", TFMessage)
-    colour = system.listen("/rpbi/camera/colour/image", Image)
     box_heights = lambda: [pose.position[2] for pose in poses(moving, "rpbi/box").values()]  # noqa: E731
     wait_until(lambda: len(box_heights()) > 10, "a box is there", SLOW_S)
     wait_until(lambda: max(box_heights()) > 1.05 and min(box_heights()) < 0.3, "it was thrown up and fell", SLOW_S)
@@ -56,7 +55,7 @@ def test_ball_flies_boxes_come_and_go_and_the_camera_sees_the_ball_where_tf_has_
     wait_until(came_again, "another one came", SLOW_S)
     wait_until(lambda: np.ptp([pose.position[1] for pose in poses(moving, "rpbi/figure_eight").values()]) > 0.7,
                "the frame has flown from end to end", SLOW_S)  # fmt: skip
-    assert colour.wait_for(1)[0].width == 640
+    assert system.listen("/rpbi/camera/colour/image", Image).wait_for(1)[0].width == 640
     if name == "pybullet_rgbd_example":
         _see_cyan_ball(system, moving)
 

@@ -15,6 +15,7 @@ import tf2_ros
 from cob_srvs.srv import SetString
 from geometry_msgs.msg import WrenchStamped
 from node_world import publishing
+from real_robot import RealRobot
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -104,8 +105,9 @@ def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ro
     wait_until(met, "targets that cross the arms are not safe")
 
 
-def test_panda_works_the_ros_way(ros, position):
-    launch(ros, "basic_example_panda", move="false")
+def test_panda_works_the_ros_way_and_leads_a_real_one(ros, position):
+    real = RealRobot(ros)
+    launch(ros, "basic_example_panda", move="false", real_robot="true")
     wait_until(lambda: position("rpbi/panda/panda_hand"), "robot_state_publisher tells where the hand is")
     wrenches = ros.listen("/rpbi/panda/panda_joint8/ft_sensor", WrenchStamped)
     weight = 9.81 * (0.81 + 2 * 0.1)  # hand and fingers in PyBullet's URDF
@@ -127,6 +129,7 @@ def test_panda_works_the_ros_way(ros, position):
             lambda: abs(dict(zip(states.messages[-1].name, states.messages[-1].position))["panda_joint1"] - 0.4) < 0.01,
             "it follows a trajectory",
         )
+        real.wait_until_moved()
 
 
 @pytest.mark.parametrize("robot", ["kinova", "talos", "nextage", "human"])

@@ -9,22 +9,12 @@ import pytest
 from apriltag_ros.msg import AprilTagDetectionArray
 from geometry_msgs.msg import TransformStamped
 from node_world import Rosout
-from ros_system import RosSystem, wait_until
+from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
 SLOW_S = 120.0
 CARRIED_Z = 0.3
 """Height at which the box is carried [m]."""
-
-
-@pytest.fixture(scope="module")
-def example(ros_master, tmp_path_factory):
-    system = RosSystem(tmp_path_factory.mktemp("tracking"))
-    try:
-        system.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true"])
-        yield system
-    finally:
-        system.close()
 
 
 def frames(tf, parent, child, since_s=0.0):
@@ -38,10 +28,11 @@ def frames(tf, parent, child, since_s=0.0):
 
 
 @pytest.mark.quick
-def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not(example):
-    tf = example.listen("/tf", TFMessage)
-    vicon = example.listen("/lab/vicon/box/box", TransformStamped)
-    rosout = Rosout(example)
+def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not(ros):
+    ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true"])
+    tf = ros.listen("/tf", TFMessage)
+    vicon = ros.listen("/lab/vicon/box/box", TransformStamped)
+    rosout = Rosout(ros)
 
     def twins():
         return frames(tf, "twin/rpbi/world", "twin/rpbi/box")

@@ -196,6 +196,7 @@ def run_script(command: list[str]) -> None:
     """Runs a script with its arguments as if Python had just been started with it."""
     sys.argv[:] = command
     sys.path[0] = os.path.dirname(command[0])
+    sys.path[1:1] = [each for each in os.environ["PYTHONPATH"].split(os.pathsep) if each and each not in sys.path]
     importlib.reload(sys.modules["rospy.names"])  # it takes namespace and remappings from argv when it is imported
     runpy.run_path(command[0], run_name="__main__")
 

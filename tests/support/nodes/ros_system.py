@@ -29,7 +29,7 @@ from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.srv import ListObjects
 
 MODULES = os.environ.get("PYTHONPATH")
-"""Where all programs find Python modules; those of a test that adds to it are no forks."""
+"""Where all programs find Python modules; those of a test that adds to it, but for `support_on_path`, are no forks."""
 READ_LATE = {"DISPLAY", "LIBGL_ALWAYS_SOFTWARE", "SPNAV_SOCKET"}
 """Variables that no module reads when it is imported."""
 SUPPORT = Path(__file__).resolve().parents[1]
@@ -197,11 +197,14 @@ class RosSystem:
             log: Name of the file of its output.
             fresh: Whether our nodes, and those that roslaunch starts, are new processes with all their imports, and
                 not forks.
-            environment: Variables of its own; with any but those of a screen, or another PYTHONPATH, it is fresh too.
+            environment: Variables of its own; with any but those of a screen, or another PYTHONPATH than that of
+                `support_on_path`, it is fresh too.
         """
         is_launch = command[0] == "roslaunch" or [*command[:2]] == [RPBI, "launch"]
         is_ours = is_launch or command[0] == "rosrun" and command[1] in PACKAGES
-        forks = is_ours and not fresh and environment.keys() <= READ_LATE and os.environ.get("PYTHONPATH") == MODULES
+        modules = environment.get("PYTHONPATH", os.environ.get("PYTHONPATH"))
+        is_known = modules in (MODULES, support_on_path(MODULES)["PYTHONPATH"])
+        forks = is_ours and not fresh and is_known and environment.keys() <= {*READ_LATE, "PYTHONPATH"}
         if command[0] == "rosrun":
             command = [find_executable(command[1], command[2]), *command[3:]]
         elif forks:

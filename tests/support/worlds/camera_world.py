@@ -12,7 +12,7 @@ import numpy.typing as npt
 import rospy
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
-from worlds import FLOOR, box
+from worlds import FLOOR, box, iiwa
 
 CAMERA = {
     "name": "eye",
@@ -21,6 +21,7 @@ CAMERA = {
     "object_tf": {"tf_id": "rpbi/eye"},
 }
 HEIGHT_M = 2.0
+COLOUR, DEPTH, SEGMENTATION = (f"/rpbi/camera/{suffix}" for suffix in ("colour/image", "depth/image", "segmentation"))
 
 
 def box_world(ros: Any, **more: Any) -> dict[str, Any]:
@@ -35,6 +36,14 @@ def box_world(ros: Any, **more: Any) -> dict[str, Any]:
         "dynamic_objects": [ros.write_yaml("box.yaml", red)],
         **more,
     }
+
+
+def arm_world(ros: Any, **more: Any) -> dict[str, Any]:
+    """Returns the main configuration of a box on a floor beside an arm, seen by a camera."""
+    load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.8, 0.0, 0.0]}
+    robots = [ros.write_yaml("iiwa.yaml", iiwa(loadURDF=load))]
+    arm_and_camera = {"setAdditionalSearchPath": "pybullet_data_path", "robots": robots, "rgbd_sensor": CAMERA}
+    return box_world(ros, **{**arm_and_camera, **more})
 
 
 @contextmanager
@@ -59,6 +68,11 @@ def renderers(simulator: subprocess.Popen) -> list[int]:
     """Returns the process ids of all renderers that a simulator has."""
     found = subprocess.run(["pgrep", "-g", str(simulator.pid), "-f", "rpbi.render"], capture_output=True, text=True)
     return [int(line) for line in found.stdout.split()]
+
+
+def pixels(message: Any, dtype: npt.DTypeLike, channels: int = 1) -> npt.NDArray[Any]:
+    """Returns the pixels of an image, shape (height, width) or (height, width, channels)."""
+    return np.frombuffer(message.data, dtype).reshape(message.height, message.width, channels).squeeze()
 
 
 def points_of(cloud: Any) -> npt.NDArray[np.float32]:

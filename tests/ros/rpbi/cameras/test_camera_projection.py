@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from robot_shape import link_triangles, moved, pose_matrix
-from ros_system import wait_until
+from ros_system import stop_group, wait_until
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from tf2_msgs.msg import TFMessage
 
@@ -66,18 +66,18 @@ class Frame:
 
 @pytest.fixture(scope="module")
 def listeners(module_ros):
-    """What comes from the example, its arm moving; by topic."""
+    """What will come from the example, by topic."""
     listeners = {topic: module_ros.listen(f"/rpbi/camera/{topic}", kind) for topic, kind in TOPICS.items()}
     listeners["tf"], listeners["tf_static"] = (module_ros.listen(f"/{name}", TFMessage) for name in ("tf", "tf_static"))
     listeners["joints"] = module_ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
-    arguments = ["headless:=true", "swing:=true"]  # a hand that pushes the box would be behind it
-    module_ros.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", *arguments])
     return listeners
 
 
 @pytest.fixture(scope="module")
-def frames(listeners):
-    """Frames for which TF has the links at the very stamp, the arm moving from each to the next."""
+def seen(module_ros, listeners):
+    """Frames for which TF has the links at the very stamp, the arm moving from each to the next; and the arm's id."""
+    arguments = ["headless:=true", "swing:=true"]  # a hand that pushes the box would be behind it
+    example = module_ros.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", *arguments])
 
     def with_links():
         """Returns the messages about the links by stamp [ns]; others tell of other bodies."""
@@ -104,19 +104,27 @@ def frames(listeners):
     stamps = wait_until(chosen, "there are enough frames")
     by_stamp = {topic: dict(zip(listeners[topic].stamps_ns, listeners[topic].messages)) for topic in TOPICS}
     links = with_links()
-    return [
+    frames = [
         Frame(
             {topic: messages[stamp] for topic, messages in by_stamp.items()},
             {one.child_frame_id: pose_matrix(one.transform) for one in [*still(), *links[stamp].transforms]},
         )
         for stamp in stamps[:FRAMES]
     ]
+    arm_id = module_ros.call("/rpbi/kuka_lwr/robot_info", RobotInfo).bodyUniqueId
+    stop_group(example)  # which would draw on for its listeners
+    return frames, arm_id
 
 
 @pytest.fixture(scope="module")
-def arm_id(module_ros, frames):
+def frames(seen):
+    return seen[0]
+
+
+@pytest.fixture(scope="module")
+def arm_id(seen):
     """The arm's id in PyBullet."""
-    return module_ros.call("/rpbi/kuka_lwr/robot_info", RobotInfo).bodyUniqueId
+    return seen[1]
 
 
 def surface(triangles, count, generator):
@@ -188,6 +196,6 @@ def test_segmentation_has_the_arm_nowhere_else(frames, arm_id):
         near = np.isfinite(nearest_depth(frame, generator))
         for axis in (0, 1):
             near = near | np.roll(near, 1, axis) | np.roll(near, -1, axis)
-        seen = frame.body_ids == arm_id
-        assert seen.sum() > 1000
-        assert (seen & ~near).sum() < 0.01 * seen.sum()
+        of_arm = frame.body_ids == arm_id
+        assert of_arm.sum() > 1000
+        assert (of_arm & ~near).sum() < 0.01 * of_arm.sum()

@@ -38,7 +38,7 @@ def both(ros_of_module: RosSystem, tmp_path_factory: pytest.TempPathFactory) -> 
     """Has the master on the first computer, and on the second a simulator with simulated time."""
     computers = TwoComputers(ros_of_module)
     try:
-        world = write_world(tmp_path_factory.mktemp("world"), robots=(iiwa(),))
+        world = write_world(tmp_path_factory.mktemp("world"), robots=(iiwa(),), timeStep=0.005)
         sim_time = ("rosparam", "set", "/use_sim_time", "true")
         wait_until(lambda: not computers.on(computers.first, *sim_time), "the master answers", every_s=0.2)
         node = ("rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py")

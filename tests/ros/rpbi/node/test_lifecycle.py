@@ -15,7 +15,7 @@ import yaml
 from camera_world import renderers
 from cob_srvs.srv import SetString
 from node_world import Rosout, add, main_config, registrations, remove
-from ros_system import wait_until
+from ros_system import support_on_path, wait_until
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 from worlds import FLOOR, ball, iiwa
@@ -24,7 +24,6 @@ from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 
 NODE = "/ros_pybullet_interface"
-SUPPORT = str(Path(__file__).resolve().parents[3] / "support/plugins")
 ENDS_WITHIN_S = 60.0  # it takes less than 2 s; a busy machine must not fail the test
 CAMERA = {"name": "camera", "object_tf": {"tf_id": "camera"}, "intrinsics": {"width": 64, "height": 48}}
 STATES = {
@@ -172,7 +171,7 @@ def test_services_that_wait_when_it_ends_get_an_answer_or_an_error(ros, tmp_path
 def test_a_world_that_breaks_stands_still_and_says_so_once(ros, tmp_path):
     rosout = Rosout(ros)
     config = _config(tmp_path, start_pybullet_after_initialization=False, trusted_packages=["faulty_lab"])
-    process = ros.simulator(config, PYTHONPATH=os.pathsep.join((SUPPORT, os.environ["PYTHONPATH"])))
+    process = ros.simulator(config, **support_on_path())
     status = ros.listen("/rpbi/status", Int64)
     fast = ball("fast", basePosition=[0.0, 0.0, 50.0], broadcast_hz=1000, type="faulty_lab:Runaway")
     assert add(ros, PybulletObject.DYNAMIC, fast).success

@@ -53,13 +53,22 @@ def workspace(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def lab(ros, workspace):
-    """The launch file of the package, up and running."""
+@pytest.fixture(scope="module")
+def launched(module_ros, workspace):
+    """The launch file of the package, up and running, for the tests of what it has."""
     rospy.set_param("/use_sim_time", True)
-    process = ros.start(_in_workspace(workspace, f"exec roslaunch {NAME} lab.launch"))
-    wait_until(lambda: objects(ros), "the simulator is up")
+    process = module_ros.start(_in_workspace(workspace, f"exec roslaunch {NAME} lab.launch"))
+    wait_until(lambda: objects(module_ros), "the simulator is up")
     return process
+
+
+@pytest.fixture
+def lab(ros, launched):
+    """The same, as it was at its start, and running."""
+    rospy.set_param("/use_sim_time", True)
+    _stand_at_the_start(ros)
+    assert ros.call("/rpbi/start", Trigger).success
+    return launched
 
 
 def _stand_at_the_start(ros):
