@@ -319,6 +319,28 @@ def test_a_frozen_clock_stops_neither_start_nor_end(ros: Any, tmp_path: Path) ->
     assert list(tables["/clock"]["clock"]) == [5.0]
 
 
+def test_no_message_of_a_fast_clock_is_missed_while_the_recorder_comes_up(ros: Any, tmp_path: Path) -> None:
+    """Its connection is there before those of fifty topics; all that is sent to it is counted by the publisher."""
+    rospy.set_param("/use_sim_time", True)
+    clock = rospy.Publisher("/clock", Clock, queue_size=1000)
+    is_over = threading.Event()
+
+    def run() -> None:
+        tick = 0
+        while not is_over.wait(5e-4):
+            tick += 1
+            clock.publish(rospy.Time(1, 1000 * tick))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    with Recorder(tmp_path / "a.bag", [*(f"/a_{number}" for number in range(50)), "/clock"]) as recorder:
+        is_over.set()
+        thread.join()
+        sent = wait_until(lambda: recorder.published().get("/clock"), "its publisher answers")
+    clock.unregister()
+    assert sent > 0 and len(bag_to_dataframes(recorder.path)["/clock"]) == sent
+
+
 def test_a_publisher_that_hangs_is_named_and_the_others_are_recorded(
     ros: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, stopped: Callable[[str], str]
 ) -> None:

@@ -7,14 +7,13 @@ when it gets no processor time for a while.
 from __future__ import annotations
 
 import argparse
-import io
 import queue
 import shutil
 import signal
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,12 +22,14 @@ from typing import Any, NamedTuple
 import genpy
 import rosbag
 import rospy
+from rosgraph_msgs.msg import Clock
 
 from .recorder import NOT_RECORDING
 
 _POLL_S = 0.1
 _FLUSH_S = 0.2
 """Time between two writes of the open chunk, which a recorder that is killed would lose [s]."""
+_CLOCK = "/clock"
 _HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
 
 
@@ -37,11 +38,13 @@ class _Arrival(NamedTuple):
 
     topic: str
     time: genpy.Time
-    message: genpy.Message
+    message: rospy.AnyMsg
 
 
 class BagWriter:
     """Writes topics to a bag until `end`, compressed by LZ4; the bag is `NAME.bag.active` until it is closed.
+
+    It keeps the time itself, in a node with `disable_rostime`: rospy would subscribe to /clock before the bag is there.
 
     Args:
         path: The bag.
@@ -53,6 +56,8 @@ class BagWriter:
         self._arrivals: queue.SimpleQueue[_Arrival] = queue.SimpleQueue()
         self._connections: dict[tuple[str, ...], Any] = {}
         self._is_ended = threading.Event()
+        self._is_time_simulated = False
+        self._simulated_time = genpy.Time()
 
     def end(self) -> None:
         """Has `run` write what has arrived, close the bag, and return."""
@@ -65,9 +70,13 @@ class BagWriter:
             OSError: If the bag cannot be written, or there is too little space.
         """
         self._require_space()
-        for topic in topics:
-            rospy.Subscriber(topic, rospy.AnyMsg, partial(self._on_message, topic), queue_size=None, tcp_nodelay=True)
-        while not rospy.get_rostime():
+        self._is_time_simulated = bool(rospy.get_param("/use_sim_time", False))
+        callbacks = {topic: partial(self._on_message, topic) for topic in topics}
+        if self._is_time_simulated:
+            callbacks[_CLOCK] = partial(self._on_clock, callbacks.get(_CLOCK))
+        for topic, callback in callbacks.items():
+            rospy.Subscriber(topic, rospy.AnyMsg, callback, queue_size=None, tcp_nodelay=True)
+        while not self._now():
             if self._is_ended.wait(_POLL_S):
                 return
         active = self._path.with_name(f"{self._path.name}.active")
@@ -93,7 +102,7 @@ class BagWriter:
                 bag.flush()
                 self._require_space()
         for each in untimed:
-            self._write(bag, each, rospy.get_rostime())
+            self._write(bag, each, self._now())
 
     def _write(self, bag: rosbag.Bag, arrival: _Arrival, at: genpy.Time) -> None:
         """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
@@ -106,29 +115,30 @@ class BagWriter:
         described = {"topic": arrival.topic, **{each: header[each] for each in _HEADER if each in header}}
         raw = (
             header["type"],
-            _serialized(arrival.message),
+            bytes(arrival.message._buff),
             header["md5sum"],
             SimpleNamespace(_md5sum=header["md5sum"]),
         )
         bag.write(arrival.topic, raw, at, raw=True, connection_header=described)
         self._connections[key] = known[arrival.topic]
 
-    def _on_message(self, topic: str, message: genpy.Message) -> None:
-        self._arrivals.put(_Arrival(topic, rospy.get_rostime(), message))
+    def _now(self) -> genpy.Time:
+        """Returns ROS time; it is zero before the first /clock."""
+        return self._simulated_time if self._is_time_simulated else rospy.Time.from_sec(time.time())
+
+    def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:
+        self._arrivals.put(_Arrival(topic, self._now(), message))
+
+    def _on_clock(self, record: Callable[[rospy.AnyMsg], None] | None, message: rospy.AnyMsg) -> None:
+        if message._connection_header["type"] == Clock._type:
+            self._simulated_time = Clock().deserialize(message._buff).clock
+        if record is not None:
+            record(message)
 
     def _require_space(self) -> None:
         free_mb = shutil.disk_usage(self._path.parent).free / 1e6
         if free_mb < self._min_space_mb:
             raise OSError(f"expected at least {self._min_space_mb:g} MB of free space, got {free_mb:.0f} MB")
-
-
-def _serialized(message: genpy.Message) -> bytes:
-    """Returns a message as it was sent; rospy itself subscribes to /clock, which therefore comes as a message."""
-    if isinstance(message, rospy.AnyMsg):
-        return bytes(message._buff)
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
 
 
 def main(words: Sequence[str]) -> int:
@@ -142,7 +152,7 @@ def main(words: Sequence[str]) -> int:
     writer = BagWriter(options.path, options.min_space_mb)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: writer.end())
-    rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True)
+    rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
     try:
         writer.run(options.topics)
     except OSError as error:
