@@ -14,7 +14,7 @@ from rpbi_mpc.pushing.planner import ProgramPlanner
 from rpbi_mpc.pushing.program import ProgramConfig
 from rpbi_mpc.pushing.sampling_planner import PushSamplingConfig, SamplingPlanner
 from rpbi_mpc.pushing.simulated import PushingWorld
-from rpbi_mpc.pushing.trials import Variation, pushing_world, run_trial, shove
+from rpbi_mpc.pushing.trials import HEIGHT, Variation, pushing_world, run_trial, shove
 
 LINE, S = PathConfig(shape="line", size=0.2), PathConfig(shape="s", size=0.2, angle=0.7)
 UNLIKE = Variation(
@@ -65,6 +65,22 @@ def test_a_shoved_box_comes_back():
     path = PathConfig(shape="line", size=0.35)
     trial = run_trial(PushingConfig(path=path), Variation(seed=902), shove_at_s=1.0, recovered_below=0.01)
     assert trial.errors.max() > 0.015 and trial.recovered_s < 5.0 and trial.finished
+
+
+def test_a_box_far_off_its_path_stops_the_loop():
+    """Pushing on would end elsewhere, and be called finished."""
+    config = PushingConfig(path=LINE)
+    world = pushing_world(Variation(), PushPath(LINE))
+    plant = PushingWorld(world)
+    plant.advance(0.05)
+    loop = LockStep(plant, PushingController(config))
+    assert loop.run(1.0)[-1].status == "solved"
+    x, y, _ = plant.slider_pose()
+    world.act("box", "teleport", {"position": [float(x), float(y) + 0.2, HEIGHT], "quat_xyzw": [0.0, 0.0, 0.0, 1.0]})
+    last = loop.run(1.0)[-1]
+    assert last.status == "stopped" and last.command is None
+    assert last.reason.endswith(" m off its path, max_off is 0.15 m")
+    world.close()
 
 
 def test_decisions_do_not_depend_on_the_speed_of_the_computer():

@@ -42,6 +42,7 @@ class Regulator(MpcController):
     """Plans to go to 0 with a time constant of 0.2 s; some plans fail."""
 
     measured_names, command_names, state_names = ("place",), ("velocity",), ("place",)
+    failure = ""
 
     def __init__(self, failing=(), wall_s=0.0, commands=4):
         self.failing, self.wall_s, self.count, self.commands = failing, wall_s, -1, commands
@@ -79,6 +80,19 @@ def test_last_plan_goes_on_and_then_the_loop_stops_and_says_why():
 def test_a_plan_that_fails_once_does_not_stop_it():
     cycles = LockStep(Cart(), Regulator(failing=(1, 3)), LoopConfig(delay_s=0.0)).run(0.2)
     assert [str(each.status) for each in cycles] == ["solved", "last plan", "solved", "last plan", "solved"]
+
+
+def test_a_task_that_has_failed_stops_it_until_it_begins_again():
+    plant, controller = Cart(), Regulator()
+    loop = LockStep(plant, controller, LoopConfig(delay_s=0.0))
+    assert loop.run(0.1)[-1].status == "solved"
+    controller.failure = "the cart is off the rails"
+    cycles = loop.run(1.0)
+    assert [(str(each.status), each.reason) for each in cycles] == [("stopped", "the cart is off the rails")]
+    assert cycles[0].command is None and plant.velocity == 0.0
+    controller.failure = ""
+    loop.restart()
+    assert loop.run(0.1)[-1].status == "solved"
 
 
 def test_without_a_measurement_it_stands_and_goes_on_with_the_next_one():

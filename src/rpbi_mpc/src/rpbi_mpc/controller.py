@@ -71,3 +71,8 @@ class MpcController(ABC):
     def is_finished(self) -> bool:
         """Whether the task is done; the loop then ends."""
         return False
+
+    @property
+    def failure(self) -> str:
+        """What keeps the task from being done, after which the loop stops; empty for nothing."""
+        return ""

@@ -163,6 +163,9 @@ class LockStep:
             return None, Status.WAITING, sensed.missing
         self._check("measurement", sensed.values, self.controller.measured_names)
         plan = self.controller.plan(sensed, self.config.delay_s)
+        self._stopped = self.controller.failure
+        if self._stopped:
+            return plan, Status.STOPPED, self._stopped
         if self.controller.is_finished:
             return plan, Status.FINISHED, "the task is done"
         fault = self._fault_of(plan)

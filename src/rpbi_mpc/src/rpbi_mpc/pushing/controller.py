@@ -45,11 +45,17 @@ class PushingController(MpcController):
         self._estimator.reset()
         self._planner.reset()
         self._settled_s = 0.0
+        self._off_m = 0.0
         self._pushes = False
 
     @property
     def is_finished(self) -> bool:
         return self._settled_s > self.config.settle_s
+
+    @property
+    def failure(self) -> str:
+        most_m = self.config.max_off
+        return f"the box is {self._off_m:.3g} m off its path, max_off is {most_m:g} m" if self._off_m > most_m else ""
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
         self._estimator.executed(time_s + self.config.lag_s, command)
@@ -61,6 +67,7 @@ class PushingController(MpcController):
         """
         assert sensed.values is not None
         scene = self._estimator.update(sensed, sensed.time_s + delay_s + self.config.lag_s)
+        self._off_m = self.path.distance(scene.slider[:2])
         gap, contact = gap_and_contact(scene, self.config.slider, self.config.radius)
         self._pushes = is_pushable(gap, contact, self.config.slider, self.config.approach, self._pushes)
         target = self.path.poses(self.path_time_s)[0]

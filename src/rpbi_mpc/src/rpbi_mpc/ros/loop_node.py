@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from collections import deque
 from pathlib import Path
 
 import rospy
@@ -16,6 +18,8 @@ from rpbi_mpc.records import write_records
 
 IDLE_S = 0.04
 """Time between two commands to a timed plant that stands [s]."""
+SLOW, SLOW_CYCLES, SLOW_EVERY_S = 1.2, 25, 10.0
+"""Cycles of a timed plant that take so many times their period on average over so many are warned of, so often [s]."""
 
 Answer = tuple[bool, str]
 
@@ -38,6 +42,7 @@ class LoopNode:
         self._status = rospy.Publisher("mpc/status", MpcStatus, queue_size=10, latch=True)
         self._changed = threading.Condition()
         self._running, self._steps, self._said = bool(rospy.get_param("~start_on_init", True)), 0, ""
+        self._cycles_s: deque[float] = deque(maxlen=SLOW_CYCLES)
         self._loop = LockStep(plant, controller, config, (self._show,))
         for name, action in (("start", self._start), ("stop", self._stop), ("step", self._step)):
             rospy.Service(f"mpc/{name}", Trigger, lambda _, action=action: TriggerResponse(*action()))
@@ -66,7 +71,10 @@ class LoopNode:
         """
         while not rospy.is_shutdown():
             if self._is_due():
+                start_s = time.monotonic()
                 cycle = self._loop.cycle()
+                self._cycles_s.append(time.monotonic() - start_s)
+                self._warn_if_slow()
                 if cycle.status in (Status.FINISHED, Status.STOPPED):
                     self._end()
                     if self._ends:
@@ -111,6 +119,12 @@ class LoopNode:
         return True, f"cycle {cycle.index}: {cycle.status}{cycle.reason and ': '}{cycle.reason}"
 
     # --- The loop
+
+    def _warn_if_slow(self) -> None:
+        mean_s, period_s = sum(self._cycles_s) / len(self._cycles_s), self._loop.config.period_s
+        if self._loop.plant.is_timed and len(self._cycles_s) == SLOW_CYCLES and mean_s > SLOW * period_s:
+            text = f"too slow: a cycle takes {1e3 * mean_s:.0f} ms, expected {1e3 * period_s:.0f} ms"
+            rospy.logwarn_throttle(SLOW_EVERY_S, f"{text}; end other programs (docs/slow.md)")
 
     def _is_due(self) -> bool:
         """Returns whether a cycle is requested; waits a little if none is and the plant is stepped."""
