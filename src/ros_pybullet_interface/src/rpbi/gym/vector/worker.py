@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import signal
@@ -162,6 +163,8 @@ def main() -> None:
             name, arguments = cloudpickle.loads(request)
             if name == "make":
                 worker, answer = Worker(*arguments), None
+                gc.collect()
+                gc.freeze()  # else a collection goes through all worlds, while the other processes wait
             elif name == "share":
                 file = recv_handle(connection)
                 os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
