@@ -6,12 +6,15 @@ import os
 import signal
 
 import numpy as np
+import rosbag
 import rosgraph
 import rospy
 from camera_world import CAMERA, COLOUR, DEPTH, SEGMENTATION, arm_world, pixels, place, renderers
 from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState
 from std_srvs.srv import Trigger
+
+from rpbi_utils import Recorder
 
 
 def test_segmentation_of_what_is_not_there_is_65535(ros, placed):
@@ -98,3 +101,18 @@ def _node_process(simulator):
         children = [int(child) for child in file.read().split()]
     nodes = [child for child in children if child not in renderers(simulator)]
     return nodes[0] if nodes else simulator.pid
+
+
+def test_a_recorder_that_stands_still_misses_no_image(ros, tmp_path, placed):
+    """As many bytes come meanwhile as no socket takes; a viewer would be sent the newest two."""
+    camera = {**CAMERA, "hz": 20, "intrinsics": {**CAMERA["intrinsics"], "width": 640, "height": 480}}
+    ros.simulator(arm_world(ros, rgbd_sensor=camera))
+    colour = ros.listen(COLOUR, Image)
+    with Recorder(tmp_path / "a.bag", [COLOUR]) as recorder:
+        colour.wait_for(3)
+        recorder._process.send_signal(signal.SIGSTOP)
+        colour.wait_for(len(colour.messages) + 30)
+        recorder._process.send_signal(signal.SIGCONT)
+    with rosbag.Bag(str(tmp_path / "a.bag")) as bag:
+        numbers = [message.header.seq for _, message, _ in bag.read_messages()]
+    assert len(numbers) > 30 and set(np.diff(numbers)) == {1}

@@ -113,6 +113,37 @@ class DirectSending:
         return True
 
 
+class RecorderQueues:
+    """Keeps more messages for subscribers that are recorders: these want all, and a viewer the newest.
+
+    A recorder is a node whose name begins with `record`, as that of `rosbag record` does.
+
+    Args:
+        publisher: A publisher with a queue size, which stays as it is for others.
+        limit: Number of messages that are kept for a recorder; beyond it, the oldest are dropped.
+    """
+
+    def __init__(self, publisher: rospy.Publisher, limit: int) -> None:
+        self._topic, self._limit = publisher.impl, limit
+        self._connections: Any = None
+
+    def extend(self) -> None:
+        """Extends the queues of new recorders; called before each message."""
+        connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
+        if connections is not self._connections:
+            self._connections = connections
+            _expecting(
+                "the connections of a publisher to have a queue and an endpoint",
+                "a recorder that gets no processor time loses large messages",
+                lambda: self._extend(connections),
+            )
+
+    def _extend(self, connections: list[Any]) -> None:
+        for each in connections:
+            if each.endpoint_id.rpartition("/")[2].startswith("record"):
+                each._queue_size = max(each._queue_size, self._limit)
+
+
 class Subscriptions:
     """Connects the subscriptions of this node to all publishers that the ROS master has reported.
 

@@ -13,6 +13,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.run_node import init_node
+from custom_ros_tools.ros.rospy_internals import RecorderQueues
 from rpbi.render.depth import PointCloud
 from rpbi.render.frame import Camera, Demand, Frame
 from rpbi.ros.headers import to_ros_time
@@ -25,6 +26,8 @@ SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
 warnings.filterwarnings("ignore", "The publisher should be created", SyntaxWarning)  # None is meant: rospy then waits
 QUEUE_SIZE = 2
 """Images kept for a slow subscriber: a stopped one must not fill the memory."""
+RECORDER_QUEUE_SIZE = 100
+"""Images kept for a recorder, as many as `rosbag record` keeps."""
 LONGEST_WAIT_S = 5.0
 """Longest wait for subscribers that the master has registered [s]."""
 
@@ -92,6 +95,12 @@ class _Topic(StateTopic):
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0
         super().__init__(topic, message_type, None if waits else QUEUE_SIZE)
+        self._queues = None if waits else RecorderQueues(self._publisher, RECORDER_QUEUE_SIZE)
+
+    def publish(self, message: Any) -> None:
+        if self._queues is not None:
+            self._queues.extend()
+        super().publish(message)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
         super().peer_subscribe(topic_name, topic_publish, peer_publish)
