@@ -24,6 +24,8 @@ import rosbag
 import rospy
 from rosgraph_msgs.msg import Clock
 
+from custom_ros_tools.ros.lifecycle.timed_master import allow_large_integers
+
 from .recorder import NOT_RECORDING
 
 _POLL_S = 0.1
@@ -152,6 +154,7 @@ def main(words: Sequence[str]) -> int:
     writer = BagWriter(options.path, options.min_space_mb)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: writer.end())
+    allow_large_integers()  # of bytes received, about which the recorder asks
     rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
     try:
         writer.run(options.topics)

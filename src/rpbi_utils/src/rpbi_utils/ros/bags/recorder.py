@@ -147,6 +147,7 @@ class Recorder:
         """
         if self._process is None:
             raise RecordingError(self.path, "has not been started")
+        self._wait_until_received()
         self._wait_until_quiet()
         died = not self.is_running
         closed = self._end()
@@ -183,6 +184,16 @@ class Recorder:
         if missing:
             raise RecordingError(self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s")
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
+
+    def _wait_until_received(self) -> None:
+        """Waits for all that was sent before: TCP may rest for seconds after the recorder got no processor time."""
+        deadline = time.monotonic() + _MOST_GRACE_S
+        sent = self.published()
+        while self.is_running and time.monotonic() < deadline:
+            received = _received(self._node)
+            if received is None or all(received.get(topic, 0) >= count for topic, count in sent.items()):
+                return
+            time.sleep(_POLL_S)
 
     def _wait_until_quiet(self) -> None:
         assert self._process is not None
@@ -277,6 +288,16 @@ def _receivers(uri: str, node: str) -> set[str]:
         return set()
     # id, other end, direction, transport, topic, whether connected
     return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
+
+
+def _received(node: str) -> dict[str, int] | None:
+    """Returns the number of messages by topic that a node of rospy has received; None if it does not answer."""
+    try:
+        proxy: Any = ServerProxy(rosgraph.Master(_CALLER).lookupNode(node), TimedTransport(_ANSWER_S))
+        _, subscribers, _ = proxy.getBusStats(_CALLER)[2]
+    except (*MASTER_FAILURES, rosgraph.MasterException):
+        return None
+    return {topic: sum(each[2] for each in connections) for topic, connections in subscribers}
 
 
 def _sent(uri: str, node: str) -> dict[str, int]:
