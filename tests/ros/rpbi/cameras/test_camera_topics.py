@@ -113,7 +113,7 @@ def test_a_recorder_that_stands_still_misses_no_image(ros, tmp_path, placed):
         recorder._process.send_signal(signal.SIGSTOP)
         colour.wait_for(len(colour.messages) + 30)
         recorder._process.send_signal(signal.SIGCONT)
-        wait_until(lambda: recorder.published()[COLOUR] > 30, "they are sent")
+        wait_until(lambda: recorder.published().get(COLOUR, 0) > 30, "they are sent")
     with rosbag.Bag(str(tmp_path / "a.bag")) as bag:
         numbers = [message.header.seq for _, message, _ in bag.read_messages()]
     assert len(numbers) > 30 and set(np.diff(numbers)) == {1}
