@@ -84,13 +84,15 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
 
 
 def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
-    """The computer may be too slow for the wall's time, which it then says."""
     driver = ros.listen("/stand_in/driver_state", DriverState)
     arguments = (*LINE, "real_robot:=true", f"out:={tmp_path}")
     process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])
     summary, output = summary_of(process, tmp_path), ros.output(process)
-    assert summary["finished"] and summary["mean_error_mm"] < 15.0 or "too slow: a cycle takes" in output, output
     assert driver.messages[-1].reflexes == 0, driver.messages[-1].message
+    is_accurate = summary["finished"] and summary["mean_error_mm"] < 15.0
+    if not is_accurate and "too slow: a cycle takes" in output:
+        pytest.skip("the real robot has the wall's time, and the node warned that this computer is too slow for it")
+    assert is_accurate, output
 
 
 def test_pushes_are_tried_in_forks_of_the_world(ros: RosSystem) -> None:

@@ -22,6 +22,14 @@ UNLIKE = Variation(
 )
 
 
+def line_loop():
+    """Returns a world in which a box is pushed along a line, its plant, and the loop."""
+    world = pushing_world(Variation(), PushPath(LINE))
+    plant = PushingWorld(world)
+    plant.advance(0.05)
+    return world, plant, LockStep(plant, PushingController(PushingConfig(path=LINE)))
+
+
 @pytest.mark.parametrize(("variation", "most_m"), [(Variation(), 0.005), (UNLIKE, 0.015)], ids=["model", "unlike"])
 def test_box_is_pushed_along_an_s(variation, most_m):
     trial = run_trial(PushingConfig(path=S), variation)
@@ -69,11 +77,7 @@ def test_a_shoved_box_comes_back():
 
 def test_a_box_far_off_its_path_stops_the_loop():
     """Pushing on would end elsewhere, and be called finished."""
-    config = PushingConfig(path=LINE)
-    world = pushing_world(Variation(), PushPath(LINE))
-    plant = PushingWorld(world)
-    plant.advance(0.05)
-    loop = LockStep(plant, PushingController(config))
+    world, plant, loop = line_loop()
     assert loop.run(1.0)[-1].status == "solved"
     x, y, _ = plant.slider_pose()
     world.act("box", "teleport", {"position": [float(x), float(y) + 0.2, HEIGHT], "quat_xyzw": [0.0, 0.0, 0.0, 1.0]})
@@ -98,11 +102,7 @@ def test_decisions_do_not_depend_on_the_speed_of_the_computer():
 
 
 def test_robot_stands_while_the_box_is_hidden_and_goes_on_afterwards():
-    config = PushingConfig(path=LINE)
-    world = pushing_world(Variation(), PushPath(LINE))
-    plant = PushingWorld(world)
-    plant.advance(0.05)
-    loop = LockStep(plant, PushingController(config))
+    world, plant, loop = line_loop()
     loop.run(1.0)
     see, plant._see = plant._see, lambda sample: None
     hidden = loop.run(1.0)

@@ -238,7 +238,7 @@ def test_whatever_is_sent_readings_make_sense_and_refusals_have_reasons(tmp_path
     listener.settimeout(PATIENCE_S)
 
     def is_all_seen() -> bool:
-        """Tells whether all reasons and a motion have come: how early depends on how fast they are read."""
+        """Returns whether all reasons and a motion have come: how early depends on how fast they are read."""
         return reader.feed.refused.keys() == REFUSALS and any(any(reading.axes) for reading in reader.readings)
 
     def serve() -> None:

@@ -74,5 +74,5 @@ class MpcController(ABC):
 
     @property
     def failure(self) -> str:
-        """What keeps the task from being done, after which the loop stops; empty for nothing."""
+        """Reason why the task cannot be done any more, with which the loop stops; empty while it can."""
         return ""

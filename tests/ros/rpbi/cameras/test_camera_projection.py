@@ -66,7 +66,7 @@ class Frame:
 
 @pytest.fixture(scope="module")
 def listeners(module_ros):
-    """What will come from the example, by topic."""
+    """Listeners to the topics of the example, which is launched later."""
     listeners = {topic: module_ros.listen(f"/rpbi/camera/{topic}", kind) for topic, kind in TOPICS.items()}
     listeners["tf"], listeners["tf_static"] = (module_ros.listen(f"/{name}", TFMessage) for name in ("tf", "tf_static"))
     listeners["joints"] = module_ros.listen("/rpbi/kuka_lwr/joint_states", JointState)

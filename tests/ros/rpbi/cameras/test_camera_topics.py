@@ -1,4 +1,4 @@
-"""What a camera publishes, as other nodes see it, when it begins, is held up, or ends."""
+"""Images of a camera as other nodes see them: at its start, with slow subscribers, and at its end."""
 
 from __future__ import annotations
 

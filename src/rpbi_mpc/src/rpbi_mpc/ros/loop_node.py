@@ -18,8 +18,12 @@ from rpbi_mpc.records import write_records
 
 IDLE_S = 0.04
 """Time between two commands to a timed plant that stands [s]."""
-SLOW, SLOW_CYCLES, SLOW_EVERY_S = 1.2, 25, 10.0
-"""Cycles of a timed plant that take so many times their period on average over so many are warned of, so often [s]."""
+MAX_MEAN_PERIODS = 1.2
+"""Largest mean duration of the newest cycles of a timed plant, in periods; beyond it a warning is logged."""
+MEAN_CYCLES = 25
+"""Number of cycles of this mean."""
+WARNING_PERIOD_S = 10.0
+"""Shortest time between two of these warnings [s]."""
 
 Answer = tuple[bool, str]
 
@@ -42,7 +46,7 @@ class LoopNode:
         self._status = rospy.Publisher("mpc/status", MpcStatus, queue_size=10, latch=True)
         self._changed = threading.Condition()
         self._running, self._steps, self._said = bool(rospy.get_param("~start_on_init", True)), 0, ""
-        self._cycles_s: deque[float] = deque(maxlen=SLOW_CYCLES)
+        self._cycles_s: deque[float] = deque(maxlen=MEAN_CYCLES)
         self._loop = LockStep(plant, controller, config, (self._show,))
         for name, action in (("start", self._start), ("stop", self._stop), ("step", self._step)):
             rospy.Service(f"mpc/{name}", Trigger, lambda _, action=action: TriggerResponse(*action()))
@@ -122,9 +126,9 @@ class LoopNode:
 
     def _warn_if_slow(self) -> None:
         mean_s, period_s = sum(self._cycles_s) / len(self._cycles_s), self._loop.config.period_s
-        if self._loop.plant.is_timed and len(self._cycles_s) == SLOW_CYCLES and mean_s > SLOW * period_s:
+        if self._loop.plant.is_timed and len(self._cycles_s) == MEAN_CYCLES and mean_s > MAX_MEAN_PERIODS * period_s:
             text = f"too slow: a cycle takes {1e3 * mean_s:.0f} ms, expected {1e3 * period_s:.0f} ms"
-            rospy.logwarn_throttle(SLOW_EVERY_S, f"{text}; end other programs (docs/slow.md)")
+            rospy.logwarn_throttle(WARNING_PERIOD_S, f"{text}; end other programs (docs/slow.md)")
 
     def _is_due(self) -> bool:
         """Returns whether a cycle is requested; waits a little if none is and the plant is stepped."""
