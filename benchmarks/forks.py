@@ -133,7 +133,7 @@ def _predictions(chosen: int) -> list[Result]:
         Result("forks", f"{what}: median", float(np.median(durations)), "s", None, Target(LARGEST_S)),
         Result("forks", f"{what}: longest", max(durations), "s", None, Target(LARGEST_S)),
         Result("forks", f"the first one, prepared {PREPARED_S:g} s before", prepared_s, "s", None, Target(LARGEST_S)),
-        Result("forks", "the first one, not prepared, for information", cold_s, "s"),
+        Result("forks", "the first one, not prepared", cold_s, "s", None, Target(LARGEST_S)),
     ]
 
 

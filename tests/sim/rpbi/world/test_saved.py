@@ -21,8 +21,8 @@ from soft_meshes import DEFORMABLE, GROUND, block
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
-from rpbi.follower import __main__ as follower
 from rpbi.world import World
+from rpbi.world.forks import following
 from rpbi.world.forks.prediction import Prediction, PredictionJob
 from rpbi.world.forks.shadow import Shadow
 from rpbi.world.saved.command_log import MAX_KEPT
@@ -170,8 +170,8 @@ def test_a_candidate_without_memory_costs_itself_alone(arm, cost, fault):
 def test_an_answer_that_is_cut_anywhere_is_the_same_fault():
     prediction = Prediction(1.0, "hash", np.arange(3), {"box": np.ones((3, 7))}, {"iiwa": np.ones((3, 7))})
     answer = pickle.dumps(prediction)
-    assert follower._read(answer).poses["box"].shape == (3, 7)
-    assert {follower._read(answer[:end]).fault for end in range(len(answer))} == {follower._read(b"").fault}
+    assert following._read(answer).poses["box"].shape == (3, 7)
+    assert {following._read(answer[:end]).fault for end in range(len(answer))} == {following._read(b"").fault}
 
 
 def test_a_process_that_cannot_fork_keeps_no_pipe(monkeypatch):
@@ -185,7 +185,7 @@ def test_a_process_that_cannot_fork_keeps_no_pipe(monkeypatch):
     before = os.listdir("/proc/self/fd")
     monkeypatch.setattr(os, "fork", fork)
     with pytest.raises(BlockingIOError):
-        list(follower._predict_all(None, [[], [], []], PredictionJob(5, (), 1, None), 3))
+        list(following._predict_all(None, [[], [], []], PredictionJob(5, (), 1, None), 3))
     assert os.listdir("/proc/self/fd") == before
 
 

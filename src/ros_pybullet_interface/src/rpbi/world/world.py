@@ -524,13 +524,13 @@ class World:
         """
         self.apply_inputs()
         if self._shadow is None:
-            self._shadow = Shadow(self.save())
+            self._shadow = Shadow.of(self, self.save())
 
     def fork(self, count: int = 1) -> list[Fork]:
         """Returns worlds in processes of their own that go on from the present state, to the last bit.
 
-        They are forked from a process that follows this world's commands, so the first call takes as long as simulating
-        again from the last reset; later ones follow from there.
+        They are forked from a process that follows this world's commands. It is a copy of this one if this has only one
+        thread; otherwise the first call takes as long as simulating again from the last reset.
 
         Raises:
             InterfaceError: If the state cannot be saved, or does not come to be the same there.

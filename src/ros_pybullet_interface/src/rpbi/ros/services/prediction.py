@@ -72,7 +72,7 @@ class Predictor:
         if self._shadow is None or self._resets != world.resets:
             self._end()
             state, self._resets = self._ask(lambda: (world.save(), world.resets))
-            self._shadow = Shadow(state, NICENESS)
+            self._shadow = Shadow.started(state, NICENESS)
         shadow = self._shadow
 
         def news() -> tuple[int, list[RecordedCommand], int, str, int]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe
@@ -17,7 +20,12 @@ from custom_ros_tools.processes.child import start_child
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.state import WorldState
 
+from .following import serve
 from .prediction import Candidate, Prediction, PredictionJob
+
+_PR_SET_PDEATHSIG = 1
+"""prctl(2): the signal when the thread that has forked ends, which is the only one here."""
+_STDERR = 2
 
 
 class Remote:
@@ -93,20 +101,97 @@ class Fork(Remote):
         self.close()
 
 
+class _Copy:
+    """A copy of this process in which a function is called, and which ends when that returns or this process ends.
+
+    Args:
+        call: The function.
+        keep: File descriptor that the copy keeps. All others lead nowhere there, so that what waits for the end of a
+            pipe or a file that this process closes does not wait for the copy, too.
+    """
+
+    stdin = None
+
+    def __init__(self, call: Callable[[], None], keep: int) -> None:
+        parent = os.getpid()
+        self._pid = os.fork()
+        if self._pid:
+            return
+        try:
+            gc.freeze()  # garbage of this process is not the copy's to finish, such as folders that would be removed
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+            if os.getppid() != parent:
+                return  # it ended before
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            for file in map(int, os.listdir("/proc/self/fd")):
+                if file not in (keep, _STDERR):
+                    with suppress(OSError):  # the folder itself
+                        os.dup2(nowhere, file)
+            call()
+        finally:
+            os._exit(0)
+
+    def kill(self) -> None:
+        """Ends it."""
+        with suppress(ProcessLookupError):
+            os.kill(self._pid, signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Waits until it has ended."""
+        with suppress(ChildProcessError):
+            os.waitpid(self._pid, 0)
+
+
 class Shadow:
     """The process; it has neither ROS nor a window nor a second thread, and may therefore fork.
 
     It starts while this one goes on; the first call waits until it has come to the state.
 
     Args:
-        state: Present state of the world.
-        niceness: How much less of the processors it gets than this process, from 0 to 19.
+        connection: Connection to it.
+        process: The process.
+        commands: Number of commands that it knows.
     """
 
-    def __init__(self, state: WorldState, niceness: int = 0) -> None:
+    def __init__(self, connection: Connection, process: subprocess.Popen[bytes] | _Copy, commands: int) -> None:
+        self._remote, self._process = Remote(connection, "the process that follows the world"), process
+        self.commands = commands
+        """Number of commands that it knows."""
+
+    @classmethod
+    def of(cls, world: Any, state: WorldState) -> Shadow:
+        """Returns one of a `World` of this process, at its present state: a copy of this process if that can be."""
+        return cls.copied(world, state) or cls.started(state)
+
+    @classmethod
+    def copied(cls, world: Any, state: WorldState) -> Shadow | None:
+        """Returns one that is a copy of this process, or None if it has other threads, or the world is elsewhere.
+
+        A copy has none of the threads, and would wait for ever for what they had locked.
+        """
+        if world.pb.has_window or threading.active_count() > 1:
+            return None
+        ours, theirs = Pipe()
+        with theirs:
+            process = _Copy(lambda: serve(theirs, lambda: world), theirs.fileno())
+        if len(os.listdir("/proc/self/task")) > 1:  # those of OpenBLAS have ended: it ends them before a fork
+            process.kill()
+            process.wait()
+            ours.close()
+            return None
+        return cls(ours, process, len(state.commands))
+
+    @classmethod
+    def started(cls, state: WorldState, niceness: int = 0) -> Shadow:
+        """Returns one that is a new program, which simulates again until it comes to the state.
+
+        Args:
+            state: Present state of the world.
+            niceness: How much less of the processors it gets than this process, from 0 to 19.
+        """
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-        self._process = start_child(
+        process = start_child(
             ["nice", "-n", str(niceness), sys.executable, "-P", "-m", "rpbi.follower", str(theirs.fileno())],
             signal.SIGKILL,
             pass_fds=[theirs.fileno()],
@@ -114,13 +199,9 @@ class Shadow:
             stdout=subprocess.DEVNULL,
         )
         theirs.close()
-        self._remote = Remote(ours, "the process that follows the world")
-        self.commands = len(state.commands)
-        """Number of commands that it knows."""
-        self._is_starting = True
         with suppress(OSError):  # the first call reports that it has ended
             ours.send(state)
-            ours.send(("follow", ((), state.tick, state.state_hash)))
+        return cls(ours, process, len(state.commands))
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
         """Brings it to the present tick of the world, before it forks or predicts.
@@ -129,9 +210,6 @@ class Shadow:
             InterfaceError: If its state then has another hash.
         """
         new = tuple(commands)
-        if self._is_starting:
-            self._remote.answer()
-            self._is_starting = False
         self._remote.ask("follow", new, tick, state_hash)
         self.commands += len(new)
 
@@ -154,5 +232,5 @@ class Shadow:
         self._remote.close()
         self._process.kill()
         self._process.wait()
-        assert self._process.stdin is not None
-        self._process.stdin.close()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
