@@ -11,23 +11,20 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xmlrpc.client import ServerProxy
 
 import rosgraph
 from rosgraph.names import get_ros_namespace, resolve_name
 
 from custom_ros_tools.processes.child import start_child
-from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 from rpbi_utils.bags.errors import RecordingError
+
+from .connections import received, sent, unconnected
 
 NOT_RECORDING = "not recording: "
 """Beginning of what the recording process prints before it ends with 1."""
-_CALLER = "/rpbi_utils"
-_ANSWER_S = 1.0
-_OUTBOUND = "o"
 _POLL_S = 0.02
 _QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
 """Number, spacing [s] and duration [s] of checks that find the recorder idle at the end, to let the last messages
@@ -100,17 +97,7 @@ class Recorder:
 
         Publishers that do not answer are left out, and so are all if the master does not answer.
         """
-        counts: dict[str, int] = {}
-        try:
-            publishers = rosgraph.Master(_CALLER).getSystemState()[0]
-            nodes = {node for topic, names in publishers if topic in self.topics for node in names}
-            uris = [rosgraph.Master(_CALLER).lookupNode(node) for node in nodes]
-        except (OSError, rosgraph.MasterException):
-            return counts
-        for uri in uris:
-            for topic, sent in _sent(uri, self._node).items():
-                counts[topic] = counts.get(topic, 0) + sent
-        return counts
+        return sent(self._node, self.topics)
 
     def start(self) -> None:
         """Starts recording and returns when everything that is published from now on will be recorded.
@@ -172,7 +159,7 @@ class Recorder:
                 raise RecordingError(self.path, f"the recorder ended at once{self._last_line()}")
             self._raise_if_not_writing()
             try:
-                missing, silent = _unconnected(self._node, self.topics)
+                missing, silent = unconnected(self._node, self.topics)
             except OSError as error:
                 uri = rosgraph.get_master_uri()
                 raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
@@ -188,10 +175,10 @@ class Recorder:
     def _wait_until_received(self) -> None:
         """Waits for all that was sent before: TCP may rest for seconds after the recorder got no processor time."""
         deadline = time.monotonic() + _MOST_GRACE_S
-        sent = self.published()
+        wanted = self.published()
         while self.is_running and time.monotonic() < deadline:
-            received = _received(self._node)
-            if received is None or all(received.get(topic, 0) >= count for topic, count in sent.items()):
+            arrived = received(self._node)
+            if arrived is None or all(arrived.get(topic, 0) >= count for topic, count in wanted.items()):
                 return
             time.sleep(_POLL_S)
 
@@ -242,76 +229,3 @@ def _is_asleep(process_id: int) -> bool:
 
 def _what_is_left(active: Path) -> str:
     return f"; what was recorded can be saved with 'rosbag reindex {active}'" if active.exists() else ""
-
-
-def _unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
-    """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
-
-    When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
-    publish. One that is registered but gone is not counted; one that does not answer is: as `"/publisher (/topic)"`.
-
-    Raises:
-        OSError: If the master cannot be reached.
-    """
-    master = rosgraph.Master(_CALLER)
-    publishers, subscribers, _ = master.getSystemState()
-    unsubscribed = set(topics).difference(topic for topic, nodes in subscribers if node in nodes)
-    if unsubscribed:
-        return sorted(unsubscribed), []
-    wanted: dict[str, list[str]] = {}
-    for topic, nodes in publishers:
-        if topic in topics:
-            for publisher in nodes:
-                wanted.setdefault(publisher, []).append(topic)
-    silent = []
-    for publisher, published in wanted.items():
-        try:
-            uri = master.lookupNode(publisher)  # outside of the next try: a master that refuses is no publisher's end
-        except rosgraph.MasterError:  # it has just ended
-            continue
-        try:
-            connected = _receivers(uri, node)
-        except ConnectionRefusedError:  # it ended without a word
-            continue
-        silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
-    return [], silent
-
-
-def _receivers(uri: str, node: str) -> set[str]:
-    """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
-    proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
-    try:
-        _, _, connections = proxy.getBusInfo(_CALLER)
-    except ConnectionRefusedError:
-        raise
-    except MASTER_FAILURES:
-        return set()
-    # id, other end, direction, transport, topic, whether connected
-    return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
-
-
-def _received(node: str) -> dict[str, int] | None:
-    """Returns the number of messages by topic that a node of rospy has received; None if it does not answer."""
-    try:
-        proxy: Any = ServerProxy(rosgraph.Master(_CALLER).lookupNode(node), TimedTransport(_ANSWER_S))
-        _, subscribers, _ = proxy.getBusStats(_CALLER)[2]
-    except (*MASTER_FAILURES, rosgraph.MasterException):
-        return None
-    return {topic: sum(each[2] for each in connections) for topic, connections in subscribers}
-
-
-def _sent(uri: str, node: str) -> dict[str, int]:
-    """Returns the number of messages by topic that the node at `uri` has sent to `node`; none if it does not answer."""
-    proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
-    try:
-        connections = proxy.getBusInfo(_CALLER)[2]
-        answer = proxy.getBusStats(_CALLER)
-    except MASTER_FAILURES:
-        return {}
-    chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
-    if isinstance(answer[0], list):  # roscpp: without code and message, and with the count behind two sizes
-        publishers = [(topic, {each[0]: each[3] for each in sent}) for topic, sent in answer[0]]
-    else:
-        publishers = [(topic, {each[0]: each[2] for each in sent}) for topic, _, sent, *_ in answer[2][0]]
-    counts = {topic: sum(sent[each] for each in chosen & sent.keys()) for topic, sent in publishers}
-    return {topic: count for topic, count in counts.items() if count}

@@ -1,0 +1,110 @@
+"""How nodes are connected to a subscriber, and how many messages have gone there, as they report it themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
+
+_CALLER = "/rpbi_utils"
+
+_ANSWER_S = 1.0
+_OUTBOUND = "o"
+
+
+def unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
+    """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
+
+    When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
+    publish. One that is registered but gone is not counted; one that does not answer is: as `"/publisher (/topic)"`.
+
+    Raises:
+        OSError: If the master cannot be reached.
+    """
+    master = rosgraph.Master(_CALLER)
+    publishers, subscribers, _ = master.getSystemState()
+    unsubscribed = set(topics).difference(topic for topic, nodes in subscribers if node in nodes)
+    if unsubscribed:
+        return sorted(unsubscribed), []
+    wanted: dict[str, list[str]] = {}
+    for topic, nodes in publishers:
+        if topic in topics:
+            for publisher in nodes:
+                wanted.setdefault(publisher, []).append(topic)
+    silent = []
+    for publisher, published in wanted.items():
+        try:
+            uri = master.lookupNode(publisher)  # outside of the next try: a master that refuses is no publisher's end
+        except rosgraph.MasterError:  # it has just ended
+            continue
+        try:
+            connected = _receivers(uri, node)
+        except ConnectionRefusedError:  # it ended without a word
+            continue
+        silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
+    return [], silent
+
+
+def sent(node: str, topics: Collection[str]) -> dict[str, int]:
+    """Returns the number of messages that publishers of some topics have sent to a node, by topic.
+
+    Publishers that do not answer are left out, and so are all if the master does not answer.
+    """
+    counts: dict[str, int] = {}
+    try:
+        publishers = rosgraph.Master(_CALLER).getSystemState()[0]
+        nodes = {each for topic, names in publishers if topic in topics for each in names}
+        uris = [rosgraph.Master(_CALLER).lookupNode(each) for each in nodes]
+    except (OSError, rosgraph.MasterException):
+        return counts
+    for uri in uris:
+        for topic, count in _sent_by(uri, node).items():
+            counts[topic] = counts.get(topic, 0) + count
+    return counts
+
+
+def received(node: str) -> dict[str, int] | None:
+    """Returns the number of messages by topic that a node of rospy has received; None if it does not answer."""
+    try:
+        uri = rosgraph.Master(_CALLER).lookupNode(node)
+        _, subscribers, _ = _node(uri).getBusStats(_CALLER)[2]
+    except (*MASTER_FAILURES, rosgraph.MasterException):
+        return None
+    return {topic: sum(each[2] for each in connections) for topic, connections in subscribers}
+
+
+def _receivers(uri: str, node: str) -> set[str]:
+    """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
+    try:
+        _, _, connections = _node(uri).getBusInfo(_CALLER)
+    except ConnectionRefusedError:
+        raise
+    except MASTER_FAILURES:
+        return set()
+    # id, other end, direction, transport, topic, whether connected
+    return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
+
+
+def _sent_by(uri: str, node: str) -> dict[str, int]:
+    """Returns the number of messages by topic that the node at `uri` has sent to `node`; none if it does not answer."""
+    other_end = _node(uri)
+    try:
+        connections = other_end.getBusInfo(_CALLER)[2]
+        answer = other_end.getBusStats(_CALLER)
+    except MASTER_FAILURES:
+        return {}
+    chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
+    if isinstance(answer[0], list):  # roscpp: without code and message, and with the count behind two sizes
+        publishers = [(topic, {each[0]: each[3] for each in rows}) for topic, rows in answer[0]]
+    else:
+        publishers = [(topic, {each[0]: each[2] for each in rows}) for topic, _, rows, *_ in answer[2][0]]
+    counts = {topic: sum(by_id[each] for each in chosen & by_id.keys()) for topic, by_id in publishers}
+    return {topic: count for topic, count in counts.items() if count}
+
+
+def _node(uri: str) -> Any:
+    return ServerProxy(uri, TimedTransport(_ANSWER_S))
