@@ -1,11 +1,14 @@
-"""The end of a node: what it says, and what the master still knows of it."""
+"""A node whose output cannot be written; the end of a node: what it says, and what the master still knows of it."""
 
 import os
 import signal
+import sys
 
 import pytest
 import rosgraph
-from ros_system import wait_until
+from ros_system import SUPPORT, support_on_path, wait_until
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Empty
 
 
 @pytest.mark.parametrize("interrupted", [True, False], ids=["both are interrupted", "the other node dies"])
@@ -32,3 +35,11 @@ def test_the_master_knows_nothing_of_a_node_that_has_ended(ros):
     assert "bad callback" not in ros.output(node)
     with pytest.raises(rosgraph.MasterError, match="unknown node"):
         master.lookupNode("/leaver")
+
+
+def test_a_node_goes_on_when_its_output_is_on_a_full_disk(ros):
+    beats, logged = ros.listen("/beats", Empty), ros.listen("/rosout", Log)
+    program = SUPPORT / "programs/warns_often.py"
+    ros.start(["bash", "-c", f"exec {sys.executable} {program} > /dev/full 2>&1"], **support_on_path())
+    beats.wait_for(10)
+    wait_until(lambda: any(each.name == "/warns_often" for each in logged.messages), "a warning in /rosout")

@@ -22,6 +22,7 @@ from typing import TypeVar
 
 import rosgraph
 import rospy
+from rosgraph.roslogging import RosStreamHandler
 from rosgraph_msgs.msg import Log
 
 from custom_ros_tools.errors import InterfaceError
@@ -54,6 +55,7 @@ def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, r
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
     _attach_logging({"custom_ros_tools", *loggers})
+    _keep_console_from_raising()
     _allow_many_files()
     MasterWatch()
     if fault := address_fault():
@@ -215,6 +217,24 @@ def _attach_logging(modules: Iterable[str]) -> None:
     logging.getLogger(ROSPY_LOGGER).addFilter(_is_news)
 
 
+def _keep_console_from_raising() -> None:
+    """Has what cannot be written to the console dropped, as when it is a file on a full disk; /rosout still gets it.
+
+    rospy would raise where something is logged, and so end a thread, for instance that of a timer.
+    """
+    for handler in logging.getLogger(ROSPY_LOGGER).handlers:
+        if isinstance(handler, RosStreamHandler):
+            handler.emit = _dropping_what_cannot_be_written(handler.emit)  # type: ignore[method-assign]
+
+
+def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) -> Callable[[logging.LogRecord], None]:
+    def call(record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):
+            emit(record)
+
+    return call
+
+
 def _is_news(record: logging.LogRecord) -> bool:
     """Returns whether a message of rospy is worth logging; a callback that met a topic closed by the shutdown is not.
 
@@ -230,7 +250,8 @@ def _log_fatal_lines(lines: Iterable[str]) -> None:
     expected = _listeners()
     while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
         time.sleep(0.01)
-    print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
+    with contextlib.suppress(OSError):  # of a full disk
+        print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
     for line in lines:
         rospy.logfatal(line)
     time.sleep(SENDING_S)
