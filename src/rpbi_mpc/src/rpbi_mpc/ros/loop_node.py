@@ -24,6 +24,8 @@ MEAN_CYCLES = 25
 """Number of cycles of this mean."""
 WARNING_PERIOD_S = 10.0
 """Shortest time between two of these warnings [s]."""
+LONG_S = 10.0
+"""Duration of a cycle after which `mpc/step` warns that it still waits [s]."""
 
 Answer = tuple[bool, str]
 
@@ -116,9 +118,10 @@ class LoopNode:
             before = len(self._loop.cycles)
             self._changed.notify_all()
         with self._changed:
-            self._changed.wait_for(lambda: len(self._loop.cycles) > before, 10.0)
-        if len(self._loop.cycles) == before:
-            return False, "no cycle within 10 s"
+            while not self._changed.wait_for(lambda: len(self._loop.cycles) > before, LONG_S):
+                if rospy.is_shutdown():
+                    return False, "the node ended before the cycle did"
+                rospy.logwarn(f"mpc/step: the cycle has not ended within {LONG_S:g} s; waiting")
         cycle = self._loop.cycles[-1]
         return True, f"cycle {cycle.index}: {cycle.status}{cycle.reason and ': '}{cycle.reason}"
 
