@@ -50,8 +50,8 @@ ELSEWHERE = (
 def run(quick: bool) -> list[Result]:
     """Compares random sessions in contact by their hashes, and predicts for an arm that pushes a box."""
     return [
+        *_predictions(QUICK_CHOSEN if quick else CHOSEN),  # while this process is as large as a script is
         *_exact(QUICK_SEEDS if quick else SEEDS),
-        *_predictions(QUICK_CHOSEN if quick else CHOSEN),
         *_saves(),
         *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
     ]

@@ -49,6 +49,20 @@ def test_each_mode_is_that_of_gymnasium(tmp_path, mode):
     theirs.close()
 
 
+def test_as_many_workers_as_processors_stay_on_one_each(tmp_path):
+    all_processors = os.sched_getaffinity(0)
+    few = set(sorted(all_processors)[:2])
+    os.sched_setaffinity(0, few)
+    try:
+        for workers in range(1, len(few) + 1):
+            envs = WorldVectorEnv([partial(made, tmp_path)] * 2, workers)
+            used = [os.sched_getaffinity(each._process.pid) for each in envs._processes]
+            assert used == ([{each} for each in sorted(few)] if workers == len(few) else [few] * workers)
+            envs.close()
+    finally:
+        os.sched_setaffinity(0, all_processors)
+
+
 def test_an_episode_that_has_ended_waits_for_its_reset(tmp_path):
     envs = WorldVectorEnv([partial(made, tmp_path)], autoreset_mode=AutoresetMode.DISABLED)
     envs.reset(seed=1)

@@ -7,6 +7,7 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection, Pipe
 from multiprocessing.reduction import send_handle
@@ -62,6 +63,10 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         self._shared: SharedArrays | None = None
         self._parts = [slice(*ends) for ends in _parts(self.num_envs, self.workers)]
         self._processes = [_Process(index) for index in range(self.workers)]
+        processors = sorted(os.sched_getaffinity(0))
+        if self.workers == len(processors):  # else Linux may wake two on one, while another one idles
+            for process, processor in zip(self._processes, processors):
+                process.stay_on(processor)
         try:
             self._ask_all("make", [(list(makers[part]), part.start, self._mode) for part in self._parts])
             self._set_spaces(self._ask_all("spaces"))
@@ -207,12 +212,15 @@ class _Process:
             )
         self._connection: Connection = ours
 
+    def stay_on(self, processor: int) -> None:
+        """Has it run on one processor from now on."""
+        with suppress(ProcessLookupError):  # `answer` reports that it has ended
+            os.sched_setaffinity(self._process.pid, {processor})
+
     def send(self, text: bytes) -> None:
         """Sends a request."""
-        try:
+        with suppress(OSError):  # `answer` reports that it has ended
             self._connection.send_bytes(text)
-        except OSError:
-            pass  # `answer` reports that it has ended
 
     def send_file(self, file: int) -> None:
         """Sends a file descriptor."""
