@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -36,7 +37,7 @@ def _seeds(count: int) -> range:
 
 def _results(name: str, runs: list[dict[str, Any] | None], share: float) -> list[Result]:
     done = [each for each in runs if each is not None]
-    at_goal, wanted = sum(each["at_goal"] for each in done), Target(int(share * len(runs)), at_least=True)
+    at_goal, wanted = sum(each["at_goal"] for each in done), Target(math.ceil(share * len(runs)), at_least=True)
     found = [Result("lfd", f"{name}: box within 30 mm and 10 deg, of {len(runs)}", at_goal, "", None, wanted)]
     for key, unit, factor in (("box_error_m", "mm", 1000.0), ("box_error_deg", "deg", 1.0)):
         if done:
