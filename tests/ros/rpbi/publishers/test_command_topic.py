@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 import threading
+import time
 
 import pytest
 import rospy
+from node_world import main_config, publishing
 from ros_system import wait_until
+from sensor_msgs.msg import JointState
 from tries import tries
-from worlds import write_world
+from worlds import iiwa, write_world
 
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
-from ros_pybullet_interface.msg import WorldCommands
+from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.world import World
 from rpbi.world.saved.command_log import WorldCommand
@@ -78,3 +83,29 @@ def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, publisher):
     finally:
         reads.set()
         subscriber.unregister()
+
+
+def test_a_recording_that_ends_anywhere_has_the_commands_of_its_last_hash(ros, tmp_path):
+    simulator = ros.simulator(main_config(tmp_path, robots=(iiwa(),), state_hash_hz=500.0), use_sim_time=True)
+    states, commands = ros.listen("/rpbi/state", SimulationState), ros.listen("/rpbi/commands", WorldCommands)
+    with publishing("/rpbi/iiwa/joint_states/target", JointState) as targets:
+        for turn in range(40):
+            for step in range(100):
+                targets.publish(JointState(name=["lbr_iiwa_joint_2"], position=[0.001 * (turn + step)]))
+                time.sleep(0.0005)
+            os.killpg(simulator.pid, signal.SIGSTOP)
+            try:
+                _wait_until_quiet(states, commands)
+                hashed = [each.commands for each in states.messages if each.state_hash]
+                known = [each.first + len(each.commands) for each in commands.messages]
+                assert not known or hashed[-1] <= max(known), f"stop {turn}"
+            finally:
+                os.killpg(simulator.pid, signal.SIGCONT)
+    assert max(known) > 200 and hashed[-1] > 200
+
+
+def _wait_until_quiet(*listeners):
+    """Waits until all that was sent has come."""
+    before = None
+    while before != (before := [len(each.messages) for each in listeners]):
+        time.sleep(0.1)

@@ -216,8 +216,8 @@ class Simulation:
 
     def _publish(self) -> None:
         self._status.spin(self.running, self._request is not None)
-        self._state.spin(self.running or self._request is not None)
         self._commands.spin()
+        self._state.spin(self.running or self._request is not None)
         flush_buffered_sockets()
 
     def _run_due_ticks(self) -> None:
@@ -233,7 +233,10 @@ class Simulation:
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
-        self._state.publish_due_hash()
+        if self._state.is_hash_due:  # after the commands that it depends on: a recording may end between the two
+            self._commands.catch_up()
+            flush_buffered_sockets()
+            self._state.publish_hash()
         if is_last:
             flush_buffered_sockets()  # before whoever asked for the tick gets an answer
 

@@ -76,6 +76,12 @@ class CommandPublisher:
             self._send(reader)
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
+    def catch_up(self) -> None:
+        """Sends all that is new."""
+        self.spin()
+        while self._all.next != self._world.commands.count:
+            self.spin()
+
     def _send(self, reader: _Recipient) -> None:
         message = commands_message(self._world, reader.next)
         reader.next = message.first + len(message.commands)

@@ -225,12 +225,16 @@ class StatePublisher:
         self._begin_window()
         self._publish(self._schedule is not None)
 
-    def publish_due_hash(self) -> None:
-        """Publishes the hash of a tick, if it is due."""
-        tick = self._world.clock.tick
-        if self._schedule is not None and self._hash_tick is not None and tick >= self._hash_tick:
-            self._hash_tick = self._schedule.next_due(tick)
-            self._publish(with_hash=True)
+    @property
+    def is_hash_due(self) -> bool:
+        """Whether the hash of the present tick is due."""
+        return self._hash_tick is not None and self._world.clock.tick >= self._hash_tick
+
+    def publish_hash(self) -> None:
+        """Publishes the state of the present tick with its hash."""
+        if self._schedule is not None:
+            self._hash_tick = self._schedule.next_due(self._world.clock.tick)
+        self._publish(with_hash=True)
 
     def spin(self, moves: bool) -> None:
         """Publishes what is due by the wall clock, and at once when the world starts or stops.
