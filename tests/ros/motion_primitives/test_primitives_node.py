@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
 import threading
@@ -169,8 +170,12 @@ def test_joints_of_a_bag_and_live(ros, tmp_path):
         stopped = threading.Event()
 
         def measure():
-            while not stopped.wait(0.01):
-                measured.publish(JointState(Header(stamp=rospy.Time.now()), ["b", "a"], [0.5, 0.1], [], []))
+            begin = rospy.Time.now()
+            for count in itertools.count():  # stamps keep their distance on a busy machine, too
+                stamp = begin + rospy.Duration(0.01 * count)
+                measured.publish(JointState(Header(stamp=stamp), ["b", "a"], [0.5, 0.1], [], []))
+                if stopped.wait(0.01):
+                    break
 
         thread = threading.Thread(target=measure)
         thread.start()

@@ -70,7 +70,9 @@ def test_a_seed_leads_to_the_same_episode_in_any_order_and_process_until_an_inte
     assert process.returncode == 130 and "Traceback" not in complaints, complaints
     found = json.loads((tmp_path / "found.json").read_text())
     row = found["rows"][0]
-    assert (row["seed"], row["state_hash"], row["time_s"]) == (5, first[1], first[0].time_s)
+    assert row["seed"] in (5, 6), "with two workers, the first one of these to end"
+    time_s = run_episode(env, row["seed"]).time_s
+    assert (row["state_hash"], row["time_s"]) == (env.world.state_hash(), time_s)
     assert f"{SCENE}: {found['success']} of {found['of']} ({found['seeds']} of 496 seeds)" in printed
     wait_until(lambda: not has_processes(process.pid), "no process of it is left")
 

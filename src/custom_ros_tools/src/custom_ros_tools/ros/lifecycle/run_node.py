@@ -224,7 +224,7 @@ def _keep_console_from_raising() -> None:
     """
     for handler in logging.getLogger(ROSPY_LOGGER).handlers:
         if isinstance(handler, RosStreamHandler):
-            handler.emit = _dropping_what_cannot_be_written(handler.emit)  # type: ignore[method-assign]
+            handler.emit = _dropping_what_cannot_be_written(handler.emit)
 
 
 def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) -> Callable[[logging.LogRecord], None]:

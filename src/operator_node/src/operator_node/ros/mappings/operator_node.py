@@ -3,6 +3,7 @@
 import math
 import threading
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 import rospy
@@ -11,9 +12,11 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Float64MultiArray
 
 from custom_ros_tools.plugins import cause_of
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import leave_ros_on_signals
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.rospy_internals import DirectSending
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from operator_node.node_configs import OperatorParameters
@@ -55,6 +58,7 @@ class OperatorNode(ABC):
         self._publisher = rospy.Publisher(
             "operator_node/signal", Float64MultiArray, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
+        self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
         self._toggle = Toggle("operator node", self._start, self._end)
         if parameters.start_on_init:
             self.start()
@@ -96,7 +100,7 @@ class OperatorNode(ABC):
         with self._lock:
             if self._is_on:
                 self._in_force = values
-                self._publisher.publish(Float64MultiArray(data=values))
+                self._send(values)
 
     def spin(self) -> None:
         """Waits until ROS shuts down."""
@@ -114,7 +118,7 @@ class OperatorNode(ABC):
     def _end_signal(self) -> None:
         with self._lock:
             if self._in_force:
-                self._publisher.publish(Float64MultiArray(data=[0.0] * len(self._in_force)))
+                self._send([0.0] * len(self._in_force))
                 self._in_force = ()
 
     def _on_joy(self, joy: Joy) -> None:
@@ -138,7 +142,14 @@ class OperatorNode(ABC):
     def _repeat(self) -> None:
         with self._lock:
             if any(self._in_force):
-                self._publisher.publish(Float64MultiArray(data=self._in_force))
+                self._send(self._in_force)
+
+    def _send(self, values: Sequence[float]) -> None:
+        """Sends a signal before it returns: rospy's own thread might lose the last one of a node that ends."""
+        if self._sending is not None:
+            self._sending.wrap_connections()
+        self._publisher.publish(Float64MultiArray(data=values))
+        flush_buffered_sockets()
 
 
 def main(node: type[OperatorNode]) -> None:
