@@ -15,7 +15,6 @@ SCRIPT = """
 import os, sys, threading
 import numpy as np
 from rpbi.world import World
-from rpbi.world.forks.shadow import Shadow
 
 def height(world):
     return world.bodies["box"].base_pose().position[2]
@@ -29,12 +28,12 @@ world = World.from_file(sys.argv[1])
 world.put("iiwa/target", {"lbr_iiwa_joint_2": 0.8})
 later(50)
 np.ones((500, 500)) @ np.ones((500, 500))  # starts OpenBLAS's threads
-stop = threading.Event()
+cost = height
 if "threads" in sys.argv:
-    threading.Thread(target=stop.wait, daemon=True).start()
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+    cost = None  # another program does not know the script's functions
 reading, writing = os.pipe()
-costs = [] if "threads" in sys.argv else [height]  # another program does not know the script's functions
-(prediction,) = world.predict([[(3, "iiwa/target", {"lbr_iiwa_joint_4": 0.5})]], 30, cost=(costs or [None])[0])
+(prediction,) = world.predict([[(3, "iiwa/target", {"lbr_iiwa_joint_4": 0.5})]], 30, cost=cost)
 later(3)
 world.put("iiwa/target", {"lbr_iiwa_joint_4": 0.5})
 print("predicted", later(27) == prediction.state_hash, prediction.cost != 0.0)

@@ -1,4 +1,4 @@
-"""How nodes are connected to a subscriber, and how many messages have gone there, as they report it themselves."""
+"""Connections of nodes to a subscriber, and their message counts, by the nodes' own XML-RPC interface."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import rosgraph
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 
 _CALLER = "/rpbi_utils"
-
 _ANSWER_S = 1.0
+"""Longest time to wait for an answer [s]."""
 _OUTBOUND = "o"
 
 
-def unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
+def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
     """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
 
     When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
@@ -42,14 +42,14 @@ def unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str
         except rosgraph.MasterError:  # it has just ended
             continue
         try:
-            connected = _receivers(uri, node)
+            connected = _topics_sent(uri, node)
         except ConnectionRefusedError:  # it ended without a word
             continue
         silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
     return [], silent
 
 
-def sent(node: str, topics: Collection[str]) -> dict[str, int]:
+def count_sent(node: str, topics: Collection[str]) -> dict[str, int]:
     """Returns the number of messages that publishers of some topics have sent to a node, by topic.
 
     Publishers that do not answer are left out, and so are all if the master does not answer.
@@ -62,12 +62,12 @@ def sent(node: str, topics: Collection[str]) -> dict[str, int]:
     except (OSError, rosgraph.MasterException):
         return counts
     for uri in uris:
-        for topic, count in _sent_by(uri, node).items():
+        for topic, count in _count_sent_by(uri, node).items():
             counts[topic] = counts.get(topic, 0) + count
     return counts
 
 
-def received(node: str) -> dict[str, int] | None:
+def count_received(node: str) -> dict[str, int] | None:
     """Returns the number of messages by topic that a node of rospy has received; None if it does not answer."""
     try:
         uri = rosgraph.Master(_CALLER).lookupNode(node)
@@ -77,7 +77,7 @@ def received(node: str) -> dict[str, int] | None:
     return {topic: sum(each[2] for each in connections) for topic, connections in subscribers}
 
 
-def _receivers(uri: str, node: str) -> set[str]:
+def _topics_sent(uri: str, node: str) -> set[str]:
     """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
     try:
         _, _, connections = _node(uri).getBusInfo(_CALLER)
@@ -89,7 +89,7 @@ def _receivers(uri: str, node: str) -> set[str]:
     return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
 
 
-def _sent_by(uri: str, node: str) -> dict[str, int]:
+def _count_sent_by(uri: str, node: str) -> dict[str, int]:
     """Returns the number of messages by topic that the node at `uri` has sent to `node`; none if it does not answer."""
     other_end = _node(uri)
     try:

@@ -21,7 +21,7 @@ from rosgraph.names import get_ros_namespace, resolve_name
 from custom_ros_tools.processes.child import start_child
 from rpbi_utils.bags.errors import RecordingError
 
-from .connections import received, sent, unconnected
+from .connections import count_received, count_sent, find_unconnected
 
 NOT_RECORDING = "not recording: "
 """Beginning of what the recording process prints before it ends with 1."""
@@ -97,7 +97,7 @@ class Recorder:
 
         Publishers that do not answer are left out, and so are all if the master does not answer.
         """
-        return sent(self._node, self.topics)
+        return count_sent(self._node, self.topics)
 
     def start(self) -> None:
         """Starts recording and returns when everything that is published from now on will be recorded.
@@ -159,7 +159,7 @@ class Recorder:
                 raise RecordingError(self.path, f"the recorder ended at once{self._last_line()}")
             self._raise_if_not_writing()
             try:
-                missing, silent = unconnected(self._node, self.topics)
+                missing, silent = find_unconnected(self._node, self.topics)
             except OSError as error:
                 uri = rosgraph.get_master_uri()
                 raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
@@ -177,7 +177,7 @@ class Recorder:
         deadline = time.monotonic() + _MOST_GRACE_S
         wanted = self.published()
         while self.is_running and time.monotonic() < deadline:
-            arrived = received(self._node)
+            arrived = count_received(self._node)
             if arrived is None or all(arrived.get(topic, 0) >= count for topic, count in wanted.items()):
                 return
             time.sleep(_POLL_S)
