@@ -8,27 +8,23 @@ processes inherit the block, which leaves their end to this process.
 
 import atexit
 import contextlib
-import logging
 import os
 import resource
 import signal
-import socket
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TypeVar
 
 import rosgraph
 import rospy
-from rosgraph.roslogging import RosStreamHandler
-from rosgraph_msgs.msg import Log
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.rospy_internals import keep_accepting
 
 from .master_watch import MasterWatch
+from .node_logging import attach_logging, log_fatal_lines
 from .timed_master import address_fault, allow_large_integers
 
 T = TypeVar("T")
@@ -36,13 +32,7 @@ T = TypeVar("T")
 MAX_FAREWELL_S = 10.0
 """Longest time for unregistering from the ROS master [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
-ROSOUT = "/rosout"
-ROSPY_LOGGER = "rosout"
 LOG_PARAMETER = "/rosout_disable_topics_generation"
-MAX_WAIT_S = 10.0
-"""Longest time to wait for subscribers of /rosout [s]; a node that has just started is not connected to them yet."""
-MAX_LOOK_S = 1.0
-SENDING_S = 0.2
 INTERRUPTED_TOO_S = 1.0
 """Time by which an interrupt may reach this node later than the node of a service, if both get it [s]."""
 MAX_FILES = 8192
@@ -54,8 +44,7 @@ def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, r
     allow_large_integers()
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
-    _attach_logging({"custom_ros_tools", *loggers})
-    _keep_console_from_raising()
+    attach_logging({"custom_ros_tools", *loggers})
     _allow_many_files()
     MasterWatch()
     if fault := address_fault():
@@ -100,18 +89,18 @@ def run_node(
                 run(node)
             ended.wait()
         except InterfaceError as error:
-            _log_fatal_lines(str(error).splitlines())
+            log_fatal_lines(str(error).splitlines())
             sys.exit(1)
         except ConnectionError as error:
             uri = rosgraph.get_master_uri()
-            _log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
+            log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
             sys.exit(1)
         except rospy.ServiceException as error:
             if not ended.wait(INTERRUPTED_TOO_S) and not rospy.core.is_shutdown_requested():
-                _log_fatal_lines([f"{error}: its node has gone, or cannot be reached"])
+                log_fatal_lines([f"{error}: its node has gone, or cannot be reached"])
                 sys.exit(1)
         except MemoryError as error:
-            _log_fatal_lines([f"out of memory: {error or 'is there a limit, such as ulimit -v?'}"])
+            log_fatal_lines([f"out of memory: {error or 'is there a limit, such as ulimit -v?'}"])
             sys.exit(1)
         except rospy.ROSInterruptException:
             return
@@ -190,84 +179,3 @@ def _allow_many_files() -> None:
     most = MAX_FILES if hard == resource.RLIM_INFINITY else min(hard, MAX_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
-
-
-class _RosHandler(logging.Handler):
-    """Hands log records to rospy."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        levels = (
-            (logging.CRITICAL, rospy.logfatal),
-            (logging.ERROR, rospy.logerr),
-            (logging.WARNING, rospy.logwarn),
-            (logging.INFO, rospy.loginfo),
-            (logging.DEBUG, rospy.logdebug),
-        )
-        next(send for level, send in levels if record.levelno >= level)(self.format(record))
-
-
-def _attach_logging(modules: Iterable[str]) -> None:
-    """Attaches the loggers of top-level Python modules to /rosout; call it once, after `rospy.init_node`."""
-    handler = _RosHandler(level=logging.DEBUG)
-    for module in modules:
-        logger = logging.getLogger(module)
-        logger.setLevel(logging.INFO)
-        logger.propagate = False
-        logger.addHandler(handler)
-    logging.getLogger(ROSPY_LOGGER).addFilter(_is_news)
-
-
-def _keep_console_from_raising() -> None:
-    """Has what cannot be written to the console dropped, as when it is a file on a full disk; /rosout still gets it.
-
-    rospy would raise where something is logged, and so end a thread, for instance that of a timer.
-    """
-    for handler in logging.getLogger(ROSPY_LOGGER).handlers:
-        if isinstance(handler, RosStreamHandler):
-            handler.emit = _dropping_what_cannot_be_written(handler.emit)
-
-
-def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) -> Callable[[logging.LogRecord], None]:
-    def call(record: logging.LogRecord) -> None:
-        with contextlib.suppress(OSError):
-            emit(record)
-
-    return call
-
-
-def _is_news(record: logging.LogRecord) -> bool:
-    """Returns whether a message of rospy is worth logging; a callback that met a topic closed by the shutdown is not.
-
-    rospy closes topics first, and only then recognises exceptions of callbacks as a consequence.
-    """
-    return not (rospy.core.is_shutdown_requested() and record.getMessage().startswith("bad callback"))
-
-
-def _log_fatal_lines(lines: Iterable[str]) -> None:
-    """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
-    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
-    end_s = time.monotonic() + MAX_WAIT_S
-    expected = _listeners()
-    while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
-        time.sleep(0.01)
-    with contextlib.suppress(OSError):  # of a full disk
-        print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
-    for line in lines:
-        rospy.logfatal(line)
-    time.sleep(SENDING_S)
-
-
-def _listeners() -> int:
-    """Returns the number of nodes that subscribe to /rosout, according to the master; killed ones may be among them."""
-    with contextlib.suppress(OSError, rosgraph.MasterException):
-        master = rosgraph.Master(rospy.get_name())
-        nodes = dict(master.getSystemState()[1]).get(ROSOUT, ())
-        return sum(map(_accepts_connections, map(master.lookupNode, nodes)))
-    return 0
-
-
-def _accepts_connections(uri: str) -> bool:
-    with contextlib.suppress(OSError, ValueError):
-        socket.create_connection(rosgraph.network.parse_http_host_and_port(uri), MAX_LOOK_S).close()
-        return True
-    return False
