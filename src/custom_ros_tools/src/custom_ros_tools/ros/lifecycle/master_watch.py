@@ -10,12 +10,12 @@ import rospy
 
 from custom_ros_tools.ros.rospy_internals import Registry, answer_cached, registry
 
+from .node_logging import LOG_PARAMETER
 from .parameters import kept_parameters
 from .timed_master import MASTER_FAILURES, timed_master
 from .wall_time import WallTimer
 
 LOOK_HZ = 1.0
-_ASKED_BY_LOGGING = "/rosout_disable_topics_generation"
 _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 
 
@@ -119,7 +119,7 @@ class MasterWatch:
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
             # rospy contacts the master for each logged line: one that hangs would block any thread that logs
-            answer_cached(_ASKED_BY_LOGGING, rospy.get_param_cached(_ASKED_BY_LOGGING, False))
+            answer_cached(LOG_PARAMETER, rospy.get_param_cached(LOG_PARAMETER, False))
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
 

@@ -17,7 +17,11 @@ ROSPY_LOGGER = "rosout"
 MAX_WAIT_S = 10.0
 """Longest time to wait for subscribers of /rosout [s]; a node that has just started is not connected to them yet."""
 MAX_LOOK_S = 1.0
+"""Longest time for connecting to a subscriber, to see whether it lives [s]."""
 SENDING_S = 0.2
+"""Time for rospy to send the last lines [s]; it drops what it has not sent when the process ends."""
+LOG_PARAMETER = "/rosout_disable_topics_generation"
+"""Parameter to which rospy subscribes with the first line that it logs."""
 
 
 class _RosHandler(logging.Handler):
@@ -79,7 +83,7 @@ def log_fatal_lines(lines: Iterable[str]) -> None:
     """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
     publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
     end_s = time.monotonic() + MAX_WAIT_S
-    expected = _listeners()
+    expected = _count_subscribers()
     while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
         time.sleep(0.01)
     with contextlib.suppress(OSError):  # of a full disk
@@ -89,7 +93,7 @@ def log_fatal_lines(lines: Iterable[str]) -> None:
     time.sleep(SENDING_S)
 
 
-def _listeners() -> int:
+def _count_subscribers() -> int:
     """Returns the number of nodes that subscribe to /rosout, according to the master; killed ones may be among them."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         master = rosgraph.Master(rospy.get_name())

@@ -24,7 +24,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.rospy_internals import keep_accepting
 
 from .master_watch import MasterWatch
-from .node_logging import attach_logging, log_fatal_lines
+from .node_logging import LOG_PARAMETER, attach_logging, log_fatal_lines
 from .timed_master import address_fault, allow_large_integers
 
 T = TypeVar("T")
@@ -32,7 +32,6 @@ T = TypeVar("T")
 MAX_FAREWELL_S = 10.0
 """Longest time for unregistering from the ROS master [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
-LOG_PARAMETER = "/rosout_disable_topics_generation"
 INTERRUPTED_TOO_S = 1.0
 """Time by which an interrupt may reach this node later than the node of a service, if both get it [s]."""
 MAX_FILES = 8192
