@@ -126,7 +126,7 @@ class Braking:
 
         Velocities and positions on the way are for others to judge.
         """
-        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state[:, None])[:, 0]
         if not fits.any(axis=0).all():
             return None
@@ -141,7 +141,7 @@ class Braking:
 
         NaN where the limits of `plan` forbid it [rad or m, rad/s or m/s].
         """
-        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state)
         shortest = fits.argmax(axis=0)
         end = self._ends[shortest]
@@ -165,7 +165,7 @@ class Braking:
 
         Rows are moments, evenly from the beginning to where all joints rest.
         """
-        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
         rows = np.linspace(0.0, self._lengths[shortest].max(), count).round().astype(int)
         way = np.where(rows[:, None] > 0, self._tables[shortest, 0][:, rows - 1].T, 0.0)  # 2 x count x n

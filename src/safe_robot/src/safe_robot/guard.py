@@ -291,12 +291,14 @@ class Guard:
 
     def _brake(self, state: State) -> Brake | None:
         """Returns how joints come to rest after a command; those that were braking, and go on so, as before."""
-        if not len(self._stop.position):
+        goes_on = np.zeros(len(state.position), dtype=bool)
+        if len(self._stop.position):
+            goes_on = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
+        if not goes_on.any():
             return self._braking.plan(state.velocity, state.acceleration)
-        goes_on = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
         brake = self._braking.plan(np.where(goes_on, 0.0, state.velocity), np.where(goes_on, 0.0, state.acceleration))
-        if brake is None or not goes_on.any():
-            return brake
+        if brake is None:
+            return None
         return brake.with_joints_of(self._stop.after_first().brake_from(state.position), goes_on)
 
     def _cannot_brake(self, state: State) -> Violation:

@@ -75,7 +75,7 @@ class Proximity:
             return None
         least_m, reach = self._margin_m + ROUNDING_M, self._reach
         known = self._known_near(motion.position[[0, -1], None])
-        near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
+        near = (~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m)).nonzero()[0]
         if not len(near):
             return None
         i, row = self._last[0], min(self._last[1], len(motion.position) - 1)
