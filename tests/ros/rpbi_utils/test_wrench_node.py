@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 import rospy
 from geometry_msgs.msg import InertiaStamped, Vector3, WrenchStamped
 from node_world import Rosout, main_config, publishing
-from ros_system import RosSystem
+from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -90,27 +90,27 @@ def test_a_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
         assert np.abs(now()[:3]).max() < 0.05 and np.abs(now()[3:]).max() < 0.005
     assert rosout.logs("payload: mass 0.4")
 
-    # it swings slowly: neither zero nor pose, and all stays as it was; then it rests, and both are taken
-    with publishing("rpbi/arm/joint_states/target", JointState) as target:
-        swinging = rospy.Timer(rospy.Duration(0.01), lambda _: target.publish(swing()))
-        rospy.rostime.wallsleep(0.5)
-        for service in ("wrench/zero", "wrench/payload/sample"):
-            answer = node.call(service, Trigger)
-            assert not answer.success, answer.message
-            assert "the sensor turns" in answer.message or "the sensor moves" in answer.message, answer.message
-        swinging.shutdown()
-        swinging.join()
+    # while it turns slowly, neither zero nor pose are taken and all stays as it was; then it rests, and both are
+    states = node.listen("rpbi/arm/joint_states", JointState)
+
+    def joint() -> float:
+        state = states.messages[-1]
+        return float(state.position[state.name.index("lwr_arm_5_joint")])
+
+    start = wait_until(joint, "the joint's position is known")
+    turning = threading.Thread(target=go, args=(node, 4.0), kwargs={"lwr_arm_5_joint": start + 0.4})
+    turning.start()
+    wait_until(lambda: joint() > start + 0.02, "it turns")
+    for service in ("wrench/zero", "wrench/payload/sample"):
+        answer = node.call(service, Trigger)
+        assert not answer.success, answer.message
+        assert "the sensor turns" in answer.message or "the sensor moves" in answer.message, answer.message
+    turning.join()
     go(node)
     assert np.abs(now()).max() < 0.05
     for service in ("wrench/zero", "wrench/payload/sample"):
         assert node.call(service, Trigger).success
     assert node.call("wrench/payload/clear", Trigger).message == "4 poses removed"
-
-
-def swing() -> JointState:
-    """Returns a target that goes to and fro by 0.1 rad/s, on which the wrench hardly depends."""
-    angle = 0.1 * abs(time.monotonic() % 4.0 - 2.0)
-    return JointState(name=["lwr_arm_5_joint"], position=[0.95 + angle])
 
 
 def test_without_tf_it_is_the_releases_node_and_a_push_or_silence_is_refused(ros):
