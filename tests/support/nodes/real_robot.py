@@ -25,9 +25,9 @@ class RealRobot:
 
     @property
     def has_moved(self) -> bool:
-        """Whether a joint has gone some way."""
-        messages = list(self._joints.messages)
-        return bool(messages) and np.ptp([each.position for each in messages], axis=0).max() > MOVED_RAD
+        """Whether a joint is some way from where the first target was."""
+        messages = self._joints.messages
+        return bool(messages) and np.abs(np.subtract(messages[-1].position, messages[0].position)).max() > MOVED_RAD
 
     def wait_until_moved(self) -> None:
         """Waits until a joint has gone some way; its driver must be in motion then, without a reflex."""
