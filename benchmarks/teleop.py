@@ -72,7 +72,7 @@ def run(quick: bool) -> list[Result]:
 def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[dict[str, Any], np.ndarray]:
     """Returns what came of one run (see `programs/hand.py`), and its targets [rad], k x 7."""
     reader, writer = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writer), "-nolisten", "tcp"]
+    command = ["Xvfb", "-displayfd", str(writer), "-nolisten", "tcp", "-noreset"]
     screen = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
     os.close(writer)
     with os.fdopen(reader) as answer:

@@ -18,6 +18,7 @@ def virtual_screen(width: int, height: int) -> Iterator[str]:
     """
     reader, writer = os.pipe()
     command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp"]
+    command.append("-noreset")  # else it restarts when its only client leaves
     server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL, start_new_session=True)
     os.close(writer)
     try:

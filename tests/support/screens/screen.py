@@ -45,6 +45,7 @@ class Screen:
     def __init__(self, width: int = 1400, height: int = 900) -> None:
         reader, writer = os.pipe()
         command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp"]
+        command.append("-noreset")  # else it restarts when a window closes that was its only client, and refuses others
         self._server = subprocess.Popen(
             command, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )
