@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
@@ -363,8 +364,11 @@ def test_renderer_that_stands_still_neither_blocks_the_simulator_nor_fills_its_m
 
 def _policies(process_id):
     """Returns how each thread is scheduled, and its nice value."""
-    threads = [int(name) for name in os.listdir(f"/proc/{process_id}/task")]
-    return {(os.sched_getscheduler(each), os.getpriority(os.PRIO_PROCESS, each)) for each in threads}
+    found = set()
+    for thread in map(int, os.listdir(f"/proc/{process_id}/task")):
+        with contextlib.suppress(ProcessLookupError):  # it has ended since
+            found.add((os.sched_getscheduler(thread), os.getpriority(os.PRIO_PROCESS, thread)))
+    return found
 
 
 @pytest.mark.parametrize("awaited", ["a scene", "who looks"])
