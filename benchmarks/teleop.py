@@ -6,8 +6,6 @@ hand without guards. The targets are then judged once more by a guard that refus
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from typing import Any
 import numpy as np
 from result import Result, Target
 from session import Session
+from virtual_screen import virtual_screen
 
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
@@ -71,29 +70,20 @@ def run(quick: bool) -> list[Result]:
 
 def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[dict[str, Any], np.ndarray]:
     """Returns what came of one run (see `programs/hand.py`), and its targets [rad], k x 7."""
-    reader, writer = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writer), "-nolisten", "tcp", "-noreset"]
-    screen = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
-    os.close(writer)
-    with os.fdopen(reader) as answer:
-        display = f"DISPLAY=:{answer.readline().strip()}"
-    try:
-        with Session(use_sim_time=False) as ros:
-            socket, file = str(ros.folder / "spnav.sock"), ros.folder / "targets.npy"
-            ros.set_parameters("/spacenav/socket", socket)
-            options = [f"device:={device}", f"guard:={str(guard).lower()}", "real_robot:=true", "headless:=true"]
-            example = ros.start(["env", display, "roslaunch", "rpbi_examples", "teleop.launch", *options])
-            program = str(Path(__file__).parent / "programs/hand.py")
-            arguments = [device, str(seconds), str(seed), TARGETS[guard], str(file), "--socket", socket]
-            hand = ros.start(["env", display, sys.executable, "-u", program, *arguments])
-            try:
-                found = ros.result_of(hand, seconds + 300.0)
-            except RuntimeError as error:
-                raise RuntimeError(f"{error}\n{ros.output(example)}") from None
-            recorded = np.load(file)
-    finally:
-        screen.terminate()
-        screen.wait()
+    with virtual_screen(1280, 1024) as screen, Session(use_sim_time=False) as ros:
+        display = f"DISPLAY={screen}"
+        socket, file = str(ros.folder / "spnav.sock"), ros.folder / "targets.npy"
+        ros.set_parameters("/spacenav/socket", socket)
+        options = [f"device:={device}", f"guard:={str(guard).lower()}", "real_robot:=true", "headless:=true"]
+        example = ros.start(["env", display, "roslaunch", "rpbi_examples", "teleop.launch", *options])
+        program = str(Path(__file__).parent / "programs/hand.py")
+        arguments = [device, str(seconds), str(seed), TARGETS[guard], str(file), "--socket", socket]
+        hand = ros.start(["env", display, sys.executable, "-u", program, *arguments])
+        try:
+            found = ros.result_of(hand, seconds + 300.0)
+        except RuntimeError as error:
+            raise RuntimeError(f"{error}\n{ros.output(example)}") from None
+        recorded = np.load(file)
     why = "; ".join(reason for reason in (*found["unsafe"][:1], found["reflex"]) if reason)
     row = ROW.format(device, seed, "on" if guard else "off", f"{found['seconds']:.0f} s", found["targets"], why)
     print(row, file=sys.stderr, flush=True)

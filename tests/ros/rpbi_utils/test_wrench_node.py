@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -97,15 +97,16 @@ def test_a_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
         state = states.messages[-1]
         return float(state.position[state.name.index("lwr_arm_5_joint")])
 
-    start = wait_until(joint, "the joint's position is known")
-    turning = threading.Thread(target=go, args=(node, 4.0), kwargs={"lwr_arm_5_joint": start + 0.4})
-    turning.start()
-    wait_until(lambda: joint() > start + 0.02, "it turns")
-    for service in ("wrench/zero", "wrench/payload/sample"):
-        answer = node.call(service, Trigger)
-        assert not answer.success, answer.message
-        assert "the sensor turns" in answer.message or "the sensor moves" in answer.message, answer.message
-    turning.join()
+    states.wait_for(1)
+    start = joint()
+    with ThreadPoolExecutor(1) as pool:
+        turning = pool.submit(go, node, 4.0, lwr_arm_5_joint=start + 0.4)
+        wait_until(lambda: joint() > start + 0.02, "it turns")
+        for service in ("wrench/zero", "wrench/payload/sample"):
+            answer = node.call(service, Trigger)
+            assert not answer.success, answer.message
+            assert "the sensor turns" in answer.message or "the sensor moves" in answer.message, answer.message
+        turning.result()
     go(node)
     assert np.abs(now()).max() < 0.05
     for service in ("wrench/zero", "wrench/payload/sample"):
