@@ -176,6 +176,19 @@ def test_commands_that_come_at_uneven_times_are_a_cycle_apart_for_the_motors() -
     assert np.abs(times_s - arrivals_s - 0.01)[[900, 1400, 1999]].max() < 2.0 * DT_S
 
 
+def test_a_burst_after_a_stall_is_played_in_order() -> None:
+    robot = controller(timeout_s=1.0, rate_tolerance=0.9)
+    arrivals_s = 5.0 + np.arange(3000) * DT_S
+    arrivals_s[1000:1500] = arrivals_s[1500]
+    points = []
+    for now_s in arrivals_s:
+        robot.command(now_s, HOME)
+        points += robot.cycle(now_s, HOME, NO_EFFORT)
+    steps = np.diff([point.time_s for point in points]) / DT_S
+    assert len(points) == 3000 and steps.min() > 0.49, "motors that get times out of order jump"
+    assert abs(points[-1].time_s - arrivals_s[-1]) < 2.0 * DT_S
+
+
 def test_motors_at_their_torque_and_joints_left_behind_are_reflexes() -> None:
     for cycles, effort, behind, check in (
         (60, 86.0, 0.19, None),

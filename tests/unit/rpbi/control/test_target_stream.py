@@ -203,6 +203,36 @@ def test_a_clock_may_jump(jump_s):
     assert positions[-1] == pytest.approx(0.003 * (98 * PERIOD - lag), abs=0.09)
 
 
+@pytest.mark.parametrize("stalled", ["world", "sender"])
+@pytest.mark.parametrize("stall_s", [0.15, 0.3, 0.9])
+def test_what_waited_in_a_stall_is_played_little_faster_than_it_was_sent(stalled, stall_s):
+    stall, begin, speed = round(stall_s / DT_S), 80 * PERIOD, 0.003
+    if stalled == "world":  # its ticks do not go on meanwhile
+        arrivals = [n * PERIOD if n <= 80 else max(begin + 1, n * PERIOD - stall) for n in range(400)]
+    else:
+        arrivals = [max(n * PERIOD, begin + stall) if n > 80 else n * PERIOD for n in range(400)]
+    targets = [(tick, speed * n * PERIOD, stamp_ns(n * PERIOD)) for n, tick in enumerate(arrivals)]
+    positions = play(targets, arrivals[-1], buffer_s=0.02)
+    jump = 0 if stalled == "world" else begin + stall  # the first target after a pause acts at once
+    fastest = max(
+        after - before
+        for tick, (before, after) in enumerate(zip(positions, positions[1:]))
+        if tick > begin and tick + 1 != jump
+    )
+    assert fastest < 1.4 * speed, "a jump would push what the robot touches away"
+    lag = 1.5 * PERIOD + 0.02 / DT_S - 1.5
+    assert positions[-1] == pytest.approx(targets[-1][1] - lag * speed, abs=2 * PERIOD * speed)
+
+
+def test_a_world_that_becomes_slower_than_the_clock_of_the_sender_lags_only_for_a_while():
+    arrivals = [n * PERIOD for n in range(100)]
+    arrivals += [arrivals[-1] + round(PERIOD / 3 * (n + 1)) for n in range(1300)]
+    targets = [(tick, 0.03 * n, stamp_ns(n * PERIOD)) for n, tick in enumerate(arrivals)]
+    positions = play(targets, arrivals[-1], buffer_s=0.02)
+    lags = [number - positions[tick - 1] / 0.03 for number, tick in enumerate(arrivals)]
+    assert max(lags) < 200 and max(lags[-10:]) < 10
+
+
 @pytest.mark.parametrize(
     "stamp",
     [lambda n: 0, lambda n: stamp_ns(0), lambda n: stamp_ns(-n * PERIOD), lambda n: stamp_ns(3 * n * PERIOD)],

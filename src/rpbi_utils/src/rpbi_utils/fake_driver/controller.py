@@ -317,7 +317,7 @@ class RobotController:
         """Returns the time for the motors of a command that arrives now [s]: nearly one cycle after the previous "
         "one."""
         planned_s = self._planned_s + self._cycle_s
-        if not abs(now_s - planned_s) <= MAX_GAP_S:
+        if now_s - planned_s > MAX_GAP_S:
             return now_s
         return max(planned_s + SPACING_GAIN * (now_s - planned_s), self._planned_s + MIN_SPACING * self._cycle_s)
 

@@ -23,6 +23,8 @@ REPLACED = 0.25
 """A target that was sent sooner than this share of the period after another one replaces it."""
 DRIFT = 0.1
 """Stamps are used while they run as fast as the world's time within this share."""
+STALL_S = 1.0
+"""Longest stall of world or sender [s] after which the stamps of what comes at once are still used."""
 MIN_MISFIT_RATIO = 2.0
 """Ratio of excess squared misfits above which a regular period replaces stamps, or the reverse."""
 MIN_MISFIT = 1e-10
@@ -99,11 +101,17 @@ class JitterBuffer:
         self._settling = SETTLING_S / dt_s
         self._longest = LONGEST_PERIOD_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
+        self._stall_ns = STALL_S * 1e9
+        self._is_clock_right: bool | None = None
+        """Whether stamps run as fast as the world's time: True and False by a whole window, None before."""
+        self._in_step_ns = 0
+        """The last stamp of a whole window that ran as fast as the world's time [ns]."""
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
         self._restart()
 
     def _restart(self) -> None:
+        self._is_clock_right = self._is_clock_right or None
         self._seen.clear()
         self._count = 0
         self._interval = 0.0
@@ -119,7 +127,7 @@ class JitterBuffer:
             stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
             goal: Positions by joint index [rad or m].
         """
-        if self._seen and tick - self._seen[-1].tick > self._longest:
+        if self._seen and self._is_apart(tick, stamp_ns):
             self._restart()
         self._seen.append(Arrival(tick, stamp_ns, goal))
         self._count += 1
@@ -146,6 +154,12 @@ class JitterBuffer:
             interval = period * self._seen[-1].step
         planned = self._undelayed(times, steps, regular) + self._buffer + period
         return self._schedule(tick, tick + planned, interval, period)
+
+    def _is_apart(self, tick: int, stamp_ns: int) -> bool:
+        """Returns whether a target comes, or was sent by a right clock, too long after the last one for a stream."""
+        last = self._seen[-1]
+        sent_ticks = (stamp_ns - last.stamp_ns) / self._dt_ns if self._is_clock_right else 0.0
+        return max(tick - last.tick, sent_ticks) > self._longest
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
         """Returns when to play the newest target, which is as near to the planned time as the delay may change."""
@@ -189,9 +203,27 @@ class JitterBuffer:
         arrivals = [float(each.tick - tick) for each in self._seen]
         stamps = [(each.stamp_ns - stamp_ns) / self._dt_ns for each in self._seen]
         rises = all(before < after for before, after in zip(stamps, stamps[1:]))
-        allowed = self._longest / 2.0 - DRIFT * arrivals[0]
-        is_sane = rises and abs(stamps[0] - arrivals[0]) <= allowed
-        return (stamps, True) if is_sane else (arrivals, False)
+        return (stamps, True) if rises and self._uses_stamps(stamps, arrivals) else (arrivals, False)
+
+    def _uses_stamps(self, stamps: Sequence[float], arrivals: Sequence[float]) -> bool:
+        """Returns whether stamps run as fast as the world's time, apart from stalls."""
+        is_full = len(stamps) == WINDOW
+        is_in_step = abs(stamps[0] - arrivals[0]) <= self._longest / 2.0 - DRIFT * arrivals[0]
+        if is_in_step and (is_full or self._is_clock_right is not False):
+            if is_full:
+                self._is_clock_right, self._in_step_ns = True, self._seen[-1].stamp_ns
+            return True
+        if not is_in_step:
+            self._is_clock_right = bool(self._is_clock_right) and self._may_have_waited()
+        return bool(self._is_clock_right)
+
+    def _may_have_waited(self) -> bool:
+        """Returns whether targets that come too fast for their stamps may have waited for the world or the sender.
+
+        That is so until they have left the window.
+        """
+        seen_ns = self._seen[-1].stamp_ns - self._seen[0].stamp_ns
+        return 0 < self._seen[-1].stamp_ns - self._in_step_ns <= seen_ns + self._stall_ns
 
     def _steps(self) -> list[int]:
         """Returns the number of periods from the newest target to each."""
