@@ -103,7 +103,7 @@ class JitterBuffer:
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
         self._stall_ns = STALL_S * 1e9
         self._is_clock_right: bool | None = None
-        """Whether stamps run as fast as the world's time: True and False by a whole window, None before."""
+        """Whether stamps run as fast as the world's time: False once they did not, until a whole window does."""
         self._in_step_ns = 0
         """The last stamp of a whole window that ran as fast as the world's time [ns]."""
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
