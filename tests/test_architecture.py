@@ -124,10 +124,6 @@ ROBOTS_IN_THE_SIMULATOR = ("rpbi.geometry", "rpbi.urdf", "rpbi.kinematics")
 ADAPTERS = {
     "ik_ros.solvers.pybullet_solver": "solves by the simulator's inverse kinematics",
     "safe_robot.geometry.bullet": "measures distances by PyBullet",
-    "rpbi_examples.dressing.hand": "shows the simulator's inverse kinematics",
-    "rpbi_examples.pushing": "shows the simulator's inverse kinematics",
-    "rpbi_examples.ros.push_example": "shows the simulator's inverse kinematics",
-    "rpbi_examples.ros.telepresence": "shows the simulator's inverse kinematics",
 }
 """Modules outside of the simulator that use its robots, and what for."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,15 +12,12 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from custom_ros_tools.config import replace_package
-from rpbi.kinematics import Kinematics
 from rpbi.samples import ContactsSample
 from rpbi.world import World
 from rpbi_examples.motions import PlanarPose
-from rpbi_examples.pushing import GAP_M, PLACES, PUSH_SPEED, Pusher, next_push
+from rpbi_examples.pushing import GAP_M, PLACES, PUSH_SPEED, Pusher, ball_solver, next_push
 
 CONFIGS = Path(__file__).resolve().parents[2] / "src/rpbi_examples/configs"
-ARM = "{rpbi_examples}/robots/kuka_lwr.urdf"
 TARGET_HZ = 50.0
 SETTLED_S = 0.5
 """Time after the first touch from which the push counts as steady [s]."""
@@ -91,22 +88,18 @@ def push(
         late_s: Returns how late the next target is [s].
         length_m: Length of the push [m].
     """
-    kinematics = Kinematics(replace_package(ARM))
-    try:
-        base = world.bodies["kuka_lwr"].base_pose()
-        (x, y, _), quat = base.inverse() @ world.bodies["box"].base_pose()
-        planned = next_push(PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3])), PLACES[0])
-        assert planned is not None  # the box of the example is not there yet
-        *before, along, _, _ = Pusher(kinematics).moves(
-            list(world.bodies["kuka_lwr"].joint_positions().values()), planned
-        )
-    finally:
-        kinematics.close()
+    solver = ball_solver()
+    base = world.bodies["kuka_lwr"].base_pose()
+    (x, y, _), quat = base.inverse() @ world.bodies["box"].base_pose()
+    planned = next_push(PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3])), PLACES[0])
+    assert planned is not None  # the box of the example is not there yet
+    positions = list(world.bodies["kuka_lwr"].joint_positions().values())
+    *before, along, _, _ = Pusher(solver).moves(positions, planned)
     whole_m = math.dist(planned.start, planned.end) + GAP_M
     ticks = round(1.0 / (TARGET_HZ * world.config.timeStep))
     for move in before:
         for number in range(1, round(move.duration_s * TARGET_HZ) + 1):
-            _send(world, kinematics, move.at(number / TARGET_HZ))
+            _send(world, solver.joint_names, move.at(number / TARGET_HZ))
             _steps(world, ticks)
     count = round(length_m / PUSH_SPEED * target_hz)
     dues = [number / target_hz + late_s() for number in range(count)]
@@ -114,14 +107,14 @@ def push(
     found, number = [], 0
     for tick in range(round(length_m / PUSH_SPEED / world.config.timeStep)):
         while number < count and dues[number] <= (tick + 1e-6) * world.config.timeStep:
-            _send(world, kinematics, along.path(ways[number]).tolist())
+            _send(world, solver.joint_names, along.path(ways[number]).tolist())
             number += 1
         found += [(tick * world.config.timeStep, *forces) for forces in _steps(world, 1)]
     return Force(*np.array(found).T)
 
 
-def _send(world: World, kinematics: Kinematics, positions: Any) -> None:
-    world.put("kuka_lwr/target", dict(zip(kinematics.joint_names, positions)))
+def _send(world: World, joint_names: Sequence[str], positions: Any) -> None:
+    world.put("kuka_lwr/target", dict(zip(joint_names, positions)))
 
 
 def _steps(world: World, ticks: int) -> list[tuple[float, float, float]]:

@@ -9,13 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from custom_ros_tools.config import replace_package
-from rpbi.kinematics import Kinematics
 from rpbi.samples import ContactsSample
 from rpbi.world import World
 from rpbi.world.loading import load_world
 from rpbi_examples.motions import PlanarPose
-from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, next_push
+from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, ball_solver, next_push
 
 sys.path.append(str(Path(__file__).resolve().parents[3] / "tools/clean_forces"))
 
@@ -26,16 +24,14 @@ ROUNDS = 2
 
 
 @pytest.fixture(scope="module")
-def kinematics():
-    kinematics = Kinematics(replace_package("{rpbi_examples}/robots/kuka_lwr.urdf"))
-    yield kinematics
-    kinematics.close()
+def solver():
+    return ball_solver()
 
 
 @pytest.fixture(scope="module")
-def session(kinematics):
+def session(solver):
     """Targets of the joints, sums of normal forces of the arm on the box, and where the box came to rest."""
-    world, pusher = World.from_file(WORLD), Pusher(kinematics)
+    world, pusher = World.from_file(WORLD), Pusher(solver)
     ticks_a_target = round(1.0 / (50 * world.config.timeStep))
     positions = tuple(world.bodies["kuka_lwr"].joint_positions().values())
     targets, forces, boxes = [positions], [], []
@@ -47,7 +43,7 @@ def session(kinematics):
                 for number in range(1, count + 1):
                     positions = move.at(number / count * move.duration_s)
                     targets.append(positions)
-                    world.put("kuka_lwr/target", dict(zip(kinematics.joint_names, positions)))
+                    world.put("kuka_lwr/target", dict(zip(solver.joint_names, positions)))
                     samples = [sample for _ in range(ticks_a_target) for sample in world.step()]
                     forces += [force_of_arm(sample) for sample in samples if isinstance(sample, ContactsSample)]
             boxes.append((box_of(world), goal))
@@ -99,15 +95,15 @@ def test_on_a_plane_it_would_chatter():
     assert force.push.std() > 1.5 and force.push.max() > 12.0
 
 
-def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_a_jump(session, kinematics):
+def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_a_jump(session, solver):
     assert (np.ptp(session.targets, axis=0) > 0.2).all()
-    assert (session.targets > kinematics.limits.lower).all() and (session.targets < kinematics.limits.upper).all()
+    assert (session.targets > solver.lower).all() and (session.targets < solver.upper).all()
     velocities = np.diff(session.targets, axis=0) * 50.0
     assert (np.abs(velocities) < (1.92, 1.92, 2.27, 2.27, 2.27, 3.14, 3.14)).all()
     assert np.abs(np.diff(velocities, axis=0)).max() * 50.0 < 20.0
 
 
-def test_what_is_out_of_reach_is_told(kinematics):
+def test_what_is_out_of_reach_is_told(solver):
     push = next_push(PlanarPose(-1.5, 0.0, 0.0), PLACES[0])
     with pytest.raises(ValueError, match=r"\(-1\.6.*\) m is out of reach"):
-        Pusher(kinematics).moves((0.0,) * 7, push)
+        Pusher(solver).moves((0.0,) * 7, push)

@@ -8,14 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from robot_model.geometry import Vector
+from ik_ros.chain.solver import ChainSolver
+from ik_ros.problem import IKProblem
+from ik_ros.solvers.pybullet_solver import PybulletConfig, PybulletSolver
+from robot_model.geometry import Pose, Vector
 from rpbi.control.trajectories.trajectory import minimum_jerk
-from rpbi.kinematics import Kinematics
-from rpbi.kinematics.problem import PybulletProblem
 
 from .motions import PlanarPose
 
-BALL = "end_effector_ball"
+URDF = "{rpbi_examples}/robots/kuka_lwr.urdf"
+BASE, BALL = "base", "end_effector_ball"
 BALL_RADIUS_M = 0.015
 PLACES = ((-0.6, 0.2), (-0.6, -0.2))
 """Targets of the centre of the box, in turn: x and y in the frame of the arm's base [m]."""
@@ -103,15 +105,21 @@ def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
     return best
 
 
+def ball_solver() -> ChainSolver:
+    """Returns the inverse kinematics of the ball at the hand of a KUKA LWR4+."""
+    options = {"urdf_filename": URDF, "base_link": BASE, "tip_link": BALL, "residualThreshold": 1e-4}
+    return PybulletSolver(PybulletConfig.parse(options, "the arm that pushes"))
+
+
 class Pusher:
     """Plans the moves of a push.
 
     Args:
-        kinematics: The arm's, a KUKA LWR4+ with the ball.
+        solver: Inverse kinematics of the ball, in the frame of the arm's base.
     """
 
-    def __init__(self, kinematics: Kinematics) -> None:
-        self._kinematics = kinematics
+    def __init__(self, solver: ChainSolver) -> None:
+        self._solver = solver
 
     def moves(self, positions: Sequence[float], push: Push) -> list[Move]:
         """Returns the moves from some joint positions [rad]: up, over, down, to the box, the push, back and up.
@@ -119,7 +127,7 @@ class Pusher:
         Raises:
             ValueError: If something on the way is out of reach.
         """
-        here = self._kinematics.forward(positions, BALL).position
+        here = self._solver.chain.pose(positions).position
         before, after = push.beside(CLEARANCE_M), push.beside(CLEARANCE_M - math.dist(push.start, push.end))
         corners = [
             (*before, TRAVEL_HEIGHT_M),
@@ -153,10 +161,11 @@ class Pusher:
 
     def _solve(self, point: Sequence[float]) -> tuple[float, ...]:
         """Returns the joint positions [rad] with the ball at a point [m], always the same for the same point."""
+        x, y, z = point
         posture = POSTURE.tolist()
-        posture[2] = ELBOW_LEAN * point[1]
-        problem = PybulletProblem(BALL, point, POINTING_DOWN, currentPosition=posture, residualThreshold=1e-4)
-        solution = self._kinematics.solve(problem)
+        posture[2] = ELBOW_LEAN * y
+        start = dict(zip(self._solver.joint_names, posture))
+        solution = self._solver.solve(IKProblem(Pose((x, y, z), POINTING_DOWN), start=start))
         if not solution.success:
-            raise ValueError(f"({point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f}) m is out of reach: {solution.message}")
+            raise ValueError(f"({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach: {solution.message}")
         return solution.positions

@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ik_ros.problem import IKProblem
+from ik_ros.solvers.pybullet_solver import PybulletConfig, PybulletSolver
 from robot_model.geometry import Pose
-from rpbi.kinematics import Kinematics
-from rpbi.kinematics.problem import PybulletProblem
 
 from .way import Array
 
 RADIUS_M = 0.085
 """File of the sleeve."""
-ROBOT, HAND_LINK = "franka_panda/panda.urdf", "panda_grasptarget"
+ROBOT, BASE_LINK, HAND_LINK = "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget"
 """File of PyBullet's data."""
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
 """Base of the robot, as in `panda.yaml`."""
@@ -54,33 +54,33 @@ def holding(cuff: Array, ahead: Array) -> HandTarget:
 class HandSolver:
     """Kinematics of the robot that holds the cuff.
 
-    Args:
-        kinematics: The robot's.
+    Attributes:
+        joint_names: The joints of its arm, in the order of all positions here.
     """
 
-    def __init__(self, kinematics: Kinematics) -> None:
-        self._kinematics = kinematics
+    def __init__(self) -> None:
+        options = {"urdf_filename": ROBOT, "base_link": BASE_LINK, "tip_link": HAND_LINK}
+        self._solver = PybulletSolver(PybulletConfig.parse(options, "the robot"))
+        self.joint_names = self._solver.joint_names
 
     def cuff(self, positions: Sequence[float]) -> Array:
         """Returns where the middle of the cuff is in the world (3) [m].
 
         Args:
-            positions: Where all joints that move are [rad or m].
+            positions: Where the joints are [rad].
         """
         in_hand = Pose((0.0, 0.0, RADIUS_M))
-        return np.array((ROBOT_BASE @ self._kinematics.forward(positions, HAND_LINK) @ in_hand).position)
+        return np.array((ROBOT_BASE @ self._solver.chain.pose(positions) @ in_hand).position)
 
     def solve(self, target: HandTarget, positions: Sequence[float]) -> dict[str, float] | None:
-        """Returns positions of the arm's joints [rad], or None if there are none nearby.
+        """Returns positions of the joints [rad], or None if there are none nearby.
 
         Args:
             target: Where the hand is to be.
-            positions: Where all joints that move are now [rad or m].
+            positions: Where the joints are now [rad].
         """
         in_base = ROBOT_BASE.inverse() @ Pose(target.position, target.quat_xyzw)
-        problem = PybulletProblem(HAND_LINK, in_base.position, in_base.quat_xyzw, currentPosition=positions)
-        solution = self._kinematics.solve(problem)
-        found = dict(zip(solution.chain, solution.chain_positions))
-        now = dict(zip(self._kinematics.joint_names, positions))
-        near = all(abs(found[name] - now[name]) <= MAX_TURN_RAD for name in found)
-        return found if solution.success and near else None
+        solution = self._solver.solve(IKProblem(in_base, start=dict(zip(self.joint_names, positions))))
+        turns = (abs(there - here) for there, here in zip(solution.positions, positions))
+        is_near = solution.success and max(turns) <= MAX_TURN_RAD
+        return dict(zip(self.joint_names, solution.positions)) if is_near else None

@@ -75,11 +75,11 @@ class Trial:
         self._engagement = Engagement(max_joint_speed=3.0, max_speed=1.0, max_angular_speed=3.0)
         links = {human.link_name(index): index for index in range(-1, len(human.joint_indices))}
         self._links = [links[name] for name in ("RightUpperArm", "RightForeArm", "RightHand")]
-        positions = dict(zip((joint.name for joint in human.model.moving), human.joint_positions().values()))
+        positions = _joint_positions(human)
         base = human.base_pose()
         first = np.array([positions[hinge] for hinge in HINGES])
         self._engagement.begin(AvatarPose(np.array(base.position), np.array(base.quat_xyzw), first))
-        self._solver = HandSolver(robot.kinematics)
+        self._solver = HandSolver()
         self._corners: tuple[Vector, ...] = ()
         self._ticks = round(1.0 / (TARGET_HZ * world.clock.dt_s))
         self._number = 0
@@ -126,7 +126,13 @@ class Trial:
         return ArmPosition(*(np.array(self._human.link_pose(link).position) for link in self._links))
 
     def _positions(self) -> tuple[float, ...]:
-        return tuple(self._robot.joint_positions().values())
+        positions = _joint_positions(self._robot)
+        return tuple(positions[name] for name in self._solver.joint_names)
+
+
+def _joint_positions(robot: Any) -> dict[str, float]:
+    """Returns the positions of the joints that move by name [rad or m]."""
+    return dict(zip((joint.name for joint in robot.model.moving), robot.joint_positions().values()))
 
 
 def main() -> int:

@@ -5,17 +5,14 @@ from itertools import cycle
 
 import rospy
 
-from custom_ros_tools.config import replace_package
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
-from rpbi.kinematics import Kinematics
 from rpbi_examples.motions import PlanarPose
-from rpbi_examples.pushing import PLACES, Pusher, next_push
+from rpbi_examples.pushing import PLACES, Pusher, ball_solver, next_push
 
 from .joint_targets import HZ, JointTargets
 
 ROBOT = "kuka_lwr"
-URDF = "{rpbi_examples}/robots/kuka_lwr.urdf"
 REST_S = 0.5
 """Time for which the arm stands still at first, and between two looks for a box that is out of reach [s]."""
 
@@ -26,7 +23,7 @@ def main() -> None:
 
 
 def _run() -> None:
-    tf, arm, pusher = TfInterface(), JointTargets(ROBOT), Pusher(Kinematics(replace_package(URDF)))
+    tf, arm, pusher = TfInterface(), JointTargets(ROBOT), Pusher(ball_solver())
     positions = arm.positions
     _rest(arm, positions)
     for goal in cycle(PLACES):

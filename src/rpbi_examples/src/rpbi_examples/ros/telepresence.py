@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet_data
 import rospy
 from geometry_msgs.msg import Point
 from pydantic import Field
@@ -25,11 +24,9 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.schema import ConfigModel, Positive
 from operator_node.msg import SegmentForces
-from robot_model.asset_files import find_file
-from rpbi.kinematics import Kinematics
 from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
 from rpbi_examples.dressing.force import ArmForce, forces_on_arm
-from rpbi_examples.dressing.hand import ROBOT, HandSolver
+from rpbi_examples.dressing.hand import HandSolver
 from rpbi_examples.dressing.outcome import Outcome, outcome, rings_of
 from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
 
@@ -58,8 +55,7 @@ class TelepresenceNode:
     def __init__(self) -> None:
         self._config = config = private_parameters(TelepresenceParameters)
         self._dressing, self._force = Dressing(config.speed), ArmForce(config.force_limit)
-        self._kinematics = Kinematics(find_file(ROBOT, ".", (pybullet_data.getDataPath(),)))
-        self._solver = HandSolver(self._kinematics)
+        self._solver = HandSolver()
         self._tf, self._lock = TfInterface(), threading.Lock()
         self._felt_s = -math.inf
         self._positions: tuple[float, ...] | None = None
@@ -152,7 +148,7 @@ class TelepresenceNode:
             self._warn(topic, f"message refused: {error}")
 
     def _on_state(self, message: JointState) -> None:
-        positions = resolve_joint_order(message, self._kinematics.joint_names).position
+        positions = resolve_joint_order(message, self._solver.joint_names).position
         if not positions:
             raise ValueError("expected positions of the joints, got none")
         self._positions = tuple(positions)
