@@ -47,6 +47,7 @@ def test_help_of_a_command_is_its_section_and_sets_nothing_up(bare, command):
     assert sorted(path.name for path in bare.parent.iterdir()) == ["docs", "rpbi"]
 
 
+@pytest.mark.quick
 def test_the_list_has_a_line_for_each_command(bare):
     done = run([bare])
     assert done.returncode == 0
@@ -55,6 +56,7 @@ def test_the_list_has_a_line_for_each_command(bare):
     assert all(f"\n{line}\n" in SECTIONS[command] for command, line in listed.items())
 
 
+@pytest.mark.quick
 def test_the_page_names_all_extras_and_all_benchmarks_that_run_only_when_named():
     extras = {path.stem.removeprefix("requirements-") for path in ROOT.glob("requirements-*.txt")}
     assert words_of("setup", "EXTRA") >= extras

@@ -99,6 +99,7 @@ def check(env: WorldEnv) -> None:
         check_env(env, skip_render_check=True)  # it opens a window, see tests/gui
 
 
+@pytest.mark.quick
 def test_gymnasium_finds_nothing_to_complain_about(env):
     check(env)
 

@@ -75,6 +75,7 @@ def test_a_shoved_box_comes_back():
     assert trial.errors.max() > 0.015 and trial.recovered_s < 5.0 and trial.finished
 
 
+@pytest.mark.quick
 def test_a_box_far_off_its_path_stops_the_loop():
     """Pushing on would end elsewhere, and be called finished."""
     world, plant, loop = line_loop()

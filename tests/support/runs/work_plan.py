@@ -18,13 +18,25 @@ QUICK_FOLDERS = ("unit", "sim")
 """Folders whose tests are quick, as those of the top are; elsewhere those with the mark."""
 NOT_QUICK = (
     "sim/ik_ros/test_chain_solvers.py",
+    "sim/rpbi/bodies/test_other_robots.py",
+    "sim/rpbi/bodies/test_soft.py",
+    "sim/rpbi/meshes/test_hostile_files.py",
+    "sim/rpbi/pages",
+    "sim/rpbi/reference",
     "sim/rpbi/render/test_render.py",
+    "sim/rpbi/sensors/test_force_torque.py",
     "sim/rpbi/world/test_reset.py",
     "sim/rpbi/world/test_saved.py",
-    "sim/rpbi_examples/test_dressing.py",
+    "sim/rpbi/world/test_world_warnings.py",
+    "sim/rpbi_examples",
+    "sim/rpbi_mpc",
+    "test_commands.py",
+    "test_second_try.py",
+    "unit/operator_node/test_spacenav.py",
+    "unit/safe_robot/test_checks.py",
     "unit/safe_robot/test_guard_fuzz.py",
 )
-"""Files in these folders whose tests take longest: only the whole run has them."""
+"""Folders and files among these whose tests take longest: of them, too, only those with the mark are quick."""
 
 EXTRA_OF = {
     "pinocchio": "ik",
@@ -129,7 +141,7 @@ def _is_quick(item: pytest.Item) -> bool:
 
 
 def _is_all_quick(path: Path) -> bool:
-    if path in (TESTS / file for file in NOT_QUICK):
+    if any(path.is_relative_to(TESTS / name) for name in NOT_QUICK):
         return False
     return path.parent == TESTS or any(path.is_relative_to(TESTS / folder) for folder in QUICK_FOLDERS)
 

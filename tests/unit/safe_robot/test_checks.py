@@ -162,6 +162,7 @@ def test_a_robot_that_is_as_late_as_expected_follows_and_one_that_stands_does_no
     assert check.check(motion, CheckContext(measured={"slide": 0.5, "turn": 0.0})) is not None
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", ["force", "tracking"])
 def test_without_a_measurement_nothing_is_safe(name):
     check = check_of(name, GuardedRobot(KUKA))
@@ -228,6 +229,7 @@ def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
         assert (violation is None) == is_safe
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_path, side):
     robot = slider(tmp_path)
@@ -263,6 +265,7 @@ def test_the_middle_of_a_braking_is_tried_too(tmp_path):
     assert violation is not None and violation.is_while_braking
 
 
+@pytest.mark.quick
 def test_links_that_are_too_near_may_only_move_apart():
     check = check_of("self_collision", GuardedRobot(KUKA))
     generator = np.random.default_rng(4)
@@ -304,6 +307,7 @@ def stretched(tmp_path, q=(0.0, 0.0), step=FURTHER):
     return check_of("environment", robot), CommandedMotion(robot, State.at_rest(np.array(q)), np.array(q) + step, 0.01)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "obstacle",
     [

@@ -338,6 +338,7 @@ HOOK = """<robot name="hook"><link name="base"/><link name="load"><inertial><mas
 <joint name="hook" type="fixed"><parent link="base"/><child link="load"/></joint></robot>"""
 
 
+@pytest.mark.quick
 def test_hanging_payload_reads_its_weight_upwards(world_of):
     """The release's sign: the parent holds two kilogrammes up with +19.62 N."""
     found = step(world_of(sensors=["hook"], description=HOOK), 10)["hook"]

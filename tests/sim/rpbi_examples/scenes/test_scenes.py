@@ -86,6 +86,7 @@ def test_a_score_without_an_extra_names_it_in_one_line(tmp_path):
     assert "'pinocchio' is not installed: ./rpbi setup ik" in lines[-1] and "Traceback" not in complaints, complaints
 
 
+@pytest.mark.quick
 def test_the_tip_goes_where_the_scene_leads_it(env):
     result = run_episode(env, 5)
     assert result.success and result.figures["error [mm]"] < 2.0

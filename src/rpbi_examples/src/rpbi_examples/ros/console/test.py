@@ -25,7 +25,7 @@ def test(*words: Annotated[str, Argument("[--quick] [PATH | OPTION OF PYTEST ...
     fail.
 
     Args:
-        --quick: all that need no ROS but the longest files, and one test of each ROS path
+        --quick: most that need no ROS, and one test of each ROS path
         --strict: no failed test is run again
         -n N: N workers; -n 0 is one process
         PATH: a folder, a file or FILE::TEST
