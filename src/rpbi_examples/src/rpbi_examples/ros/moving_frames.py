@@ -70,5 +70,5 @@ def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, Arra
                 tf.tf_broadcaster.sendTransform(message)
             rate.sleep()
     except rospy.ROSException:
-        if not rospy.is_shutdown():  # Ctrl-C, asleep or on the way to a topic that is closed already
+        if not rospy.core.is_shutdown_requested():  # Ctrl-C, asleep or on the way to a topic that is closed already
             raise

@@ -78,7 +78,7 @@ class InterpolationNode:
                 self._tick(rospy.Time.now())
                 rate.sleep()
         except rospy.ROSException:
-            if not rospy.is_shutdown():  # its topic is closed already
+            if not rospy.core.is_shutdown_requested():  # its topic is closed already
                 raise
 
     def _on_waypoints(self, message: Float64MultiArray) -> None:

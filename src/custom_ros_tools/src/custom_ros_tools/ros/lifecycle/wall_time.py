@@ -61,7 +61,7 @@ class WallTimer:
                 if self._rate.is_due():
                     self._action()
             except Exception:
-                if not rospy.is_shutdown():  # otherwise its topics are closed already
+                if not self._ended.is_set():  # otherwise its topics may be closed already
                     self._warn(threading.current_thread().name, traceback.format_exc())
 
 

@@ -1,0 +1,35 @@
+"""Timers by the wall clock."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+import rospy
+
+from custom_ros_tools.ros.lifecycle import wall_time
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+
+
+@pytest.mark.parametrize("is_ended", [False, True], ids=["while it runs", "at the end"])
+def test_an_exception_is_logged_unless_the_timer_has_been_stopped(monkeypatch, is_ended):
+    """A node that ends closes its topics before rospy says that it does."""
+    called, logged, is_made = threading.Semaphore(0), [], threading.Event()
+    monkeypatch.setattr(wall_time.rospy, "logwarn", lambda *words: logged.append(words))
+
+    def publish() -> None:
+        assert is_made.wait(10.0)
+        if is_ended:
+            timer.stop()
+        called.release()
+        raise rospy.ROSException("topic was closed during publish()")
+
+    timer = WallTimer(200.0, publish)
+    is_made.set()
+    threads = [thread for thread in threading.enumerate() if thread.name == "wall timer"]
+    assert called.acquire(timeout=10.0)
+    assert is_ended or called.acquire(timeout=10.0), "it goes on"
+    timer.stop()
+    for thread in threads:
+        thread.join(10.0)
+    assert len(logged) == (0 if is_ended else 1)
