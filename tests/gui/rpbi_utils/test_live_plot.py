@@ -36,7 +36,7 @@ class _Wave:
 
     def __init__(self) -> None:
         self._ended = Event()
-        self._publisher = rospy.Publisher(WAVE, JointState, queue_size=10)
+        self._publisher = rospy.Publisher(WAVE, JointState, queue_size=10 * HZ)  # of a busy machine, none is lost
         Thread(target=self._run, daemon=True).start()
 
     def _run(self) -> None:
