@@ -233,6 +233,21 @@ def test_a_world_that_becomes_slower_than_the_clock_of_the_sender_lags_only_for_
     assert max(lags) < 200 and max(lags[-10:]) < 10
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_slow_world_that_gets_its_targets_in_bursts_never_jumps_to_the_newest_one(seed):
+    """As on a busy machine: what is still to be played when the clock of the stamps turns out to be another one is."""
+    rng, speed, burst, targets = random.Random(seed), 0.003, 0, []
+    for n in range(600):
+        tick = n * PERIOD if n < 100 else 100 * PERIOD + round(0.6 * PERIOD * (n - 100))
+        if tick > burst and n >= 100:
+            burst = tick + rng.choice((0, 0, 8, 20, 60, 90))
+        targets.append((max(tick, burst), speed * n * PERIOD, stamp_ns(n * PERIOD)))
+    positions = play(targets, targets[-1][0] + 800, buffer_s=0.1)
+    largest = max(abs(after - before) for before, after in zip(positions[500:], positions[501:]))
+    assert largest < 100.0 * speed, "a burst, but not the whole rest, which is 300 to 400 ticks"
+    assert max(positions) - targets[-1][1] < 0.5 and positions[-1] == targets[-1][1]
+
+
 @pytest.mark.parametrize(
     "stamp",
     [lambda n: 0, lambda n: stamp_ns(0), lambda n: stamp_ns(-n * PERIOD), lambda n: stamp_ns(3 * n * PERIOD)],

@@ -37,6 +37,8 @@ PERSISTENT = 4
 """Number of targets out of step in a row after which only these count."""
 SAME_PERIOD = (0.6, 1.6)
 """Range of the mean of the last `PERSISTENT` intervals within which the period has not changed [periods]."""
+SHORTEST_WAY = 0.05
+"""Least time between two targets [ticks]."""
 LEAST_AHEAD = 0.25
 """Smallest delay between arrival and playing of a target [ticks]."""
 
@@ -65,17 +67,19 @@ class Playout(NamedTuple):
         end: When to be at this one [ticks].
         period: Period of the stream [ticks], 0 if the target is not part of a stream.
         speed: Time between this target and the one before as they were sent, over that as they are played.
+        pace: Mean time between the last targets as they came [ticks].
     """
 
     start: float
     end: float
     period: float
     speed: float = 1.0
+    pace: float = 0.0
 
     @property
     def is_immediate(self) -> bool:
         """Whether the target acts at once."""
-        return self.period <= EVERY_TICK
+        return self.start == self.end
 
 
 class JitterBuffer:
@@ -108,6 +112,8 @@ class JitterBuffer:
         """The last stamp of a whole window that ran as fast as the world's time [ns]."""
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
+        self._pace = 0.0
+        """Mean time between targets as they came [ticks]; 0 if all of them came before the same tick."""
         self._restart()
 
     def _restart(self) -> None:
@@ -129,6 +135,8 @@ class JitterBuffer:
         """
         if self._seen and self._is_apart(tick, stamp_ns):
             self._restart()
+        elif self._seen:
+            self._pace += (tick - self._seen[-1].tick - self._pace) / WINDOW
         self._seen.append(Arrival(tick, stamp_ns, goal))
         self._count += 1
         times, is_stamped = self._times()
@@ -136,8 +144,7 @@ class JitterBuffer:
         intervals = sorted(after - before for before, after in zip(times, times[1:])) or [0.0]
         mean_interval = (times[-1] - times[0]) / len(intervals)
         if mean_interval <= EVERY_TICK or 0.0 < intervals[len(intervals) // 2] <= EVERY_TICK:
-            self._end, self._interval = float(tick), 0.0
-            return Playout(self._end, self._end, min(mean_interval, EVERY_TICK))
+            return self._at_every_tick(tick, mean_interval)
         if self._interval and count > 3:
             self._count_lost(times)
         if self._interval and count > PERSISTENT + 1 and self._is_out_of_step(times):
@@ -161,12 +168,27 @@ class JitterBuffer:
         sent_ticks = (stamp_ns - last.stamp_ns) / self._dt_ns if self._is_clock_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
 
+    def _at_every_tick(self, tick: int, interval: float) -> Playout:
+        """Returns when to play a target that comes alone, or at every tick: at once, or after the rest of a stream."""
+        self._interval = 0.0
+        if self._end - tick <= EVERY_TICK or not self._pace:
+            self._end = float(tick)
+            return Playout(self._end, self._end, min(interval, EVERY_TICK))
+        self._start = self._end
+        self._end += max(SHORTEST * self._pace, SHORTEST_WAY)
+        return Playout(self._start, self._end, 2.0 * EVERY_TICK, pace=self._pace)
+
+    def _least_way(self, tick: int) -> float:
+        """Returns the least time from the target before to the newest [ticks]."""
+        return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
+
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
         """Returns when to play the newest target, which is as near to the planned time as the delay may change."""
         before = self._end
         if self._count == 2:
-            self._end = max(planned, tick + SHORTEST * period)
-            self._start = self._end - interval
+            way = max(SHORTEST * interval, self._least_way(tick))
+            self._end = max(planned, tick + max(SHORTEST * period, LEAST_AHEAD), before + way)
+            self._start = max(self._end - interval, before)
             return Playout(self._start, self._end, period)
         gain = max(min(interval / self._settling, 1.0), 2.0 / (self._count + 2.0))
         regular = before + interval
@@ -174,11 +196,11 @@ class JitterBuffer:
         if (late := tick - before) > 0.0:
             beyond = min(late / self.extrapolation - 1.0, 1.0) if self.extrapolation else 1.0
             end = max(end, tick + SHORTEST * period * beyond)
-        self._end = end = max(end, tick + LEAST_AHEAD)
+        self._end = end = max(end, tick + LEAST_AHEAD, before + self._least_way(tick))
         if interval <= REPLACED * period:
-            return Playout(self._start, end, period)
+            return Playout(self._start, end, period, pace=self._pace)
         self._start = before
-        return Playout(before, end, period, interval / (end - before))
+        return Playout(before, end, period, interval / (end - before), self._pace)
 
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
         """Returns when the newest target would have come without a delay, from its arrival [ticks].

@@ -17,11 +17,13 @@ from collections.abc import Callable, Iterable, Mapping
 
 from rpbi.control.motors import POSITION_MODES, Motors, ResolvedCommand, coalesce
 
-from .jitter_buffer import JitterBuffer
+from .jitter_buffer import EVERY_TICK, JitterBuffer
 from .segment import StreamSegment, agree
 
 ADAPTATION_PERIODS = 4.0
 """Time constant with which the window of the moving average follows the period [periods]."""
+HURRIED = 0.5
+"""Share of the time between targets below which the time for a way says nothing of the velocity to come."""
 SAME_TIME = 1e-9
 """Difference of times that is an error of rounding [ticks]."""
 RETURN_PERIODS = 5.0
@@ -50,7 +52,7 @@ class TargetStream:
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
         self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
-        """Velocities at the last targets by joint index [rad or m per tick]."""
+        """Velocities at the last targets by joint index [rad or m per tick]; none of a hurried way."""
         self._period = 0.0
         self._window = self._lagging_window = self._wanted_window = 0.0
         self.set_points = held
@@ -77,10 +79,15 @@ class TargetStream:
         else:
             slopes = {index: velocity * playout.speed for index, velocity in slopes.items()}
             segment = self._append(max(playout.start, float(tick)), playout.end, goal, slopes)
-            self._wanted_window = playout.period if self._smooth and segment.slopes is None else 0.0
+            period = max(playout.period, EVERY_TICK)
+            if segment.length < HURRIED * max(period, playout.pace):
+                self._velocities.clear()
+            else:
+                self._velocities.append(segment.velocity(playout.end))
+            self._wanted_window = period if self._smooth and segment.slopes is None else 0.0
             if not self._period:
                 self._window = self._lagging_window = self._wanted_window
-            self._period = playout.period
+            self._period = period
         self._goal, self._slopes, self.rests = goal, slopes, False
 
     def _append(
@@ -99,7 +106,6 @@ class TargetStream:
         way = {index: value - leaving[index] for index, value in goal.items()}
         ends = (before, slopes) if before and slopes and agree(way, end - start, before, slopes) else None
         segments.append(StreamSegment(start, end - start, goal, way, ends))
-        self._velocities.append(segments[-1].velocity(end))
         return segments[-1]
 
     def advance(self, tick: float) -> Mapping[int, float]:
