@@ -102,7 +102,8 @@ class GuardNode:
 
     def _answer(self, message: JointState) -> bool:
         if self._guard.is_halted:
-            self._status.warn_of_halt()
+            if not rospy.core.is_shutdown_requested():  # otherwise it is because its topic has closed
+                self._status.warn_of_halt()
             return False
         try:
             decision = self._decide(message)
