@@ -36,7 +36,7 @@ NOT_QUICK = (
     "unit/safe_robot/test_checks.py",
     "unit/safe_robot/test_guard_fuzz.py",
 )
-"""Folders and files among these whose tests take longest: of them, too, only those with the mark are quick."""
+"""Folders and files whose tests take longest: of these, too, only tests with the mark are quick."""
 
 EXTRA_OF = {
     "pinocchio": "ik",

@@ -235,7 +235,7 @@ def test_a_world_that_becomes_slower_than_the_clock_of_the_sender_lags_only_for_
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_slow_world_that_gets_its_targets_in_bursts_never_jumps_to_the_newest_one(seed):
-    """As on a busy machine: what is still to be played when the clock of the stamps turns out to be another one is."""
+    """As on a busy machine: targets that wait are played, also once the clock of the stamps counts as another one."""
     rng, speed, burst, targets = random.Random(seed), 0.003, 0, []
     for n in range(600):
         tick = n * PERIOD if n < 100 else 100 * PERIOD + round(0.6 * PERIOD * (n - 100))

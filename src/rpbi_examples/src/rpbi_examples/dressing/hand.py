@@ -15,11 +15,11 @@ from robot_model.geometry import Pose
 from .way import Array
 
 RADIUS_M = 0.085
-"""File of the sleeve."""
+"""Radius of the cuff."""
 ROBOT, BASE_LINK, HAND_LINK = "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget"
-"""File of PyBullet's data."""
+"""A file of PyBullet's data, its root link, and the link between the fingertips."""
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
-"""Base of the robot, as in `panda.yaml`."""
+"""Base of the robot in the world, as in `panda.yaml`."""
 MAX_TURN_RAD = 0.3
 """Joints that would have to turn farther for the next target stay where they are."""
 

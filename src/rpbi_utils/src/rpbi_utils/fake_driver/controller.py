@@ -314,8 +314,7 @@ class RobotController:
         self._waiting.clear()
 
     def _planned(self, now_s: float) -> float:
-        """Returns the time for the motors of a command that arrives now [s]: nearly one cycle after the previous "
-        "one."""
+        """Returns the time for the motors of a command that arrives now [s]: nearly a cycle after the one before."""
         planned_s = self._planned_s + self._cycle_s
         if now_s - planned_s > MAX_GAP_S:
             return now_s

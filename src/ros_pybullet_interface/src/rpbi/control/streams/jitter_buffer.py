@@ -38,7 +38,7 @@ PERSISTENT = 4
 SAME_PERIOD = (0.6, 1.6)
 """Range of the mean of the last `PERSISTENT` intervals within which the period has not changed [periods]."""
 SHORTEST_WAY = 0.05
-"""Least time between two targets [ticks]."""
+"""Least time from one target to the next as they are played [ticks]."""
 LEAST_AHEAD = 0.25
 """Smallest delay between arrival and playing of a target [ticks]."""
 
@@ -105,7 +105,6 @@ class JitterBuffer:
         self._settling = SETTLING_S / dt_s
         self._longest = LONGEST_PERIOD_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
-        self._stall_ns = STALL_S * 1e9
         self._is_clock_right: bool | None = None
         """Whether stamps run as fast as the world's time: False once they did not, until a whole window does."""
         self._in_step_ns = 0
@@ -179,7 +178,11 @@ class JitterBuffer:
         return Playout(self._start, self._end, 2.0 * EVERY_TICK, pace=self._pace)
 
     def _least_way(self, tick: int) -> float:
-        """Returns the least time from the target before to the newest [ticks]."""
+        """Returns the least time from the target before to the newest as they are played [ticks].
+
+        While the rest of a stream is still to be played, a burst takes at least half of the time that so many targets
+        usually take.
+        """
         return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
@@ -245,7 +248,7 @@ class JitterBuffer:
         That is so until they have left the window.
         """
         seen_ns = self._seen[-1].stamp_ns - self._seen[0].stamp_ns
-        return 0 < self._seen[-1].stamp_ns - self._in_step_ns <= seen_ns + self._stall_ns
+        return 0 < self._seen[-1].stamp_ns - self._in_step_ns <= seen_ns + STALL_S * 1e9
 
     def _steps(self) -> list[int]:
         """Returns the number of periods from the newest target to each."""
