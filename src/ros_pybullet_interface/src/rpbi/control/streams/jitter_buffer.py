@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from .sender_clock import DRIFT, Arrival, SenderClock
+
 BUFFER_S = 0.02
 """Default delay in which late targets are still in time [s]."""
 LONGEST_PERIOD_S = 0.2
@@ -21,10 +23,6 @@ SHORTEST = 0.8
 """A target is played no sooner after the one before than this share of the time between them."""
 REPLACED = 0.25
 """A target that was sent sooner than this share of the period after another one replaces it."""
-DRIFT = 0.1
-"""Stamps are used while they run as fast as the world's time within this share."""
-STALL_S = 1.0
-"""Longest stall of world or sender [s] after which the stamps of what comes at once are still used."""
 MIN_MISFIT_RATIO = 2.0
 """Ratio of excess squared misfits above which a regular period replaces stamps, or the reverse."""
 MIN_MISFIT = 1e-10
@@ -41,22 +39,6 @@ SHORTEST_WAY = 0.05
 """Least time from one target to the next as they are played [ticks]."""
 LEAST_AHEAD = 0.25
 """Smallest delay between arrival and playing of a target [ticks]."""
-
-
-class Arrival(NamedTuple):
-    """A target that came.
-
-    Attributes:
-        tick: The tick before which it came.
-        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
-        goal: Positions by joint index [rad or m].
-        step: Number of periods since the target before.
-    """
-
-    tick: int
-    stamp_ns: int
-    goal: Mapping[int, float]
-    step: int = 1
 
 
 class Playout(NamedTuple):
@@ -100,15 +82,11 @@ class JitterBuffer:
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
-        self._dt_ns = dt_s * 1e9
         self._buffer = max(buffer_s / dt_s - 1.5, 0.0)
         self._settling = SETTLING_S / dt_s
         self._longest = LONGEST_PERIOD_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
-        self._is_clock_right: bool | None = None
-        """Whether stamps run as fast as the world's time: False once they did not, until a whole window does."""
-        self._in_step_ns = 0
-        """The last stamp of a whole window that ran as fast as the world's time [ns]."""
+        self._sender = SenderClock(dt_s)
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
         self._pace = 0.0
@@ -116,7 +94,7 @@ class JitterBuffer:
         self._restart()
 
     def _restart(self) -> None:
-        self._is_clock_right = self._is_clock_right or None
+        self._sender.restart()
         self._seen.clear()
         self._count = 0
         self._interval = 0.0
@@ -138,7 +116,7 @@ class JitterBuffer:
             self._pace += (tick - self._seen[-1].tick - self._pace) / WINDOW
         self._seen.append(Arrival(tick, stamp_ns, goal))
         self._count += 1
-        times, is_stamped = self._times()
+        times, is_stamped = self._sender.times(self._seen)
         count = len(times)
         intervals = sorted(after - before for before, after in zip(times, times[1:])) or [0.0]
         mean_interval = (times[-1] - times[0]) / len(intervals)
@@ -164,7 +142,7 @@ class JitterBuffer:
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
         """Returns whether a target comes, or was sent by a right clock, too long after the last one for a stream."""
         last = self._seen[-1]
-        sent_ticks = (stamp_ns - last.stamp_ns) / self._dt_ns if self._is_clock_right else 0.0
+        sent_ticks = self._sender.ticks_between(last.stamp_ns, stamp_ns) if self._sender.is_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
 
     def _at_every_tick(self, tick: int, interval: float) -> Playout:
@@ -218,37 +196,6 @@ class JitterBuffer:
         undelayed = least - 2.0 * (sum(delays) / len(delays) - least) / len(delays)
         self._out_of_step = self._out_of_step + 1 if undelayed < -self._buffer - 1.0 else 0
         return undelayed
-
-    def _times(self) -> tuple[list[float], bool]:
-        """Returns when targets were sent by their stamps if these make sense, else when they came, and which of both.
-
-        Times are counted from the newest target [ticks].
-        """
-        tick, stamp_ns = self._seen[-1].tick, self._seen[-1].stamp_ns
-        arrivals = [float(each.tick - tick) for each in self._seen]
-        stamps = [(each.stamp_ns - stamp_ns) / self._dt_ns for each in self._seen]
-        rises = all(before < after for before, after in zip(stamps, stamps[1:]))
-        return (stamps, True) if rises and self._uses_stamps(stamps, arrivals) else (arrivals, False)
-
-    def _uses_stamps(self, stamps: Sequence[float], arrivals: Sequence[float]) -> bool:
-        """Returns whether stamps run as fast as the world's time, apart from stalls."""
-        is_full = len(stamps) == WINDOW
-        is_in_step = abs(stamps[0] - arrivals[0]) <= self._longest / 2.0 - DRIFT * arrivals[0]
-        if is_in_step and (is_full or self._is_clock_right is not False):
-            if is_full:
-                self._is_clock_right, self._in_step_ns = True, self._seen[-1].stamp_ns
-            return True
-        if not is_in_step:
-            self._is_clock_right = bool(self._is_clock_right) and self._may_have_waited()
-        return bool(self._is_clock_right)
-
-    def _may_have_waited(self) -> bool:
-        """Returns whether targets that come too fast for their stamps may have waited for the world or the sender.
-
-        That is so until they have left the window.
-        """
-        seen_ns = self._seen[-1].stamp_ns - self._seen[0].stamp_ns
-        return 0 < self._seen[-1].stamp_ns - self._in_step_ns <= seen_ns + STALL_S * 1e9
 
     def _steps(self) -> list[int]:
         """Returns the number of periods from the newest target to each."""
