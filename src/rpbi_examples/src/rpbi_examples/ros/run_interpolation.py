@@ -12,6 +12,7 @@ from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.files import atomic_file
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, position_in
@@ -114,7 +115,8 @@ class RunInterpolation:
         path = Path(rospy.get_param("~working_directory", ".").strip(), name)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=100)
+            with atomic_file(path) as part:
+                figure.savefig(part, dpi=100)
         except (OSError, ValueError) as error:
             raise InterfaceError(f"plot: expected a picture file that can be written, got '{path}': {error}") from error
         rospy.loginfo("the motion is drawn in %s", path)
