@@ -95,7 +95,11 @@ class _StampedTopic(FastTopic):
 
     def publish(self, message: Any) -> None:
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
-        super().publish(message)
+        try:
+            super().publish(message)
+        except rospy.ROSException:
+            if not rospy.core.is_shutdown_requested():  # else it is closed, which actionlib's timer does not know
+                raise
 
     def unregister(self) -> None:
         self.close()
