@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 MAX_OFFSET_S = 0.1
-"""Largest difference between stamps and arrivals [s] over the last targets, `DRIFT` apart."""
+"""Largest difference between the times of the last targets by stamps and by arrivals [s]; `DRIFT` comes on top."""
 DRIFT = 0.1
 """Largest relative difference of rate between stamps and the world's time."""
 STALL_S = 1.0
