@@ -10,7 +10,7 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from importlib import import_module
 from itertools import count
@@ -286,6 +286,47 @@ def keep_accepting() -> None:
         "who connects and sends no header, or a lack of file handles, keeps others from this node",
         wrap,
     )
+
+
+def keep_new_connections() -> None:
+    """Makes this process, before it is a node, remove from its topics only connections that have ended.
+
+    rospy finds a connection by its file number too, which a new connection gets as soon as the earlier one is closed.
+    The new one may then be removed instead: without being closed, so that its subscriber waits forever, or closed.
+    """
+
+    def wrap() -> None:
+        topic = import_module("rospy.topics")._TopicImpl
+        check, topic._remove_connection = topic.check, _remove_connection
+
+        def check_locked(self: Any) -> None:
+            lock = self.c_lock
+            if lock is not None and any(self.connection_poll.error_iter()):
+                with lock:  # what it finds in here is not closed before it has removed it
+                    if self.c_lock is not None:  # else the topic was closed meanwhile
+                        check(self)
+
+        topic.check = check_locked
+
+    _expecting(
+        "rospy.topics._TopicImpl to check and remove its connections",
+        "a subscriber that connects while another one ends may receive nothing",
+        wrap,
+    )
+
+
+def _remove_connection(topic: Any, connections: list[Any], ended: Any) -> None:
+    """Closes a connection of a topic and removes it from a list, in which it may be the one behind a queue."""
+    if not ended.done:  # else its file is closed, and the number may be that of another connection
+        with suppress(OSError, TypeError, ValueError):  # it was not polled
+            topic.connection_poll.remove_fd(ended.fileno())
+        with suppress(Exception):  # as rospy does
+            ended.close()
+    connections[:] = [each for each in connections if _without_queue(each) is not _without_queue(ended)]
+
+
+def _without_queue(connection: Any) -> Any:
+    return vars(connection).get("_connection", connection)
 
 
 def answer_cached(parameter: str, value: Any) -> None:

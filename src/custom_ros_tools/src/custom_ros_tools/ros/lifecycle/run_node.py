@@ -21,7 +21,7 @@ import rosgraph
 import rospy
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.rospy_internals import keep_accepting
+from custom_ros_tools.ros.rospy_internals import keep_accepting, keep_new_connections
 
 from .master_watch import MasterWatch
 from .node_logging import LOG_PARAMETER, attach_logging, log_fatal_lines
@@ -40,6 +40,7 @@ MAX_FILES = 8192
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
     """Makes this process a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
     keep_accepting()
+    keep_new_connections()
     allow_large_integers()
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)

@@ -1,0 +1,45 @@
+"""Threads that start while the priority of their process is changed are changed as well."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import os
+import threading
+from rpbi.render import priority
+
+over, find = threading.Event(), priority._threads
+
+def find_before_another_starts(process_id):
+    found = find(process_id)
+    if threading.active_count() == 1:
+        threading.Thread(target=over.wait).start()
+    return found
+
+priority._threads = find_before_another_starts
+priority.{change}
+print(*(os.sched_getscheduler(int(each)) for each in os.listdir("/proc/self/task")))
+over.set()
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "change", "policy"),
+    [
+        (os.SCHED_OTHER, "run_when_idle()", os.SCHED_IDLE),
+        (os.SCHED_IDLE, "run_normally(os.getpid())", os.SCHED_OTHER),
+        (os.SCHED_IDLE, "raise_from_idle(os.getpid())", os.SCHED_OTHER),
+    ],
+    ids=["idle", "normal", "raised"],
+)
+def test_all_threads_are_changed(before, change, policy):
+    command = [sys.executable, "-c", PROGRAM.format(change=change)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, preexec_fn=lambda: os.sched_setscheduler(0, before, os.sched_param(0))
+    )
+    assert done.stdout.split() == [str(policy)] * 2, done.stderr
