@@ -30,7 +30,16 @@ from ros_pybullet_interface.srv import ListObjects
 
 MODULES = os.environ.get("PYTHONPATH")
 """Where all programs find Python modules; those of a test that adds to it, but for `support_on_path`, are no forks."""
-READ_LATE = {"DISPLAY", "LIBGL_ALWAYS_SOFTWARE", "SPNAV_SOCKET"}
+READ_LATE = {
+    "DISPLAY",
+    "HOME",
+    "LIBGL_ALWAYS_SOFTWARE",
+    "ROS_HOSTNAME",
+    "ROS_IP",
+    "ROS_MASTER_URI",
+    "SPNAV_SOCKET",
+    "XDG_RUNTIME_DIR",
+}
 """Variables that no module reads when it is imported."""
 SUPPORT = Path(__file__).resolve().parents[1]
 """Where the tests' helpers are, in folders by subject; programs that tests start are in `programs`."""
@@ -197,7 +206,7 @@ class RosSystem:
             log: Name of the file of its output.
             fresh: Whether our nodes, and those that roslaunch starts, are new processes with all their imports, and
                 not forks.
-            environment: Variables of its own; with any but those of a screen, or another PYTHONPATH than that of
+            environment: Variables of its own; with any but those of `READ_LATE`, or another PYTHONPATH than that of
                 `support_on_path`, it is fresh too.
         """
         is_launch = command[0] == "roslaunch" or [*command[:2]] == [RPBI, "launch"]

@@ -70,6 +70,8 @@ class Workplace:
             XDG_RUNTIME_DIR=str(run),
             OPENBLAS_NUM_THREADS="1",  # else each import of numpy has threads of the other processors spin for 0.1 s
         )
+        if "PYTEST_XDIST_WORKER" not in os.environ:  # all workers share what is made once, such as trials of meshes
+            os.environ["XDG_CACHE_HOME"] = str(self.folder / "cache")
         if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):  # else each of a thousand nodes would compile its modules
             os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).resolve().parents[3] / ".rpbi/pycache")
         if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # so it is behind the `&` of a script
