@@ -14,7 +14,7 @@ from rpbi_examples.scenes.task import make_env, run_episode
 ENDED = re.compile(r"seed (\d+) (\w+), after ([^;]*); (.*), real-time factor.* state: (\w+)")
 OPTIONS = "headless:=true", "real_time_factor:=0"
 BOUNDS = {
-    "cup": {"off [mm]": (0.0, 5.0), "largest tilt [deg]": (0.0, 5.0)},
+    "cup": {"balls inside": (5.0, 5.0), "off [mm]": (0.0, 5.0), "largest tilt [deg]": (0.0, 5.0)},
     "wiping": {
         "way within 10 % [%]": (95.0, 100.0),
         "stains gone [%]": (100.0, 100.0),

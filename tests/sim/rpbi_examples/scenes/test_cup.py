@@ -1,4 +1,4 @@
-"""The cup comes onto the shelf with its balls, held by friction alone; a ball beside it is no success."""
+"""A ball beside the cup, or a cup without friction, is no success; one that succeeds is tested with the launch file."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ def env():
     found.close()
 
 
-def test_the_cup_comes_onto_the_shelf_with_its_balls(env):
-    result = run_episode(env, 203)
-    assert result.success, result
-    figures = result.figures
-    assert figures["balls inside"] == 5 and figures["off [mm]"] < 5.0 and figures["largest tilt [deg]"] < 5.0
+def test_a_ball_that_leaves_the_cup_is_a_fault(env):
+    env.reset(seed=203)
+    for _ in range(50):
+        env.step(None)
+    scene = env.task.scene
+    assert scene.figures()["balls inside"] == 5 and not scene.fault(), "they have come to rest in it"
     env.world.act("ball_3", "teleport", Pose((0.5, 0.0, 0.6)))
     env.step(None)
-    assert env.task.scene.figures()["balls inside"] == 4 and not env.task.scene.has_succeeded()
-    assert env.task.scene.fault() == "1 of 5 balls spilled"
+    assert scene.figures()["balls inside"] == 4 and not scene.has_succeeded()
+    assert scene.fault() == "1 of 5 balls spilled"
 
 
 def test_a_slippery_cup_stays_on_the_table(env, monkeypatch):
