@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 from collections.abc import Iterator
+from itertools import count
 
 import pytest
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
@@ -76,12 +77,17 @@ def test_who_comes_back_while_its_last_connection_ends_is_served(topic, is_mende
     assert topic.reaches(topic.ends[-1]) == is_mended
 
 
-@MENDED
-def test_who_comes_while_a_lost_connection_is_looked_for_is_served(topic, is_mended, monkeypatch):
+@pytest.mark.parametrize(
+    ("is_mended", "call"),
+    [(True, 1), (True, 2), (False, 1)],
+    ids=["mended", "mended, under the lock", "rospy by itself"],
+)
+def test_who_comes_while_a_lost_connection_is_looked_for_is_served(topic, is_mended, call, monkeypatch):
+    """The new connection gets the file of the lost one right after a call that has found that to be lost."""
     lost = topic.connect("/viewer")
     topic.ends[0].close()
     find = topic.impl.connection_poll.error_iter
-    is_replaced = threading.Event()
+    is_replaced, calls = threading.Event(), count(1)
 
     def replace() -> None:
         lost.socket.detach()
@@ -91,7 +97,7 @@ def test_who_comes_while_a_lost_connection_is_looked_for_is_served(topic, is_men
 
     def find_late() -> list[int]:
         found = list(find())
-        if found and not is_replaced.is_set():
+        if next(calls) == call:
             threading.Thread(target=replace).start()
             is_replaced.wait(0.5)
         return found

@@ -21,6 +21,7 @@ JOINT_STATES = "/rpbi/iiwa/joint_states"
 BUILT_OTHERWISE = "this rospy is built otherwise: expected "
 SENDING = "messages go by rospy's queues and threads, which is slower at high rates"
 REGISTERING = "a ROS master that comes back will not know this node: start it again then"
+REMOVING = "a subscriber that connects while another one ends may receive nothing"
 LOGGING = "who logs something waits for a master that hangs"
 SENDERS = {
     "a publisher's implementation": (r"\bself\.impl\b", "self.inner"),
@@ -91,6 +92,15 @@ def test_a_master_that_comes_back_is_noticed_though_nothing_is_registered_again(
     wait_until(lambda: ros.output(listening).count("\n") > before + 10, "joint states still come")
     assert second_master.registrations(NODE) == []
     assert process.poll() is None and "Traceback" not in ros.output(process), ros.output(process)
+
+
+def test_the_simulator_leaves_the_removal_of_connections_to_rospy(ros, tmp_path):
+    environment = _other_rospy(tmp_path, (r"\b_remove_connection\b", "_drop_connection"))
+    process = ros.simulator(_config(tmp_path), use_sim_time=True, **environment)
+    (line,) = _lines(ros, process, BUILT_OTHERWISE)
+    assert line.endswith(REMOVING)
+    ros.listen(JOINT_STATES, JointState).wait_for(10)
+    assert "Traceback" not in ros.output(process), ros.output(process)
 
 
 def test_the_rospy_that_is_here_is_as_expected(ros, tmp_path):

@@ -21,6 +21,7 @@ def find_before_another_starts(process_id):
         threading.Thread(target=over.wait).start()
     return found
 
+os.sched_setscheduler(0, {before}, os.sched_param(0))
 priority._threads = find_before_another_starts
 priority.{change}
 print(*(os.sched_getscheduler(int(each)) for each in os.listdir("/proc/self/task")))
@@ -38,8 +39,6 @@ over.set()
     ids=["idle", "normal", "raised"],
 )
 def test_all_threads_are_changed(before, change, policy):
-    command = [sys.executable, "-c", PROGRAM.format(change=change)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, preexec_fn=lambda: os.sched_setscheduler(0, before, os.sched_param(0))
-    )
+    command = [sys.executable, "-c", PROGRAM.format(before=before, change=change)]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.stdout.split() == [str(policy)] * 2, done.stderr

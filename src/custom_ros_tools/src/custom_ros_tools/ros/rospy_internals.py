@@ -297,16 +297,20 @@ def keep_new_connections() -> None:
 
     def wrap() -> None:
         topic = import_module("rospy.topics")._TopicImpl
-        check, topic._remove_connection = topic.check, _remove_connection
+        check, _ = topic.check, topic._remove_connection
+        trial = topic("/trial", rospy.AnyMsg)
+        with trial.c_lock:
+            assert not [*trial.connection_poll.error_iter()]
+        trial.close()
 
         def check_locked(self: Any) -> None:
             lock = self.c_lock
-            if lock is not None and any(self.connection_poll.error_iter()):
+            if lock is not None and [*self.connection_poll.error_iter()]:
                 with lock:  # what it finds in here is not closed before it has removed it
                     if self.c_lock is not None:  # else the topic was closed meanwhile
                         check(self)
 
-        topic.check = check_locked
+        topic.check, topic._remove_connection = check_locked, _remove_connection
 
     _expecting(
         "rospy.topics._TopicImpl to check and remove its connections",

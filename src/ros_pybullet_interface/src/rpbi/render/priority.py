@@ -33,7 +33,7 @@ def raise_from_idle(process_id: int) -> None:
 
 
 def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
-    """Changes all threads of a process, those too that others start meanwhile, before their own change."""
+    """Changes all threads of a process, including those that start meanwhile."""
     changed: set[int] = set()
     while new := _threads(process_id) - changed:
         for thread_id in new:
