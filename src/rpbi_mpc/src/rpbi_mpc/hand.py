@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import ConfigModel, ListOf, Text, Unit
 from robot_model.asset_files import find_file
+from robot_model.linear_algebra import solve
 from robot_model.model import RobotModel
 
 TOLERANCE_M, TOLERANCE_RAD = 1e-4, 1e-3
@@ -108,7 +109,7 @@ class PlanarHand:
         """Returns positions that are nearer, by one damped step of least squares."""
         jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
         damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
-        step = jacobian.T @ np.linalg.solve(damped, error)
+        step = jacobian.T @ solve(damped, error)
         step *= min(1.0, MAX_STEP_RAD / max(float(np.abs(step).max()), 1e-12))
         improved: np.ndarray = np.clip(q + step, self._robot.limits.lower, self._robot.limits.upper)
         return improved

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from robot_model.limits import Limits
+from robot_model.linear_algebra import solve
 
 from .kdl import Goal, KdlChain
 
@@ -50,7 +51,7 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
         square = jacobian.T @ jacobian
         while damping <= LARGEST_DAMPING:
             step = np.zeros(len(q))
-            step[free] = -np.linalg.solve(square + damping * np.eye(len(square)), gradient[free])
+            step[free] = -solve(square + damping * np.eye(len(square)), gradient[free])
             step *= min(1.0, LARGEST_STEP / max(np.abs(step).max(), 1e-12))
             moved = np.clip(q + step, lower, upper)
             moved_error, moved_turn = _error(chain, goal, moved)

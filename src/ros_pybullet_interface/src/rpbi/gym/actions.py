@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from robot_model.geometry import normalized, quaternion_of, quaternion_product, rotation_between
+from robot_model.linear_algebra import solve
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
-from rpbi.linear_algebra import solve
 from rpbi.world import World
 
 from .parts import link_index, robot_of

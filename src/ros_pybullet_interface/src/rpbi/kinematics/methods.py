@@ -8,8 +8,8 @@ import numpy as np
 import pybullet
 
 from robot_model.limits import Limits
+from robot_model.linear_algebra import inverse
 from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
-from rpbi.linear_algebra import inverse
 
 from .chain import BulletChain, Target
 

@@ -18,7 +18,7 @@ from pydantic import Field
 from custom_ros_tools.errors import hint
 from custom_ros_tools.schema import ConfigModel, Positive, Unit
 from robot_model.geometry import Vector, scaled
-from rpbi.linear_algebra import solve
+from robot_model.linear_algebra import solve
 from rpbi.urdf.joints import Joint
 
 Array = npt.NDArray[np.float64]
