@@ -55,6 +55,8 @@ FLOORS = {
     )
 }
 """The rooms of packages from below; each imports only from floors under its own, or from rooms beside it."""
+ROSPY_INTERNALS = "custom_ros_tools.ros.rospy_internals"
+"""The only folder that uses private parts of rospy."""
 ONE_PLACE = {
     "rospy's private parts": r"\.impl\b",
     "the XML of URDFs": r"ElementTree|\betree\b|\blxml\b",
@@ -63,7 +65,7 @@ ONE_PLACE = {
     "class Chain": r"^class Chain\b",
     "class Waypoint": r"^class Waypoint\b",
 }
-"""What stands in one library file only, and how it is recognised."""
+"""Pattern of what stands in one library file only, or in that folder."""
 
 SHARED_NAMES = {"Pose", "Twist"}
 """Names of classes that two packages have, with the same meaning."""
@@ -144,10 +146,16 @@ DOCUMENTED = {
 def repeated(src: Path) -> list[str]:
     files = {name: path.read_text() for name, path in graph_of(src).files.items()}
     found = {
-        what: [name for name, text in files.items() if re.search(pattern, text, re.MULTILINE)]
+        what: {
+            ROSPY_INTERNALS if name.startswith(f"{ROSPY_INTERNALS}.") else name
+            for name, text in files.items()
+            if re.search(pattern, text, re.MULTILINE)
+        }
         for what, pattern in ONE_PLACE.items()
     }
-    return [f"{what} belongs into one file, found in {names}" for what, names in found.items() if len(names) != 1]
+    return [
+        f"{what} belongs into one place, found in {sorted(names)}" for what, names in found.items() if len(names) != 1
+    ]
 
 
 def shared_class_names(src: Path) -> list[str]:

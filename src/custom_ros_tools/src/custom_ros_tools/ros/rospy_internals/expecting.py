@@ -1,0 +1,29 @@
+"""Uses of private parts that may be missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import rospy
+
+T = TypeVar("T")
+
+
+def expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
+    """Returns the result of using private parts; None and a warning if they are not as expected.
+
+    While rospy shuts down, its parts are in another state, which is no evidence of different internals.
+    """
+    try:
+        return use()
+    except Exception as error:  # whatever a different rospy raises, the node continues
+        if not rospy.core.is_shutdown_requested():
+            rospy.logwarn(
+                "this rospy is built otherwise: expected %s, got %s: %s; %s",
+                expected,
+                type(error).__name__,
+                error,
+                loss,
+            )
+        return None

@@ -1,0 +1,133 @@
+"""Registrations of a node with the ROS master, reports of publishers, and cached parameters."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from itertools import count
+from typing import Any
+
+import rospy
+
+from .expecting import expecting
+
+
+class Subscriptions:
+    """Connects the subscriptions of this node to all publishers that the ROS master has reported.
+
+    rospy handles only the last report of each topic, although reports overtake each other. It also counts connections
+    that have ended, so that it overlooks a publisher that comes back, or that has lost one connection.
+
+    Args:
+        manager: The part of rospy that receives the reports; they come here instead.
+        topics: The topics of this node.
+    """
+
+    def __init__(self, manager: Any, topics: Any) -> None:
+        self._topics, self._connect_topic = topics, manager.handler._connect_topic
+        self._lock = threading.Lock()
+        self._reports = count()
+        self._reported: dict[tuple[str, str], int] = {}
+        """Number of the last report of each topic and publisher."""
+        self._connecting: set[tuple[str, str]] = set()
+        if not callable(manager.publisher_update):
+            raise TypeError("RegManager.publisher_update is no method")
+        manager.publisher_update = self.on_report
+
+    def on_report(self, topic: str, publishers: list[str]) -> None:
+        """Connects a subscription to publishers, given by their URIs; existing connections stay."""
+        with self._lock:
+            self._reported.update({(topic, uri): next(self._reports) for uri in publishers})
+        self.connect_missing()
+
+    def connect_missing(self) -> None:
+        """Connects to all reported publishers without a connection, without waiting for them."""
+        with self._lock:
+            missing = [pair for pair in self._reported if pair not in self._connecting and not self._has(*pair)]
+            self._connecting.update(missing)
+        for pair in missing:
+            threading.Thread(target=self._connect, args=pair, daemon=True).start()
+
+    def _has(self, topic: str, uri: str) -> bool:
+        subscription = self._topics.get_subscriber_impl(topic)
+        if subscription is None:
+            return False
+        for connection in getattr(subscription, "connections", ()):  # without this list, ended ones stay
+            if connection.done:
+                subscription.remove_connection(connection)
+        return bool(subscription.has_connection(uri))
+
+    def _connect(self, topic: str, uri: str) -> None:
+        """Connects to one publisher; one that refuses is forgotten until it is reported again."""
+        pair, code = (topic, uri), 0
+        report = self._reported.get(pair)
+        try:
+            code, *_ = self._connect_topic(topic, uri)
+        except Exception:
+            if not rospy.core.is_shutdown_requested():  # else its parts are gone
+                raise
+        finally:
+            with self._lock:
+                self._connecting.discard(pair)
+                if code != 1 and self._reported.get(pair) == report:
+                    self._reported.pop(pair, None)
+
+
+class Registry:
+    """The topics and services of this node, from rospy.
+
+    Attributes:
+        subscriptions: Connects the node to the publishers of what it subscribes to.
+    """
+
+    def __init__(self) -> None:
+        registration = import_module("rospy.impl.registration")
+        self._topics, self._services = registration.get_topic_manager(), registration.get_service_manager()
+        self._listeners = registration.get_registration_listeners()
+        (self._rospys,) = (each for each in self._listeners.listeners if isinstance(each, registration.RegManager))
+        kinds = registration.Registration
+        if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
+            raise TypeError("other kinds of registrations")
+        with self.entries():
+            pass  # otherwise it would fail when it is needed
+        self.subscriptions = Subscriptions(self._rospys, self._topics)
+        rospy.core.add_shutdown_hook(lambda _: self._wake())  # rospy waits for its thread, up to 0.5 s
+
+    @contextmanager
+    def entries(self) -> Iterator[list[tuple[str, str, str]]]:
+        """Yields the kind (`sub`, `pub`, `srv`), name and type or URI of all; none comes or goes in the context."""
+        with self._topics.lock, self._services.lock:
+            yield [
+                *(("sub", *each) for each in self._topics.get_subscriptions()),
+                *(("pub", *each) for each in self._topics.get_publications()),
+                *(("srv", *each) for each in self._services.get_services()),
+            ]
+
+    def _wake(self) -> None:
+        with self._rospys.cond:
+            self._rospys.cond.notify_all()
+
+    def hand_over(self, listener: Any) -> None:
+        """Redirects registrations to another listener, instead of rospy, with `reg_added` and `reg_removed`."""
+        with self._listeners.lock:
+            self._listeners.listeners[self._listeners.listeners.index(self._rospys)] = listener
+
+
+def registry() -> Registry | None:
+    """Returns the registry of this node, None if rospy's internals differ."""
+    return expecting(
+        "rospy.impl.registration to have RegManager among its listeners",
+        "a ROS master that comes back will not know this node: start it again then",
+        Registry,
+    )
+
+
+def answer_cached(parameter: str, value: Any) -> None:
+    """Makes `rospy.get_param_cached` answer without contacting the master."""
+    expecting(
+        "rospy.impl.paramserver to have a cache",
+        "who logs something waits for a master that hangs",
+        lambda: import_module("rospy.impl.paramserver").get_param_server_cache().set(parameter, value),
+    )
