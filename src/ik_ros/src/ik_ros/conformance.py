@@ -169,7 +169,7 @@ class SolverConformance:
             self.solver.solve(problem)
 
     def test_equal_problems_have_equal_answers(self) -> None:
-        """Whatever was solved before, in a new solver, and in another process with more threads; if deterministic."""
+        """Whatever was solved before, in a new solver, and in a process with another number of threads."""
         if not self.solver.deterministic:
             pytest.skip(f"'{self.solver_name}' is not declared deterministic")
         problems = self.reachable(random.Random(3), 10) + [self.problem(Pose((0.0, 0.0, 100.0)), {})]
@@ -180,7 +180,7 @@ class SolverConformance:
         assert self._in_another_process(problems) == first, "another process answers otherwise"
 
     def _in_another_process(self, problems: Sequence[IKProblem]) -> Any:
-        threads = "2" if os.environ.get("OPENBLAS_NUM_THREADS") == "1" else "1"  # other than here, with two processors
+        threads = "2" if os.environ.get("OPENBLAS_NUM_THREADS") == "1" else "1"  # another number than here
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": threads}
         with tempfile.NamedTemporaryFile() as answers:
             asked = pickle.dumps((self.solver_name, self.options, list(problems)))

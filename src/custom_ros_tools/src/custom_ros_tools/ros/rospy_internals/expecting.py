@@ -1,4 +1,4 @@
-"""Uses of private parts that may be missing."""
+"""Use of private parts of rospy, with a warning where they are missing or different."""
 
 from __future__ import annotations
 
