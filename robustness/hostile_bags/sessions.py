@@ -30,7 +30,7 @@ def _session_with(path: Path, change: Callable[[str, bytes], list[bytes]]) -> No
     path.write_bytes(recorded_session())
     with path.open("rb") as file:
         bag = BagFile(file)
-        found = [(number, round(time_s * 1e9), raw) for number, raw, time_s in bag.messages(bag.connections)]
+        found = [(number, time_ns, raw) for number, raw, time_ns in bag.messages(bag.connections)]
     numbers = {number: index for index, number in enumerate(bag.connections)}
     topics = [Topic(each.topic, each.datatype, each.definition, each.md5sum) for each in bag.connections.values()]
     changed = [

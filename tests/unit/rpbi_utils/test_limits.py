@@ -91,7 +91,7 @@ def test_a_table_has_at_most_so_many_columns(
     monkeypatch.setattr("rpbi_utils.bags.tables.MAX_COLUMNS", 10)
     builder = TableBuilder("/states")
     for index in range(11):
-        builder.add(joint_state_type, pack_joint_state(1, [f"j{index}"], [1.0]), 1.0)
+        builder.add(joint_state_type, pack_joint_state(1, [f"j{index}"], [1.0]), 10**9)
     with pytest.raises(LimitError, match="expected at most 10 columns, got 11"):
         builder.table()
 
@@ -110,7 +110,7 @@ def test_a_table_has_at_most_so_many_columns(
 def test_known_types_with_other_definitions_have_a_row_a_message(name: str, definition: str, raw: bytes) -> None:
     builder = TableBuilder("/a", keep_binary=True)
     message_type = MessageType.parse(name, definition)
-    builder.add(message_type, raw, 5.0)
+    builder.add(message_type, raw, 5 * 10**9)
     table = builder.table()
     assert list(table.index) == [5.0] and len(table.columns) > 1
     assert not message_type.has_header
@@ -128,7 +128,7 @@ def test_columns_come_as_fields_appear_and_pieces_are_merged(monkeypatch: pytest
     monkeypatch.setattr("rpbi_utils.bags.tables.MAX_PIECES", 7)
     builder = TableBuilder("/a")
     for index in range(50):
-        builder.add(text, struct.pack("<I", index) + b"x" * index + bytes([index, index % 2]), float(index))
+        builder.add(text, struct.pack("<I", index) + b"x" * index + bytes([index, index % 2]), index * 10**9)
     table = builder.table()
     assert list(table.columns) == ["record_time", "a", "b", "c"]
     assert table["a"].tolist() == ["x" * index for index in range(50)]
@@ -156,7 +156,7 @@ def test_a_budget_names_bag_topic_limit_and_remedy() -> None:
 def test_a_builder_asks_its_budget_for_each_layout() -> None:
     now = 0.0
     builder = TableBuilder("/a", budget=Budget(Path("/a.bag"), 0, False, clock=lambda: now))
-    builder.add(MessageType.parse("a_msgs/A", "uint8 a"), b"\1", 1.0)
+    builder.add(MessageType.parse("a_msgs/A", "uint8 a"), b"\1", 10**9)
     now = 31.0
     with pytest.raises(BagError, match="/a.bag: /a: expected at most 30 s"):
         builder.table()

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import bisect
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi_utils.bags.resampling import TIME_ERROR, align, resample
+from rpbi_utils.bags.nanoseconds import to_seconds
+from rpbi_utils.bags.resampling import TIME_ERROR, align, resample, resample_exactly
 
 
 def _table(times: list[float], **columns: object) -> pd.DataFrame:
@@ -53,6 +56,45 @@ def test_of_several_samples_of_one_time_the_last_counts() -> None:
     double = _table([0.0, 1.0, 1.0, 2.0], x=[0.0, 1.0, 7.0, 8.0])
     assert list(resample(double, [1.0, 1.5])["x"]) == [7.0, 7.5]
     assert list(resample(double, [1.0], "previous")["x"]) == [7.0]
+
+
+def test_the_last_of_several_partial_samples_of_one_time_counts() -> None:
+    partial = _table([0.0, 1.0, 1.0, 1.0], a=[0.0, 5.0, np.nan, 9.0], b=[0.0, np.nan, 3.0, np.nan])
+    for method in ("linear", "previous", "nearest"):
+        found = resample(partial, [1.0], method)
+        assert (list(found["a"]), list(found["b"])) == ([9.0], [3.0])
+
+
+@pytest.mark.parametrize("begin_ns", [0, 1_002_000_000, 1_700_000_000_123_456_789])
+def test_rows_get_the_sample_at_their_own_time(begin_ns: int) -> None:
+    ties = 0
+    for seed, hz in enumerate((10, 25, 30, 50, 60, 100, 333, 1000)):
+        rng = np.random.default_rng(seed)
+        rows = [begin_ns + (2 * k * 10**9 + hz) // (2 * hz) for k in range(200)]
+        tied = rng.random(200) < 0.5
+        tied[0] = tied[-1] = True
+        others = begin_ns + rng.integers(1, rows[-1] - begin_ns, 100)
+        stamps = sorted({row for row, is_tied in zip(rows, tied) if is_tied} | set(others.tolist()))
+        seconds = [stamp // 10**9 + stamp % 10**9 / 1e9 for stamp in stamps]
+        table = _table(seconds, x=np.arange(len(stamps)))
+        found = align({"a": table}, hz=hz, method="previous").table
+        assert len(found) == len(rows)
+        expected = [bisect.bisect_right(stamps, row) - 1 for row in rows]
+        assert list(found["a/x"]) == expected
+        at_own = align({"a": table}, hz=hz, method="linear").table["a/x"].to_numpy()[tied]
+        assert list(at_own) == [index for index, is_tied in zip(expected, tied) if is_tied]
+        ties += int(tied.sum())
+    assert ties > 700
+
+
+def test_nanoseconds_are_exact_where_floats_are_not() -> None:
+    begin = 1_700_000_000_000_000_000
+    table = pd.DataFrame({"x": [0.0, 1.0, 2.0]}, index=pd.Index([begin, begin + 1, begin + 50], name="time"))
+    rows = np.array([begin, begin + 1, begin + 2, begin + 49, begin + 50])
+    assert list(resample_exactly(table, rows, "previous")["x"]) == [0.0, 1.0, 1.0, 1.0, 2.0]
+    assert to_seconds(rows).max() - to_seconds(rows).min() == 0.0  # negative control
+    with pytest.raises(ValueError, match="index of the table: expected seconds of at most 4.5e"):
+        resample(table.astype(float).set_axis([0.0, 1.0, 5e9]), [0.0])
 
 
 def test_too_old_samples_are_no_values() -> None:

@@ -22,7 +22,7 @@ TEXT = MessageType.parse("std_msgs/String", "string data")
 def _table(message_type: MessageType, raws: list[bytes], keep_binary: bool = False) -> pd.DataFrame:
     builder = TableBuilder("/topic", keep_binary)
     for index, raw in enumerate(raws):
-        builder.add(message_type, raw, 100.0 + index)
+        builder.add(message_type, raw, (100 + index) * 10**9)
     return builder.table()
 
 
@@ -164,8 +164,8 @@ def test_binary_data_is_kept_byte_for_byte_when_asked_for(caplog: pytest.LogCapt
 
 def test_two_types_on_one_topic_share_a_table() -> None:
     builder = TableBuilder("/topic")
-    builder.add(NUMBER, struct.pack("<d", 1.5), 1.0)
-    builder.add(TEXT, _text(b"x"), 2.0)
+    builder.add(NUMBER, struct.pack("<d", 1.5), 1_000_000_000)
+    builder.add(TEXT, _text(b"x"), 2_000_000_000)
     assert list(builder.table()["data"]) == [1.5, "x"]
 
 
@@ -178,7 +178,7 @@ def test_a_clock_that_was_set_back_and_messages_of_several_types_are_named(
     assert "/topic: its clock was set back by 7 s at 10 s" in caplog.text
     builder = TableBuilder("/mixed")
     for time_s in range(4):
-        builder.add(*((NUMBER, struct.pack("<d", 1.5)) if time_s else (TEXT, _text(b"x"))), float(time_s))
+        builder.add(*((NUMBER, struct.pack("<d", 1.5)) if time_s else (TEXT, _text(b"x"))), time_s * 10**9)
     builder.table()
     came = "std_msgs/Float64 (messages: 3), std_msgs/String (messages: 1)"
     assert f"/mixed: expected messages of one type, got {came}" in caplog.text

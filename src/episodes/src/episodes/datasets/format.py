@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from custom_ros_tools.schema import ConfigModel
 from episodes.errors import EpisodeError
+from rpbi_utils.bags.nanoseconds import PER_SECOND
 
 Array = NDArray[Any]
 
@@ -35,9 +36,8 @@ class DatasetError(EpisodeError):
 
 
 def stamps_of(times: Array) -> Array:
-    """Returns seconds and nanoseconds, shape (n, 2), int64, of times [s], shape (n,)."""
-    nanoseconds = np.rint(times * 1e9).astype(np.int64)
-    return np.stack(np.divmod(nanoseconds, 1_000_000_000), axis=1)
+    """Returns seconds and nanoseconds, shape (n, 2), int64, of times [ns], shape (n,)."""
+    return np.stack(np.divmod(times, PER_SECOND), axis=1)
 
 
 class Feature(NamedTuple):
@@ -87,11 +87,11 @@ class ImageFrame(NamedTuple):
 
     Attributes:
         pixels: Shape (height, width, 3), uint8.
-        stamp: Time of the image in the clock of the recording [s].
+        stamp: Time of the image in the clock of the recording [ns].
     """
 
     pixels: Array
-    stamp: float
+    stamp: int
 
 
 class ExportedEpisode(ABC):
@@ -110,7 +110,7 @@ class ExportedEpisode(ABC):
     @property
     @abstractmethod
     def times(self) -> Array:
-        """Times of the rows in the clock of the recording, shape (n,) [s]."""
+        """Times of the rows in the clock of the recording, int64, shape (n,) [ns]."""
 
     @abstractmethod
     def frames(self, key: str) -> Iterator[ImageFrame]:
@@ -125,7 +125,7 @@ class ExportedEpisode(ABC):
         """Returns the numbers of all features by key, each of shape (n, number of names).
 
         Args:
-            image_stamps: Times of the images of each camera, shape (n,) [s].
+            image_stamps: Times of the images of each camera, int64, shape (n,) [ns].
         """
 
 

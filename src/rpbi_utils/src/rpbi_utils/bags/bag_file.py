@@ -15,6 +15,7 @@ import roslz4
 
 from .clock import SetBack, set_back
 from .limits import MAX_CONNECTIONS, LimitError
+from .nanoseconds import PER_SECOND
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _FILE_HEADER, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
@@ -114,8 +115,8 @@ class BagFile:
         index = index[np.lexsort((index["offset"], index["chunk"]))]
         return set_back(index["time_ns"] / 1e9)
 
-    def messages(self, connections: Collection[int]) -> Iterator[tuple[int, bytes, float]]:
-        """Yields the connection's number, the serialised message and the time of recording [s], in the order of time.
+    def messages(self, connections: Collection[int]) -> Iterator[tuple[int, bytes, int]]:
+        """Yields the connection's number, the serialised message and the time of recording [ns], in the order of time.
 
         Raises:
             ValueError, struct.error, KeyError, OSError, EOFError: If it is damaged.
@@ -189,7 +190,7 @@ class BagFile:
             raise ValueError(f"expected {_ENTRY.itemsize * count} bytes, got {size}")
         entries = np.frombuffer(self._read(size), _ENTRY)
         found = np.empty(count, _SORTED)
-        found["time_ns"] = entries["secs"].astype("u8") * 1_000_000_000 + entries["nsecs"]
+        found["time_ns"] = entries["secs"].astype("u8") * PER_SECOND + entries["nsecs"]
         found["chunk"], found["offset"] = chunk, entries["offset"]
         self._index[_uint32(header, b"conn")].append(found)
         return count
@@ -243,7 +244,7 @@ def _uint32(fields: Fields, name: bytes) -> int:
     return value
 
 
-def _message(data: bytes, offset: int) -> tuple[int, bytes, float]:
+def _message(data: bytes, offset: int) -> tuple[int, bytes, int]:
     """Reads the message at an offset in a chunk; `rosbag` may have put the record of its connection before it."""
     while True:
         (size,) = _UINT32.unpack_from(data, offset)
@@ -258,4 +259,4 @@ def _message(data: bytes, offset: int) -> tuple[int, bytes, float]:
     if fields[b"op"][0] != _MESSAGE:
         raise ValueError(f"expected a message, got a record of kind {fields[b'op'][0]}")
     secs, nsecs = _TIME.unpack(fields[b"time"])
-    return _uint32(fields, b"conn"), data[start:offset], secs + nsecs / 1e9
+    return _uint32(fields, b"conn"), data[start:offset], secs * PER_SECOND + nsecs

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import UnknownNameError
 
+from .nanoseconds import MAX_SECONDS, resolution_ns, row_times, to_nanoseconds, to_seconds
 from .row_plan import INDEX
 
 Array = NDArray[Any]
@@ -67,7 +68,7 @@ def align(
     if to is not None:
         wanted = np.unique(tables[to].index.to_numpy())
     elif hz is not None:
-        wanted = _common_times(tables, hz)
+        wanted = to_seconds(_common_times(tables, hz))
     else:
         wanted = np.asarray(times, float)
     resampled = {
@@ -84,7 +85,8 @@ def resample(
 
     Each column is computed from its own samples, without the rows where it is NaN or None. Of several samples of one
     time the last counts. There is no extrapolation: before the first sample, and with `linear` after the last one,
-    there is no value.
+    there is no value. Times are compared as integer nanoseconds; those that floats cannot distinguish are one time,
+    which is 0.24 us in wall time.
 
     Args:
         table: A table with the index `time` [s], ascending.
@@ -101,35 +103,59 @@ def resample(
         UnknownNameError: If there is no such method.
         ValueError: If times are not ascending and finite, or a quaternion is zero.
     """
+    wanted, known = _checked_times(times, "times"), _checked_times(table.index, "index of the table")
+    known_ns = to_nanoseconds(known)
+    rows = _snapped(to_nanoseconds(wanted), known_ns, resolution_ns([*wanted[-1:], *known[-1:]]))
+    resampled = resample_exactly(table.set_axis(known_ns), rows, method, max_time_error_s)
+    return resampled.set_axis(pd.Index(wanted, name=INDEX))
+
+
+def resample_exactly(
+    table: pd.DataFrame, times: Array, method: str = "linear", max_time_error_s: float = np.inf
+) -> pd.DataFrame:
+    """Returns the values of a table at other times, see `resample`, whose index and times are int64 [ns]."""
     if method not in _METHODS:
         raise UnknownNameError("method", method, _METHODS)
-    wanted, known = _checked_times(times, "times"), _checked_times(table.index, "index of the table")
+    known = table.index.to_numpy()
     values: dict[str, Array] = {}
-    largest = np.full(len(wanted), np.nan)
+    largest = np.full(len(times), np.nan)
     for names in _groups(table.columns, method):
-        samples = table[names].to_numpy()
-        is_there = ~table[names].isna().to_numpy().any(axis=1)
-        is_there[:-1] &= ~((known[:-1] == known[1:]) & is_there[1:])  # of one time, the last one
-        if len(names) > 1 and not samples[is_there].any(axis=1).all():
+        is_there = np.flatnonzero(~table[names].isna().to_numpy().any(axis=1))
+        is_last = np.append(np.diff(known[is_there]) > 0, True)[: len(is_there)]  # of the samples of one time
+        rows = is_there[is_last]
+        samples = table[names].to_numpy()[rows]
+        if len(names) > 1 and not samples.any(axis=1).all():
             raise ValueError(f"{', '.join(names)}: expected unit quaternions, got one of zeros")
-        new, error = _METHODS[method](known[is_there], samples[is_there], wanted)
+        new, error = _METHODS[method](known[rows], samples, times)
         is_far = ~(error <= max_time_error_s)
         new[is_far] = None if new.dtype == object else np.nan
         largest = np.fmax(largest, np.where(is_far, np.nan, error))
         values |= zip(names, new.T, strict=True)
     columns = {name: values[name] for name in table.columns}
-    return pd.DataFrame({**columns, TIME_ERROR: largest}, index=pd.Index(wanted, name=INDEX))
+    return pd.DataFrame({**columns, TIME_ERROR: largest}, index=pd.Index(times, name=INDEX))
 
 
 def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
     checked = np.asarray(times, float)
     if checked.ndim != 1 or not np.isfinite(checked).all() or (np.diff(checked) < 0).any():
         raise ValueError(f"{name}: expected ascending, finite seconds in one dimension")
+    if (np.abs(checked) > MAX_SECONDS).any():
+        raise ValueError(
+            f"{name}: expected seconds of at most {MAX_SECONDS:g}, got {checked[np.abs(checked).argmax()]:g}"
+        )
     return checked
 
 
+def _snapped(times: Array, known: Array, resolution: int) -> Array:
+    """Returns times [ns], each moved to the known one that floats of that resolution cannot distinguish from it."""
+    if not len(known):
+        return times
+    newest = known[np.searchsorted(known, times + resolution, side="right") - 1]
+    return np.where(np.abs(times - newest) <= resolution, newest, times)
+
+
 def _common_times(tables: Mapping[str, pd.DataFrame], hz: float) -> Array:
-    """Returns times of a rate over the range that all tables cover, from its beginning on."""
+    """Returns times of a rate over the range that all tables cover, from its beginning on: int64 [ns]."""
     if not (np.isfinite(hz) and hz > 0):
         raise ValueError(f"hz: expected a positive rate, got {hz}")
     empty = [name for name, table in tables.items() if not len(table)]
@@ -139,7 +165,7 @@ def _common_times(tables: Mapping[str, pd.DataFrame], hz: float) -> Array:
     end = min(table.index[-1] for table in tables.values())
     if end < start:
         raise ValueError(f"the tables have no time in common: one begins at {start} s, another ends at {end} s")
-    return start + np.arange(int((end - start) * hz * (1 + 1e-12)) + 1) / hz
+    return row_times(int(to_nanoseconds(start)), int(to_nanoseconds(end)), hz)
 
 
 def _groups(columns: Sequence[str], method: str) -> Iterator[list[str]]:
@@ -164,7 +190,7 @@ def _previous(known: Array, samples: Array, wanted: Array) -> Resampled:
 
 
 def _nearest(known: Array, samples: Array, wanted: Array) -> Resampled:
-    index = np.searchsorted((known[1:] + known[:-1]) / 2, wanted)
+    index = np.searchsorted(known[:-1] + np.diff(known) // 2, wanted)
     return _picked(known, samples, wanted, index if len(known) else index - 1)
 
 
@@ -175,7 +201,7 @@ def _picked(known: Array, samples: Array, wanted: Array, index: Array) -> Resamp
     new = np.full((len(wanted), samples.shape[1]), np.nan if is_number else None, float if is_number else object)
     error = np.full(len(wanted), np.nan)
     new[is_there] = samples[index[is_there]]
-    error[is_there] = np.abs(wanted[is_there] - known[index[is_there]])
+    error[is_there] = np.abs(wanted[is_there] - known[index[is_there]]) / 1e9
     return new, error
 
 
@@ -193,7 +219,7 @@ def _linear(known: Array, samples: Array, wanted: Array) -> Resampled:
         new[inside] = _slerp(samples[left], samples[right], share)
     else:
         new[inside] = (1.0 - share[:, None]) * samples[left] + share[:, None] * samples[right]
-    error[inside] = np.minimum(before, np.abs(after))
+    error[inside] = np.minimum(before, after) / 1e9
     return new, error
 
 

@@ -19,6 +19,7 @@ from .clock import clock_of
 from .layout import BYTES, NUMBER_DTYPES, Leaf
 from .limits import MAX_COLUMNS, Budget, LimitError
 from .message_type import MessageType
+from .nanoseconds import PER_SECOND, to_seconds
 from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
 
 Array = NDArray[Any]
@@ -63,16 +64,23 @@ class TableBuilder:
         keep_binary: Whether binary arrays become columns of `bytes`; else they are left out.
         budget: Limits of time and cells, if any.
         is_plain: Whether every message is one row, with columns named by its fields alone.
+        in_nanoseconds: Whether the index is int64 [ns] instead of a float [s].
     """
 
     def __init__(
-        self, topic: str, keep_binary: bool = False, budget: Budget | None = None, is_plain: bool = False
+        self,
+        topic: str,
+        keep_binary: bool = False,
+        budget: Budget | None = None,
+        is_plain: bool = False,
+        in_nanoseconds: bool = False,
     ) -> None:
         self._topic = topic
+        self._in_nanoseconds = in_nanoseconds
         self._is_plain = is_plain
         self._budget = budget
         self._keep_binary = keep_binary
-        self._batch: list[tuple[MessageType, bytes, float]] = []
+        self._batch: list[tuple[MessageType, bytes, int]] = []
         self._batch_bytes = 0
         self._messages = 0
         self._rows = 0
@@ -85,14 +93,14 @@ class TableBuilder:
         self._notes: Counter[str] = Counter()
         self._types: Counter[str] = Counter()
 
-    def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
-        """Adds a serialised message with the time at which it was recorded [s].
+    def add(self, message_type: MessageType, raw: bytes, record_time_ns: int) -> None:
+        """Adds a serialised message with the time at which it was recorded [ns].
 
         Raises:
             LimitError: If the table has too many columns, or one with too long a name; so does `table`.
             BagError: If the budget is used up; so does `table`.
         """
-        self._batch.append((message_type, raw, record_time_s))
+        self._batch.append((message_type, raw, record_time_ns))
         self._batch_bytes += len(raw)
         if len(self._batch) >= BATCH_MESSAGES or self._batch_bytes >= BATCH_BYTES:
             self._read_batch()
@@ -100,7 +108,8 @@ class TableBuilder:
     def table(self) -> pd.DataFrame:
         """Returns all rows in the order of time; to be called once, after the last message.
 
-        The index `time` is the stamp of the header [s], or the record time where there is none or it is 0.
+        The index `time` is the stamp of the header [s], or the record time where there is none or it is 0; with
+        `in_nanoseconds`, int64 [ns].
         The column `record_time` [s] is the first; the others are grouped by field. A warning names a clock that was
         set back, and messages of several types.
         """
@@ -110,18 +119,19 @@ class TableBuilder:
         if len(self._types) > 1:
             came = ", ".join(f"{name} (messages: {count})" for name, count in sorted(self._types.items()))
             _log.warning("%s: expected messages of one type, got %s", self._topic, came)
-        time = np.concatenate([*self._time, np.empty(0)])
-        record_time = np.concatenate([*self._record_time, np.empty(0)])
+        time = np.concatenate([*self._time, np.empty(0, np.int64)])
+        record_time = to_seconds(np.concatenate([*self._record_time, np.empty(0, np.int64)]))
         order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
         names = sorted(self._columns, key=self._appeared.__getitem__)
         fields = dict.fromkeys(name.split("/")[0] for name in names)
         places = {field: place for place, field in enumerate(fields)}
         names.sort(key=lambda name: places[name.split("/")[0]])  # stable
         columns = {name: _join(self._columns.pop(name), self._rows)[order] for name in names}
-        table = pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
+        index = pd.Index(to_seconds(time[order]), name=INDEX)
+        table = pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index)
         if (clock := clock_of(table)).is_fault:
             _log.warning("%s: %s", self._topic, clock)
-        return table
+        return table.set_axis(pd.Index(time[order], name=INDEX)) if self._in_nanoseconds else table
 
     def _read_batch(self) -> None:
         """Reads the messages that are waiting, sorted by type and size."""
@@ -203,17 +213,17 @@ class TableBuilder:
 
     def _read_rows(self, row: Columns, matrix: Array, indices: Array) -> None:
         """Reads one row of each message; for the arguments see `_Block`."""
-        record_time = np.array([self._batch[index][2] for index in indices])
+        record_time = np.array([self._batch[index][2] for index in indices], np.int64)
         time = record_time
         for name, leaf in row.items():
             if leaf.kind == BYTES and not self._keep_binary:
                 self._notes[f"'{name}' is binary or long: left out, unless asked for"] += len(indices)
                 continue
-            values = _read_leaf(leaf, matrix)
             if name == STAMP and leaf.kind == "time":
-                time = np.where(values == 0.0, record_time, values)  # 0 is ROS for "no time"
+                stamps = _read_stamps(leaf, matrix)
+                time = np.where(stamps == 0, record_time, stamps)  # 0 is ROS for "no time"
             else:
-                self._columns.setdefault(name, []).append((self._rows, values))
+                self._columns.setdefault(name, []).append((self._rows, _read_leaf(leaf, matrix)))
         self._time.append(time)
         self._record_time.append(record_time)
         self._message.append(self._messages + indices)
@@ -245,6 +255,13 @@ def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
         known: dict[bytes, str] = {}  # equal texts share their memory
         values[:] = [known.setdefault(cell.tobytes(), _text(cell)) for cell in cells]
     return values
+
+
+def _read_stamps(leaf: Leaf, matrix: Array) -> Array:
+    """Reads a `time` out of messages of one layout: int64, shape (n,) [ns]."""
+    start, stop = leaf.span
+    seconds, nanoseconds = np.ascontiguousarray(matrix[:, start:stop]).view("<u4").astype(np.int64).T
+    return np.asarray(seconds * PER_SECOND + nanoseconds)
 
 
 def _text(cell: Array) -> str:

@@ -219,10 +219,10 @@ class _Film:
 
     def __init__(self, frames: int) -> None:
         self._statistics = ImageStatistics(frames)
-        self._stamps: list[float] = []
+        self._stamps: list[int] = []
         self._coarse: list[Array] = []
 
-    def add(self, pixels: Array, stamp: float) -> None:
+    def add(self, pixels: Array, stamp: int) -> None:
         """Adds an image."""
         self._statistics.add(pixels)
         self._stamps.append(stamp)

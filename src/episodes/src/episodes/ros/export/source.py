@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+import heapq
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -30,13 +30,14 @@ from episodes.datasets.provenance import file_digest, hash_chain
 from episodes.files import URDF, stored_path
 from episodes.folder import BAG, Episode, EpisodeFolder
 from robot_model.urdf.document import UrdfDocument
-from rpbi_utils.bags.clock import SetBack, clock_of
+from rpbi_utils.bags.clock import MAX_BACK_S, SetBack, clock_of
 from rpbi_utils.bags.images import decode_image
+from rpbi_utils.bags.nanoseconds import PER_SECOND, row_times, to_seconds
 from rpbi_utils.bags.resampling import TIME_ERROR as RESAMPLING_ERROR
-from rpbi_utils.bags.resampling import resample
-from rpbi_utils.ros.bags.bag_reader import BagReader
+from rpbi_utils.bags.resampling import resample_exactly
+from rpbi_utils.ros.bags.bag_reader import BagMessage, BagReader
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
-from rpbi_utils.ros.bags.topic_report import message_time
+from rpbi_utils.ros.bags.topic_report import message_time_ns
 
 from .signals import Choice, Signal, by_frame, derive, image_topics, is_used, wanted_topics
 
@@ -106,7 +107,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def times(self) -> Array:
-        """Times of the rows: where all features but actions have values, shape (n,) [s].
+        """Times of the rows: where all features but actions have values, int64, shape (n,) [ns].
 
         Raises:
             DatasetError: If there is none.
@@ -115,11 +116,11 @@ class SourceEpisode(ExportedEpisode):
         starts = [table.index[0] for table in tables.values()]
         starts += [next(self._images(self._image_topics[camera.key]))[1] for camera in self._schema.cameras]
         start, end = max(starts), min(table.index[-1] for table in tables.values())
-        count = int((end - start) * self._schema.fps * (1 + 1e-12)) + 1 if end > start else 0
-        if count < 2:
+        times = row_times(int(start), int(end), self._schema.fps) if end > start else np.empty(0, np.int64)
+        if len(times) < 2:
             last = max(tables, key=lambda name: tables[name].index[0])
             raise DatasetError(self.bag, f"its topics have no time in common; the last one to begin is {last}")
-        return np.asarray(start + np.arange(count) / self._schema.fps)
+        return times
 
     def frames(self, key: str) -> Iterator[ImageFrame]:
         """Yields the newest image of a camera at the time of each row."""
@@ -129,18 +130,19 @@ class SourceEpisode(ExportedEpisode):
         coming = next(images, None)
         shown: ImageFrame | None = None
         newest = coming
-        for time_s in self.times:
-            while coming is not None and coming[1] <= time_s:
+        for time_ns in self.times.tolist():
+            while coming is not None and coming[1] <= time_ns:
                 newest, coming = coming, next(images, None)
             assert newest is not None
             if shown is None or newest[1] != shown.stamp:
                 try:
                     pixels = _rgb(newest[0]())
                 except ValueError as error:
-                    raise DatasetError(self.bag, f"{topic}: the image at {newest[1]} s: {error}") from error
+                    raise DatasetError(self.bag, f"{topic}: the image at {to_seconds(newest[1])} s: {error}") from error
                 if pixels.shape[:2] != camera[1:]:
                     got, expected = (f"{width} x {height}" for height, width in (pixels.shape[:2], camera[1:]))
-                    raise DatasetError(self.bag, f"{topic}: the image at {newest[1]} s: expected {expected}, got {got}")
+                    at = f"the image at {to_seconds(newest[1])} s"
+                    raise DatasetError(self.bag, f"{topic}: {at}: expected {expected}, got {got}")
                 shown = ImageFrame(pixels, newest[1])
             yield shown
 
@@ -153,7 +155,7 @@ class SourceEpisode(ExportedEpisode):
             values[key], errors[key] = self._resampled(signal)
             if not np.isfinite(values[key]).all():
                 raise DatasetError(self.bag, f"'{key}' has values that are not finite")
-        errors |= {key: self.times - stamps for key, stamps in image_stamps.items()}
+        errors |= {key: (self.times - stamps) / 1e9 for key, stamps in image_stamps.items()}
         values[STAMP] = stamps_of(self.times)
         values[TIME_ERROR] = np.stack(list(errors.values()), axis=1).astype(np.float32)
         return values
@@ -177,7 +179,7 @@ class SourceEpisode(ExportedEpisode):
         for table, name in signal.columns:
             by_table.setdefault(table, []).append(name)
         found = {
-            table: resample(self._tables[table].reindex(columns=names), self.times, signal.method)
+            table: resample_exactly(self._tables[table].reindex(columns=names), self.times, signal.method)
             for table, names in by_table.items()
         }
         columns = [found[table][name].to_numpy(float) for table, name in signal.columns]
@@ -194,10 +196,8 @@ class SourceEpisode(ExportedEpisode):
         """Replaces what is missing before the first command by the measured position, or by 0."""
         if source.table == "":
             return np.where(np.isnan(column), 0.0, column)
-        measured = resample(self._tables[source.table][[source.name]], self.times, "linear")[source.name].to_numpy(
-            float
-        )
-        return np.where(np.isnan(column), measured, column)
+        measured = resample_exactly(self._tables[source.table][[source.name]], self.times, "linear")[source.name]
+        return np.where(np.isnan(column), measured.to_numpy(float), column)
 
     def _continuous_tables(self) -> list[str]:
         """Returns the names of the tables that rows begin and end with."""
@@ -207,9 +207,9 @@ class SourceEpisode(ExportedEpisode):
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
         topics = wanted_topics(self._types, self._choice)
-        tables = bag_to_dataframes(self.bag, topics, any_size=True) if topics else {}
+        tables = bag_to_dataframes(self.bag, topics, any_size=True, nanoseconds=True) if topics else {}
         for topic, table in tables.items():
-            self._require_steady(topic, clock_of(table))
+            self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
         return by_frame(tables)
 
     @cached_property
@@ -239,15 +239,20 @@ class SourceEpisode(ExportedEpisode):
     def _image_topics(self) -> dict[str, str]:
         return image_topics(self._types, self._choice)
 
-    def _images(self, topic: str) -> Iterator[tuple[Any, float]]:
-        """Yields a function that returns the pixels, and the stamp [s], of each image."""
+    def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
+        """Yields a function that returns the pixels, and the stamp [ns], of each image, in the order of stamps."""
+        waiting: list[tuple[int, int, BagMessage]] = []
         with BagReader(self.bag, any_size=True) as bag:
-            latest_s = -math.inf
-            for message in bag.messages([topic]):
-                stamp_s = message_time(message)
-                self._require_steady(topic, SetBack(latest_s, latest_s - stamp_s))
-                latest_s = max(latest_s, stamp_s)
-                yield (lambda message=message: decode_image(message.type, message.raw)), stamp_s
+            latest = 0
+            for number, message in enumerate(bag.messages([topic])):
+                stamp = message_time_ns(message)
+                self._require_steady(topic, SetBack(latest / 1e9, (latest - stamp) / 1e9))
+                latest = max(latest, stamp)
+                heapq.heappush(waiting, (stamp, number, message))
+                while latest - waiting[0][0] > MAX_BACK_S * PER_SECOND:
+                    yield _image(*heapq.heappop(waiting))
+            while waiting:
+                yield _image(*heapq.heappop(waiting))
 
     def _states(self) -> Iterator[dict[str, Any]]:
         topic = f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
@@ -270,6 +275,10 @@ class SourceEpisode(ExportedEpisode):
                     for name, kind in UrdfDocument(str(copy)).joint_types.items():
                         (fixed if kind == "fixed" else movable).add(name)
         return fixed - movable
+
+
+def _image(stamp: int, _: int, message: BagMessage) -> tuple[Callable[[], Array], int]:
+    return (lambda: decode_image(message.type, message.raw)), stamp
 
 
 def _rgb(pixels: Array) -> Array:

@@ -12,6 +12,7 @@ from rpbi_utils.bags.clock import SetBack
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.limits import MAX_ALL_DEFINITIONS_BYTES, MAX_TOPICS, Budget, LimitError
 from rpbi_utils.bags.message_type import MessageType
+from rpbi_utils.bags.nanoseconds import to_seconds
 
 _ACTIVE_SUFFIX = ".active"
 MAX_UNPACKED_BYTES = 2**30
@@ -21,12 +22,17 @@ MAX_COMPRESSION = 255
 
 
 class BagMessage(NamedTuple):
-    """A serialised message of a bag, and when it was recorded [s], in ROS time."""
+    """A serialised message of a bag, and when it was recorded [ns], in ROS time."""
 
     topic: str
     type: MessageType
     raw: bytes
-    record_time_s: float
+    record_time_ns: int
+
+    @property
+    def record_time_s(self) -> float:
+        """Time at which it was recorded [s]."""
+        return float(to_seconds(self.record_time_ns))
 
 
 class BagReader:
@@ -82,7 +88,7 @@ class BagReader:
         found = self._bag.messages(chosen)
         while True:
             try:
-                number, raw, record_time_s = next(found)
+                number, raw, record_time_ns = next(found)
                 topic, message_type = chosen[number]
                 left -= len(raw)
                 if left < 0:
@@ -93,7 +99,7 @@ class BagReader:
                 message = f"damaged: {_words(error)}; what is left can be saved with 'rosbag reindex {self.path}'"
                 raise BagError(self.path, message) from error
             self.budget.check_time(topic)
-            yield BagMessage(topic, message_type, raw, record_time_s)
+            yield BagMessage(topic, message_type, raw, record_time_ns)
 
     def clock_of(self, topic: str) -> SetBack:
         """Returns by how much the times of recording of a topic run back, in the order of the file."""

@@ -26,6 +26,7 @@ def bag_to_dataframes(
     images: bool = False,
     any_size: bool = False,
     progress: bool = False,
+    nanoseconds: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Reads a bag into pandas tables, one a topic.
 
@@ -46,6 +47,7 @@ def bag_to_dataframes(
         any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size, and take more time and memory
             than `rpbi_utils.bags.limits` says.
         progress: Whether to show a progress bar.
+        nanoseconds: Whether the index is an integer [ns], in which wall time is exact, too.
 
     Returns:
         Tables by topic, sorted by name.
@@ -58,7 +60,7 @@ def bag_to_dataframes(
     with BagReader(path, any_size) as bag:
         chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
         keep_binary = images or topics is not None
-        builders = {topic: TableBuilder(topic, keep_binary, bag.budget) for topic in chosen}
+        builders = {topic: TableBuilder(topic, keep_binary, bag.budget, in_nanoseconds=nanoseconds) for topic in chosen}
         return _read(bag, builders, progress)
 
 
@@ -124,8 +126,8 @@ def _read(bag: BagReader, builders: dict[str, TableBuilder], progress: bool = Fa
     bar = tqdm(bag.messages(chosen), total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
     topic = ""
     try:
-        for topic, message_type, raw, record_time_s in bar:
-            builders[topic].add(message_type, raw, record_time_s)
+        for topic, message_type, raw, record_time_ns in bar:
+            builders[topic].add(message_type, raw, record_time_ns)
         tables = {}
         for topic in chosen:
             tables[topic] = builders.pop(topic).table()

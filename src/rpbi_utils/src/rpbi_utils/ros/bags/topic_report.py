@@ -2,13 +2,18 @@
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from rpbi_utils.bags.clock import SetBack, set_back
+from rpbi_utils.bags.nanoseconds import PER_SECOND, to_seconds
 
 from .bag_reader import BagMessage, BagReader
+
+Array = NDArray[Any]
 
 _STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
 _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "first", "last")
@@ -39,34 +44,39 @@ def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
         BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
     """
     with BagReader(path, any_size) as bag:
-        times: dict[str, list[float]] = {topic: [] for topic in bag.types}
+        times: dict[str, list[int]] = {topic: [] for topic in bag.types}
         sizes = dict.fromkeys(bag.types, 0)
         for message in bag.messages(list(bag.types)):
-            times[message.topic].append(message_time(message))
+            times[message.topic].append(message_time_ns(message))
             sizes[message.topic] += len(message.raw)
         rows = [
             (
                 "|".join(sorted({each.name for each in types})),
                 len(times[topic]),
                 sizes[topic],
-                *_rhythm(times[topic], bag.clock_of(topic)),
+                *_rhythm(to_seconds(times[topic]), bag.clock_of(topic)),
             )
             for topic, types in bag.types.items()
         ]
         return TopicReport(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
 
 
+def message_time_ns(message: BagMessage) -> int:
+    """Returns the stamp of a message [ns], or where it has none the time of its recording."""
+    if not message.type.has_header or len(message.raw) < _STAMP.size:
+        return message.record_time_ns
+    seconds, nanoseconds = _STAMP.unpack_from(message.raw)
+    return seconds * PER_SECOND + nanoseconds or message.record_time_ns
+
+
 def message_time(message: BagMessage) -> float:
     """Returns the stamp of a message [s], or where it has none the time of its recording."""
-    if not message.type.has_header or len(message.raw) < _STAMP.size:
-        return message.record_time_s
-    seconds, nanoseconds = _STAMP.unpack_from(message.raw)
-    return seconds + nanoseconds / 1e9 or message.record_time_s
+    return float(to_seconds(message_time_ns(message)))
 
 
-def _rhythm(times: list[float], clock: SetBack) -> tuple[float, float, float, float, float]:
+def _rhythm(times: Array, clock: SetBack) -> tuple[float, float, float, float, float]:
     """Returns mean rate [Hz], longest gap, largest time by which times run back, first and last time [s]."""
-    back_s = max(set_back(np.array(times)).back_s, clock.back_s)
+    back_s = max(set_back(times).back_s, clock.back_s)
     ordered = np.sort(times)
     first, last = ordered[0], ordered[-1]
     rate_hz = (len(ordered) - 1) / (last - first) if last > first else np.nan
