@@ -107,7 +107,7 @@ def test_a_pose_that_is_shown_live(ros, own_tf, tmp_path, of_page):
     middle = ros.call("primitive/plan", PlanPrimitive, goal=GOAL, duration=3.0, via_points=via).trajectory.points[150]
     assert middle.positions[:3] == pytest.approx([0.5, 0.5, 0.5], abs=1e-3)
     for change, text in (
-        ({"goal": [2.0, *GOAL[1:]]}, "goal: x: expected positions from -1 to 1, got 2"),
+        ({"goal": [1.2, *GOAL[1:]]}, "goal: x: expected positions from -1 to 1, got 1.2"),
         ({"goal": [1.0]}, "goal: expected 7 finite numbers"),
         ({"duration": -1.0}, "duration: expected a finite time"),
         ({"via_points": [ViaPointMessage(2.0, GOAL)]}, r"via_points[0].progress"),

@@ -48,6 +48,30 @@ def test_what_is_wrong_is_named(arguments, text):
         Demonstration.of(*arguments)
 
 
+@pytest.mark.parametrize("sample", [0, 1, 50, 99])
+def test_a_spike_of_a_position_is_refused(sample):
+    times = np.linspace(0.0, 1.0, 100)
+    path = np.outer(np.sin(0.5 * np.pi * times) ** 2, [0.4, 0.2, 0.0])
+    path[sample] += [0.0, 0.0, 0.1]
+    with pytest.raises(DemonstrationError, match=r"positions: expected at most .* got a spike or jump of 0.[01]"):
+        Demonstration.of(times, path)
+
+
+def test_quick_and_noisy_motions_are_no_spikes():
+    times = np.linspace(0.0, 1.0, 100)
+    rng = np.random.default_rng(5)
+    corner = np.abs(times[::10] - 0.5)
+    burst = np.clip((times - 0.5) * 30.0, 0.0, 1.0)
+    for stamps, path in (
+        (times, rng.normal(0.0, 0.002, 100)),
+        (times[::10], corner),
+        (times, burst),
+        (times, np.round(16.0 * times) / 16.0),
+        (times, np.zeros(100)),
+    ):
+        assert Demonstration.of(stamps, path[:, None]).points.shape == (len(stamps), 1)
+
+
 def test_the_sign_of_a_quaternion_does_not_matter():
     flipped = QUATS * np.where(np.arange(21) % 2, -1.0, 1.0)[:, None]
     plans = [make_primitive("dmp", {}).learn(Demonstration.of(TIMES, PATH, quats)).plan() for quats in (QUATS, flipped)]

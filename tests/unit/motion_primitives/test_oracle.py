@@ -12,7 +12,7 @@ import pytest
 from motion_primitives import Demonstration, Primitive, make_primitive
 from motion_primitives.basis import GaussianBasis
 from motion_primitives.dynamics import Execution
-from motion_primitives.primitives.promp import WeightDistribution
+from motion_primitives.primitives.promp import Known, WeightDistribution
 from motion_primitives.space import Space
 
 ORACLE = json.loads((Path(__file__).parent / "oracle.json").read_text())
@@ -84,7 +84,7 @@ def test_distributions_of_motions():
     learned = {"origin": [0.0] * 3, "duration_s": 1.0, "weights": np.zeros((1, 3, BASES)).tolist()}
     primitive.restore(Space(("x", "y", "z")), primitive.Learned.parse(learned, "test"))
     free = WeightDistribution(expected["weight_mean"], expected["weight_covariance"])
-    known = [(primitive.rows(share), point, 1e-2) for share, point in zip((0.3, 1.0), expected["points"])]
+    known = [Known("point", share, point, 1e-2) for share, point in zip((0.3, 1.0), expected["points"])]
     given = primitive.given(free, known)
     for distribution, mean, variance in ((free, "mean", "variance"), (given, "given_mean", "given_variance")):
         found = [primitive.mean_at(distribution, share)[0] for share in LOOKS]

@@ -183,6 +183,55 @@ def test_the_spread_is_that_of_the_demonstrations():
     assert free.stds([0.5])[0, :3] == pytest.approx(shown, rel=0.05)
 
 
+@pytest.mark.parametrize("samples", [10, 15, 20, 201])
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_promp_keeps_shown_ends_with_few_samples(samples, at_rest):
+    """With fewer samples than basis functions a motion left the shown one by 0.72 m, and its goal by 11 mm."""
+    times = np.linspace(0.0, 2.0, samples)
+    u = times / 2.0
+    share = 10 * u**3 - 15 * u**4 + 6 * u**5 if at_rest else u
+    shown = np.outer(share, [0.4, 0.2, -0.1]) + [1.0, 0.0, 0.3]
+    plan = make_primitive("promp", {}).learn(Demonstration.of(times, shown)).plan()
+    assert plan.positions[[0, -1]] == pytest.approx(shown[[0, -1]], abs=1e-4)
+    near = np.stack([np.interp(plan.times, times, column) for column in shown.T], axis=1)
+    assert plan.positions == pytest.approx(near, abs=0.02 if at_rest else 0.08)  # it starts and ends at rest
+
+
+def via_points(gap: float, apart: float) -> list[ViaPoint]:
+    """Returns two via-points near each other on a demonstration, the second one shifted [m]."""
+    shifted = SHOWN[0].points[round(1000 * (0.5 + gap))] + [0.0, 0.0, apart, 0.0, 0.0, 0.0, 0.0]
+    return [ViaPoint(0.5, SHOWN[0].points[500]), ViaPoint(0.5 + gap, shifted)]
+
+
+def test_promp_refuses_plans_far_from_demonstrations():
+    assert LEARNED["promp"].plan(via_points=via_points(0.001, 0.0)).positions[:, 2].max() < 0.7
+    with pytest.raises(PlanError, match=r"plan: expected . from .* within 2 shown extents \(option 'reach'\)"):
+        LEARNED["promp"].plan(via_points=via_points(0.001, 0.1))
+    with pytest.raises(PlanError, match=r"goal: expected x from .* got 5 at 10 s"):
+        LEARNED["promp"].plan(goal=[5.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0])
+    far = make_primitive("promp", {"reach": 20.0}).learn(SHOWN)
+    assert far.plan(goal=[5.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]).positions[-1] == pytest.approx([5.0, 0.0, 0.3], abs=1e-3)
+
+
+def test_promp_refuses_missed_points():
+    point = SHOWN[0].points[500]
+    other = point + [0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    with pytest.raises(PlanError, match=r"via_points\[0\]: expected to be passed within 0.00103 m .* a miss by 0.01"):
+        LEARNED["promp"].plan(via_points=[ViaPoint(0.5, point), ViaPoint(0.5, other)])
+    LEARNED["promp"].plan(via_points=[ViaPoint(0.5, point, 0.01), ViaPoint(0.5, other, 0.01)])
+
+
+def test_promp_keeps_its_motion_when_a_new_goal_is_refused():
+    execution = LEARNED["promp"].begin(duration_s=2.0)
+    for _ in range(100):
+        execution.step(0.01)
+    with pytest.raises(PlanError, match="'reach'"):
+        execution.set_goal([5.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0])
+    for _ in range(100):
+        execution.step(0.01)
+    assert execution.is_at_goal()
+
+
 # --- Rhythms
 
 

@@ -18,6 +18,8 @@ OVERLAP = 0.8
 """Value of a Gaussian at the centre of the next one."""
 RIDGE = 1e-10
 """Weight of the squared weights against the squared errors of a fit, relative to the largest basis function."""
+SMOOTHING = 1e-9
+"""Weight of the roughness against the squared errors of a fit, relative to the largest basis function."""
 
 
 class GaussianBasis(NamedTuple):
@@ -97,18 +99,25 @@ class TimeBasis(NamedTuple):
         total = values.sum(axis=-1, keepdims=True)
         return np.asarray((rates - values * rates.sum(axis=-1, keepdims=True) / total) / total)
 
+    @property
+    def roughness(self) -> Array:
+        """Matrix of the squared second differences of weights, shape (k, k); straight lines have none."""
+        bends = np.diff(np.eye(len(self.centers)), n=2, axis=0)
+        return np.asarray(bends.T @ bends)
+
     def _gaussians(self, progress: Array) -> Array:
         distance = np.asarray(progress)[..., None] - self.centers
         return np.asarray(np.exp(-0.5 * distance**2 / self.variance))
 
 
-def fitted(values: Array, samples: Array, conditions: Array | None = None) -> Array:
+def fitted(values: Array, samples: Array, conditions: Array | None = None, roughness: Array | None = None) -> Array:
     """Returns weights with the least squared error.
 
     Args:
         values: Basis functions at m samples, shape (m, k).
         samples: Samples of d signals, shape (m, d).
         conditions: Rows that are 0 for all weights, shape (c, k).
+        roughness: Matrix of a smooth prior of the weights, shape (k, k): it decides what the samples leave open.
 
     Returns:
         Weights, shape (d, k).
@@ -116,5 +125,6 @@ def fitted(values: Array, samples: Array, conditions: Array | None = None) -> Ar
     free = np.eye(values.shape[1]) if conditions is None else null_space(conditions)
     inputs = values @ free
     square = inputs.T @ inputs
-    ridge = RIDGE * float(np.max(np.diag(square), initial=0.0)) * np.eye(len(square))
-    return np.asarray((free @ np.linalg.solve(square + ridge, inputs.T @ samples)).T)
+    largest = float(np.max(np.diag(square), initial=0.0))
+    prior = RIDGE * np.eye(len(square)) if roughness is None else SMOOTHING * free.T @ roughness @ free
+    return np.asarray((free @ np.linalg.solve(square + largest * prior, inputs.T @ samples)).T)

@@ -25,6 +25,10 @@ MAX_GAP_SHARE = 0.1
 """Largest share of the duration between two samples; a longer gap counts as a jump in time, and is rejected."""
 MAX_TURN_RAD = 1.5
 """Largest rotation between two samples [rad]; a larger one counts as a jump, and is rejected."""
+SPIKE_SHARE = 0.05
+"""Share of the extent of the positions beyond which a sample may count as a spike."""
+SPIKE_TO_STEPS, SPIKE_TO_NOISE = 5.0, 10.0
+"""A spike is larger than the steps before and after it, and than the median of all samples, by these factors."""
 TRANSLATION = ("translation/x", "translation/y", "translation/z")
 ROTATION = ("rotation/x", "rotation/y", "rotation/z", "rotation/w")
 """Columns of a table of /tf, see docs/data.md."""
@@ -68,7 +72,7 @@ class Demonstration:
 
         Raises:
             DemonstrationError: If sizes differ, there are fewer than 10 samples, a number is not finite, times repeat,
-                run back or jump, or orientations jump.
+                run back or jump, or positions or orientations jump.
         """
         stamps = checked_array(times, "times", 1)
         where = checked_array(positions, "positions", 2)
@@ -78,6 +82,7 @@ class Demonstration:
         names = _default_names(where.shape[1]) if names is None else tuple(names)
         if len(names) != where.shape[1] or len(set(names)) != len(names):
             raise DemonstrationError("positions", f"one column for each of {', '.join(names)}", f"shape {where.shape}")
+        _check_no_spike(stamps, where)
         if quats_xyzw is None:
             return cls(Space(names), stamps - stamps[0], where)
         quats = checked_array(quats_xyzw, "orientations", 2)
@@ -200,6 +205,21 @@ def _check_no_jump(times: Array) -> None:
     if steps[index] > max(MAX_GAP_SHARE * duration_s, 3.0 * typical_s):
         got = f"{steps[index]:.3g} s after sample [{index}], {typical_s:.3g} s between others"
         raise DemonstrationError("times", "no jump", got)
+
+
+def _check_no_spike(times: Array, positions: Array) -> None:
+    """Rejects a sample far off the line between its neighbours while the motion around it is slow."""
+    share = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
+    line = positions[:-2] + share * (positions[2:] - positions[:-2])
+    off = np.linalg.norm(positions[1:-1] - line, axis=1)
+    steps = np.pad(np.linalg.norm(np.diff(positions, axis=0), axis=1), 1)
+    around = np.maximum(steps[:-3], steps[3:])  # the steps before and after the three samples
+    extent = float(np.ptp(positions, axis=0).max())
+    limits = np.maximum(SPIKE_TO_STEPS * around, max(SPIKE_SHARE * extent, SPIKE_TO_NOISE * float(np.median(off))))
+    if (off > limits).any():
+        index = int(np.argmax(off - limits))
+        expected = f"at most {limits[index]:.3g} off the line between the samples before and after"
+        raise DemonstrationError("positions", expected, f"a spike or jump of {off[index]:.3g} at sample [{index + 1}]")
 
 
 def _unit_quats(quats: Array) -> Array:

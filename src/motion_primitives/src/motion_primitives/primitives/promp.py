@@ -14,7 +14,7 @@ from custom_ros_tools.schema import ConfigModel, ListOf, Positive, Seconds
 from custom_ros_tools.transforms import Array
 from motion_primitives.basis import TimeBasis, fitted
 from motion_primitives.demonstration import Demonstration
-from motion_primitives.dynamics import Execution, PathExecution, SpringDamper
+from motion_primitives.dynamics import TOLERANCE, TOLERANCE_RAD, Execution, PathExecution, SpringDamper
 from motion_primitives.errors import DemonstrationError, PlanError
 from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, check_shape
 from motion_primitives.space import Space, angular_velocity
@@ -29,10 +29,18 @@ MIN_EXTENT = 0.01
 """Least extent of a motion for the share above [m or rad]."""
 SAMPLES_OF_MEAN = 50
 """Number of samples of each demonstration for the mean orientation."""
+END_WEIGHT = 100.0
+"""Weight of the error at the first and the last sample: the shown start and goal are kept."""
 EXACT_STD = 1e-6
 """Standard deviation with which start and goal are kept [m or rad]."""
 LAST_CHANGE = 0.9
 """Share of the duration after which the goal cannot be changed any more."""
+LOOKS = np.linspace(0.0, 1.0, 201)
+"""Shares of the duration at which a motion is checked."""
+MISSED_STDS = 3.0
+"""Number of its standard deviations beyond which a point counts as missed."""
+MAX_TURN_RAD = 2.0 * math.pi
+"""Angle from the mean orientation at which a motion is rejected [rad]: it is a whole turn."""
 
 
 class ProMPConfig(PrimitiveConfig):
@@ -43,6 +51,11 @@ class ProMPConfig(PrimitiveConfig):
         1.0,
         description="Number of demonstrations as much as which it counts, that motions may deviate smoothly from their "
         "mean. Larger values follow new points more gently where demonstrations did not differ.",
+    )
+    reach: Positive = Field(
+        2.0,
+        description="How far a motion may leave the demonstrated positions, as a multiple of their largest extent; one "
+        "that goes farther is refused.",
     )
 
 
@@ -81,17 +94,46 @@ class WeightDistribution(NamedTuple):
         return WeightDistribution(mean, self.covariance - gain @ across.T)
 
 
+class Known(NamedTuple):
+    """A point that a motion passes, or its rate at a share of the duration.
+
+    Attributes:
+        subject: Its name in messages.
+        progress: Share of the duration.
+        values: Coordinates, or their rates for a duration of 1 s, shape (dof,).
+        std: Standard deviation [m or rad].
+        is_rate: Whether it is a rate.
+    """
+
+    subject: str
+    progress: float
+    values: Array
+    std: float = EXACT_STD
+    is_rate: bool = False
+
+
 class MeanPath:
     """The mean of a distribution of motions.
 
     Args:
-        free: The distribution before its goal is known; another goal is found in it.
-        goal: The last point, None for the mean of the distribution.
+        known: Points and rates that are known besides the goal.
+        goal: The last point, None if it is one of the known points.
+
+    Raises:
+        PlanError: If a point is missed, or the motion goes too far from the demonstrations.
     """
 
-    def __init__(self, primitive: ProMP, free: WeightDistribution, duration_s: float, goal: Array | None) -> None:
-        self._primitive, self._free, self.end_s = primitive, free, duration_s
-        self._distribution = free if goal is None else primitive.given(free, [primitive.known_at(1.0, goal)])
+    def __init__(self, primitive: ProMP, known: Sequence[Known], duration_s: float, goal: Array | None) -> None:
+        self._primitive, self._known, self.end_s = primitive, list(known), duration_s
+        self._distribution = self._to(self._known, goal)
+
+    def _to(self, known: Sequence[Known], goal: Array | None, progress: float = 0.0) -> WeightDistribution:
+        """Returns the checked distribution of the motions to a goal."""
+        primitive = self._primitive
+        to_goal = [] if goal is None else [Known("goal", 1.0, primitive.coordinates(goal))]
+        distribution = primitive.given(primitive.distribution, [*known, *to_goal])
+        primitive.check(distribution, [*known, *to_goal], self.end_s, progress)
+        return distribution
 
     def at(self, time_s: float) -> tuple[Array, Array]:
         """Returns point and velocity, shape (dof,)."""
@@ -102,15 +144,19 @@ class MeanPath:
         """Sets another goal: the mean, given where it is now, and that it ends there.
 
         Raises:
-            PlanError: If it is too late.
+            PlanError: If it is too late, or as for a new motion.
         """
         primitive, progress = self._primitive, time_s / self.end_s
         if progress > LAST_CHANGE:
             got = f"one after {min(progress, 1.0):.0%}"
             raise PlanError("goal", f"a change before {LAST_CHANGE:.0%} of the duration", got)
-        now = primitive.rows(progress), primitive.rows(progress, is_rate=True)
-        self._free = primitive.given(self._free, [(rows, rows @ self._distribution.mean, EXACT_STD) for rows in now])
-        self._distribution = primitive.given(self._free, [primitive.known_at(1.0, goal)])
+        mean, now = self._distribution.mean, []
+        for is_rate in (False, True):
+            values = primitive.rows(progress, is_rate) @ mean
+            now.append(Known("present motion", progress, values, is_rate=is_rate))
+        known = [*self._known, *now]
+        self._distribution = self._to(known, goal, progress)
+        self._known = known
 
 
 class ProMP(Primitive):
@@ -134,7 +180,9 @@ class ProMP(Primitive):
             if largest > MAX_ANGLE_RAD:
                 expected = f"at most {MAX_ANGLE_RAD:.3g} rad from their mean"
                 raise DemonstrationError("orientations", expected, f"{largest:.3g} rad in [{index}]")
-            weights.append(fitted(basis.values(each.times / each.duration_s), path))
+            values = basis.values(each.times / each.duration_s)
+            values, path = (np.vstack([part, END_WEIGHT * part[[0, -1]]]) for part in (values, path))
+            weights.append(fitted(values, path, roughness=basis.roughness))
         duration_s = float(np.mean([each.duration_s for each in demonstrations]))
         self._set(space, origin, duration_s, np.array(weights))
 
@@ -143,6 +191,8 @@ class ProMP(Primitive):
         self._origin, self._duration_s, self._weights = origin, duration_s, weights
         self._basis = TimeBasis.of(self.config.bases)
         self._dof = space.dof
+        shown = weights @ self._basis.values(LOOKS).T
+        self._least, self._most = shown.min(axis=(0, 2)), shown.max(axis=(0, 2))
         count, rows = len(weights), weights.reshape(len(weights), -1)
         mean = rows.mean(axis=0)
         spread = (rows - mean).T @ (rows - mean)
@@ -170,27 +220,70 @@ class ProMP(Primitive):
         duration = self._duration_s if duration_s is None else duration_s
         if start is None and velocity.any():
             raise PlanError("velocity", "a start with it", "none")
+        known = [
+            Known(f"via_points[{index}]", each.progress, self.coordinates(each.point), each.std)
+            for index, each in enumerate(via_points)
+        ]
+        ends = {each.progress for each in via_points}
+        shown_start, shown_goal = (self.mean_at(self.distribution, progress)[0] for progress in (0.0, 1.0))
+        if start is None and 0.0 not in ends:
+            start = shown_start
+        if goal is None and 1.0 not in ends:
+            goal = shown_goal
         rate = velocity if start is None else duration * self.space.shift_rate(self.coordinates(start), velocity)
-        known = [(self.rows(each.progress), self.coordinates(each.point), each.std) for each in via_points]
-        known.append((self.rows(0.0, is_rate=True), rate, EXACT_STD))
-        known.append((self.rows(1.0, is_rate=True), np.zeros(self._dof), EXACT_STD))
+        known.append(Known("velocity", 0.0, rate, is_rate=True))
+        known.append(Known("velocity", 1.0, np.zeros(self._dof), is_rate=True))
         if start is not None:
-            known.append(self.known_at(0.0, start))
+            known.append(Known("start", 0.0, self.coordinates(start)))
         spring, rest = SpringDamper(self.config.alpha, duration), np.zeros(self._dof)
-        path = MeanPath(self, self.given(self.distribution, known), duration, goal)
+        path = MeanPath(self, known, duration, goal)
         return PathExecution(self.space, spring, path, lambda _: rest, path.at(duration)[0] if goal is None else goal)
 
-    def known_at(self, progress: float, point: Array) -> tuple[Array, Array, float]:
-        """Returns rows, values and standard deviation of a point that is passed exactly."""
-        return self.rows(progress), self.coordinates(point), EXACT_STD
+    def given(self, distribution: WeightDistribution, known: Sequence[Known]) -> WeightDistribution:
+        """Returns a distribution, given points and rates."""
+        rows = np.vstack([self.rows(each.progress, each.is_rate) for each in known])
+        stds = np.array([max(each.std, EXACT_STD) for each in known])
+        return distribution.given(rows, np.concatenate([each.values for each in known]), np.repeat(stds**2, self._dof))
 
-    def given(
-        self, distribution: WeightDistribution, known: Sequence[tuple[Array, Array, float]]
-    ) -> WeightDistribution:
-        """Returns a distribution, given rows, values and standard deviations."""
-        rows, values, stds = zip(*known)
-        variances = np.repeat(np.maximum(stds, EXACT_STD) ** 2, self._dof)
-        return distribution.given(np.vstack(rows), np.concatenate(values), variances)
+    def check(
+        self, distribution: WeightDistribution, known: Sequence[Known], duration_s: float, progress: float
+    ) -> None:
+        """Checks the mean of a distribution from a share of the duration on.
+
+        Raises:
+            PlanError: If it misses a known point, leaves the demonstrations by more than the option `reach`, or turns
+                by more than a whole turn.
+        """
+        n = len(self.space.names)
+        looks = LOOKS[LOOKS >= progress]
+        path = distribution.mean.reshape(self._dof, -1) @ self._basis.values(looks).T
+        ahead = [each for each in known if not each.is_rate and each.progress >= progress]
+        for each in ahead:
+            self._check_reach(each.subject, each.values[:n, None], np.array([each.progress]) * duration_s)
+        self._check_reach("plan", path[:n], looks * duration_s)
+        angles = np.linalg.norm(path[n:], axis=0)
+        if angles.max(initial=0.0) > MAX_TURN_RAD:
+            got = f"{angles.max():.3g} rad at {looks[int(np.argmax(angles))] * duration_s:.3g} s"
+            raise PlanError("plan", f"at most {MAX_TURN_RAD:.3g} rad from the mean orientation", got)
+        for each in ahead:
+            miss = self.rows(each.progress) @ distribution.mean - each.values
+            distance, angle = float(np.abs(miss[:n]).max()), float(np.linalg.norm(miss[n:]))
+            spread = MISSED_STDS * each.std
+            if distance > TOLERANCE + spread or angle > TOLERANCE_RAD + spread:
+                expected = f"to be passed within {TOLERANCE + spread:.3g} m (or rad, for joints)"
+                expected += f" and {TOLERANCE_RAD + spread:.3g} rad" if angle else ""
+                raise PlanError(each.subject, expected, f"a miss by {distance:.3g} and {angle:.3g} rad")
+
+    def _check_reach(self, subject: str, path: Array, times_s: Array) -> None:
+        """Rejects positions, shape (n, m), at m times that are too far from the demonstrations."""
+        least, most, reach = self._least[: len(path)], self._most[: len(path)], self.config.reach
+        room = reach * max(float((most - least).max()), MIN_EXTENT)
+        beyond = np.maximum(least[:, None] - path, path - most[:, None])
+        index, at = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+        if beyond[index, at] > room:
+            name, limits = self.space.names[index], f"{least[index] - room:.3g} to {most[index] + room:.3g}"
+            expected = f"{name} from {limits}, within {reach:g} shown extents (option 'reach') of the demonstrations"
+            raise PlanError(subject, expected, f"{path[index, at]:.3g} at {times_s[at]:.3g} s")
 
     def rows(self, progress: float, is_rate: bool = False) -> Array:
         """Returns the linear functions of all weights that are the coordinates at a share of the duration, or rates."""
@@ -230,8 +323,11 @@ class ProMP(Primitive):
         Raises:
             PlanError: If one is no point of the space.
         """
-        points = [self.space.point(each.point, f"via_points[{index}]") for index, each in enumerate(via_points)]
-        known = [(self.rows(each.progress), self.coordinates(at), each.std) for each, at in zip(via_points, points)]
+        known = []
+        for index, each in enumerate(via_points):
+            subject = f"via_points[{index}]"
+            point = self.space.point(each.point, subject)
+            known.append(Known(subject, each.progress, self.coordinates(point), each.std))
         return self.given(self.distribution, known)
 
     def _learned(self) -> LearnedProMP:
