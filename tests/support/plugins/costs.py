@@ -6,6 +6,8 @@ import pickle
 import resource
 import signal
 
+from rpbi.samples import AprilTagsSample
+
 
 def height(world):
     """Returns how high the box is [m]."""
@@ -15,6 +17,19 @@ def height(world):
 def turned(world):
     """Returns how far the second joint of the arm is from 0.6 rad, squared."""
     return (list(world.bodies["iiwa"].joint_positions().values())[1] - 0.6) ** 2
+
+
+def farthest_tag(world):
+    """Returns how far the farthest tag is that the cameras see [m]."""
+    samples = [one for one in world.read_rest() if isinstance(one, AprilTagsSample)]
+    return max((tag.pose.position[2] for one in samples for tag in one.tags), default=0.0)
+
+
+def cameras(world):
+    """Returns all that is known of the cameras."""
+    return {
+        name: (each.config.model_dump(), each.pose, each.hz, each.topic_name) for name, each in world.cameras.items()
+    }
 
 
 def broken(world):

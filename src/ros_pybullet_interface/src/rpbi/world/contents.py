@@ -2,7 +2,7 @@
 
 import hashlib
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, PluginError, Problem, UnknownNameError
@@ -15,6 +15,7 @@ from rpbi.control.pose_follower import PoseFollower
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose
 from rpbi.plugins import plugin_errors
 from rpbi.sensors import SENSOR_TYPES
 from rpbi.sensors.contacts.contacts import ContactReader
@@ -194,6 +195,17 @@ class WorldContents:
         if problems:
             raise ConfigError(problems)
 
+    def moved_cameras(self) -> Iterator[tuple[str, Pose]]:
+        """Yields slots and poses of the cameras that are not where the configuration has them."""
+        for name, camera in self.cameras.items():
+            if camera.pose is not None and camera.pose != self._configured_pose(camera):
+                yield f"{name}/pose", camera.pose
+
+    def move_cameras_back(self) -> None:
+        """Has all cameras forget their poses, but for those of the configuration."""
+        for camera in self.cameras.values():
+            camera.pose = self._configured_pose(camera)
+
     def changed_names(self) -> set[str]:
         """Returns the names of all bodies that came or went since it was filled."""
         return {entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove")}
@@ -227,7 +239,10 @@ class WorldContents:
         self.cameras = {**self.cameras, camera.name: camera}
         self._register(camera.name, (camera,), camera.inputs())
         if camera.pose is None:
-            camera.pose = self._config.pose_of(camera.config.object_tf.tf_id)
+            camera.pose = self._configured_pose(camera)
+
+    def _configured_pose(self, camera: RgbdSensor) -> Pose | None:
+        return self._config.pose_of(camera.config.object_tf.tf_id)
 
     def _require_new(self, name: str, file: str | None) -> None:
         if name in self.sensors:

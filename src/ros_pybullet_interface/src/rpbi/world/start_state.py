@@ -101,7 +101,8 @@ class StartState:
 
     def _is_undone(self, command: WorldCommand) -> bool:
         if command.what == "input":
-            return command.name.endswith("/target") and command.name.count("/") == 1
+            name, _, key = command.name.partition("/")
+            return key == "target" or name in self._contents.cameras  # which keep their poses
         if command.what == "teleport":
             return self._contents.bodies[command.name].object_tf is None
         return command.what in UNDONE

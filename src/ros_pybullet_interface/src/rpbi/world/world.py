@@ -175,7 +175,9 @@ class World:
         """
         if isinstance(config, Mapping):
             config = RgbdSensorConfig.parse(config, file or str(config.get("name", "camera")))
-        return self._contents.add_camera(config, file)
+        camera = self._contents.add_camera(config, file)
+        self._note(config.name, "add_camera", config)
+        return camera
 
     def remove(self, name: str) -> None:
         """Removes a body or a camera.
@@ -183,12 +185,10 @@ class World:
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        is_body = name in self.bodies
         self._contents.remove(name)
         self._pushed.pop(name, None)
         self.clock.bump_stamp()  # another object of its name, perhaps elsewhere, may come within this tick
-        if is_body:
-            self._note(name, "remove", None)
+        self._note(name, "remove", None)
         self.apply_inputs()  # what still waits for it must not meet a later body of the same name
 
     def dynamics(self, object_name: str) -> LinkDynamics:
@@ -268,8 +268,7 @@ class World:
         if name not in self._sensors:
             raise UnknownNameError("object", name, [*self.bodies, *self.cameras])
         self._sensors.set_rate(name, number, hz)
-        if name in self.bodies:
-            self._note(name, "sensor_rate", (number, hz))
+        self._note(name, "sensor_rate", (number, hz))
 
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
         """Applies an action to a body, and logs it as a command; when it raises, nothing is logged.
@@ -353,13 +352,13 @@ class World:
                 self.apply_input(slot, value)
 
     def apply_input(self, slot: str, value: Any) -> None:
-        """Acts on a value that was checked, and notes it if it is for a body."""
+        """Acts on a value that was checked, and notes it."""
         body = self.bodies.get(slot.split("/")[0])
         with plugin_errors(body or self, f"applying '{slot}' at tick {self.clock.tick}"):
             self.inputs[slot].apply(value)
         if body is not None:
             self._note_pushed(body)
-            self._note(slot, "input", value)
+        self._note(slot, "input", value)
 
     def step(self) -> list[Any]:
         """Advances by a tick.
@@ -444,8 +443,7 @@ class World:
         try:
             self._contents.fill(self.loaded)
         finally:
-            self.commands.clear()
-            self.mailbox.drop()
+            self._forget_commands()
             self.start_hash, self._description = self.state_hash(), ""
         if not rebuild and StartState.suits(self._contents):
             self._start = StartState(self.pb, self._contents)
@@ -458,9 +456,15 @@ class World:
         self.contacts.invalidate()
         self._sensors.restart()
         self.resets += 1
+        self._forget_commands()
+        return self.state_hash() == self.start_hash
+
+    def _forget_commands(self) -> None:
+        """Begins a life: without commands, but for the poses that cameras keep, and without inputs that wait."""
         self.commands.clear()
         self.mailbox.drop()
-        return self.state_hash() == self.start_hash
+        for slot, pose in self._contents.moved_cameras():
+            self._note(slot, "input", pose)
 
     def describe(self) -> str:
         """Returns what it was built from, as JSON; see `WorldDescription`."""
@@ -471,8 +475,8 @@ class World:
     def save(self, file: str | Path | None = None) -> WorldState:
         """Returns the present state, from which the same world goes on to the last bit.
 
-        It holds all commands since the world was built or reset. The time that `restore` takes is therefore that of
-        simulating again from there.
+        Inputs that wait act first, as they would before the next step. The state holds all commands since the world was
+        built or reset. The time that `restore` takes is therefore that of simulating again from there.
 
         Args:
             file: File that it is written to, too.
@@ -484,7 +488,7 @@ class World:
         """
         if soft := [body.name for body in self.bodies.values() if body.is_soft]:
             raise InterfaceError(f"expected no soft bodies, which never move the same way twice, got {', '.join(soft)}")
-
+        self.apply_inputs()
         state = WorldState(self.describe(), tuple(self.commands.records()), self.clock.tick, self.state_hash())
         if file is not None:
             state.write(file)
@@ -498,6 +502,7 @@ class World:
                 it is reset.
         """
         self.require_own(state)
+        self._contents.move_cameras_back()
         self.reset()
         try:
             state.run(self)

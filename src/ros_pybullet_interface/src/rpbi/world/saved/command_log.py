@@ -24,10 +24,10 @@ class WorldCommand(NamedTuple):
 
     Attributes:
         tick: The world's tick: it entered after that tick's physics, before the next.
-        name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's name for
-            those, empty for the whole world.
-        what: Its kind: `input`, `add`, `remove`, `dynamics`, `physics`, `sensor_rate`, `attach`, `detach`, `halt`,
-            `pause`, or a key of ACTIONS.
+        name: The body or camera that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's
+            name for those, empty for the whole world.
+        what: Its kind: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`, `attach`,
+            `detach`, `halt`, `pause`, or a key of ACTIONS.
         value: Its value.
     """
 

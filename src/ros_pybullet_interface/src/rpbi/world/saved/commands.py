@@ -13,6 +13,7 @@ from .values import from_text
 _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "input": lambda world, slot, value: world.apply_input(slot, value),
     "add": lambda world, _, arguments: world.add(*arguments),
+    "add_camera": lambda world, _, config: world.add_camera(config),
     "remove": lambda world, name, _: world.remove(name),
     "dynamics": lambda world, name, change: world.change_dynamics(name, change),
     "attach": lambda world, _, config: world.attach(config),

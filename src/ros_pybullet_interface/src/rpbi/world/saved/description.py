@@ -15,7 +15,8 @@ from custom_ros_tools.schema.type_names import shown
 from robot_model.asset_files import LONGEST_PATH
 from robot_model.urdf.files import is_temporary, write_description
 from rpbi.bodies import BodyConfig
-from rpbi.world.loading import LoadedWorld, ObjectConfig, WorldConfig
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.world.loading import CameraConfig, LoadedWorld, ObjectConfig, WorldConfig
 
 from .values import from_text, to_text
 
@@ -37,6 +38,7 @@ def describe(loaded: LoadedWorld, start_hash: str) -> str:
             "file": loaded.file,
             "config": to_text(loaded.config),
             "objects": [{"type": o.type, "file": o.file, "config": to_text(o.config)} for o in loaded.objects],
+            "cameras": [{"file": camera.file, "config": to_text(camera.config)} for camera in loaded.cameras],
             "files": {path: _hash_of(path) for path in files},
             "descriptions": {path: Path(path).read_text(encoding="utf-8") for path in files if is_temporary(path)},
             "start_hash": start_hash,
@@ -53,13 +55,21 @@ class _Object(ConfigModel):
     config: str
 
 
+class _Camera(ConfigModel):
+    """A camera of a description, with its configuration as text."""
+
+    file: str
+    config: str
+
+
 class _Description(ConfigModel):
-    """Content that `describe` writes, without the format."""
+    """Content that `describe` writes, without the format. Older recordings have no cameras."""
 
     pybullet: str
     file: str
     config: str
     objects: list[_Object]
+    cameras: list[_Camera] = []
     files: dict[str, str]
     descriptions: dict[str, str]
     start_hash: str
@@ -91,7 +101,8 @@ class WorldDescription:
         except (json.JSONDecodeError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise ValueError(f"the world's description cannot be read: {shortened(repr(error))}") from None
         self.start_hash = read.start_hash
-        self._file, self._config, self._objects = read.file, read.config, read.objects
+        self._file, self._config = read.file, read.config
+        self._objects, self._cameras = read.objects, read.cameras
         self._descriptions, written_by = read.descriptions, read.pybullet
         self.warnings = [
             f"{path}: is another file than when the world was recorded"
@@ -109,7 +120,10 @@ class WorldDescription:
         """
         config = self._read(self._config, self._file, WorldConfig)
         objects = [ObjectConfig(each.type, self._read(each.config, each.file), each.file) for each in self._objects]
-        return LoadedWorld(config, tuple(objects), self._file)
+        cameras = [
+            CameraConfig(self._read(each.config, each.file, RgbdSensorConfig), each.file) for each in self._cameras
+        ]
+        return LoadedWorld(config, tuple(objects), self._file, tuple(cameras))
 
     def _read(self, text: str, file: str, kind: type[ConfigModel] = BodyConfig) -> Any:
         for path, description in self._descriptions.items():
