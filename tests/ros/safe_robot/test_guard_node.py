@@ -93,6 +93,17 @@ def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):
     assert left.commands.messages == []
 
 
+def test_targets_of_one_stamp_are_commanded_once(left):
+    first = left.send(0.0, 0.0)
+    repeated = JointState(first.header, NAMES, [0.9, 0.0], [], [])
+    left.publish(repeated)
+    left.send(0.001, 0.0)
+    statuses = left.statuses.wait_for(3)
+    assert [each.is_safe for each in statuses] == [True] * 3
+    assert [bool(each.message) for each in statuses] == [False, True, False]
+    assert [each.position for each in left.commands.wait_for(2)] == [(0.0, 0.0), (0.001, 0.0)]
+
+
 def test_a_target_without_a_stamp_after_others_that_had_one_is_refused(left):
     """ROS time that begins anew at 0 looks like that."""
     left.send(0.0, 0.0)
@@ -223,7 +234,7 @@ def test_launch_files_of_the_release_are_answered_with_what_they_lack(parameters
     heard.wait_for(["the robot is assumed to stand at the first target"])
 
 
-def test_targets_with_one_stamp_are_warned_of_in_one_line_a_minute(parameters, ros):
+def test_stamps_that_go_back_are_warned_of_once_a_minute(parameters, ros):
     """In the policy `limit` the guard goes on, and a busy computer may send hundreds of them."""
     parameters(policy="limit", start_from="target")
     guard, _ = guard_of_parameters()
@@ -233,10 +244,10 @@ def test_targets_with_one_stamp_are_warned_of_in_one_line_a_minute(parameters, r
     heard.wait_to_hear(rospy.get_name())
     status = GuardStatus(guard, "/joint_states/target")
     for _ in range(20):
-        status.publish(Header(), guard.decide((0.0, 0.0), CheckContext(stamp_step_s=0.0)).violation)
+        status.publish(Header(), guard.decide((0.0, 0.0), CheckContext(stamp_step_s=-0.01)).violation)
     rospy.logwarn("all have been published")
     heard.wait_for(["all have been published"])
     assert [log.msg for log in heard.logs("stamp")] == [
-        "/joint_states/target: staleness: two targets have the same stamp; give each target a later stamp, or none, and"
-        " let one source publish"
+        "/joint_states/target: staleness: the stamp of the target is 0.01 s before that of the target before; give each"
+        " target a later stamp, or none, and let one source publish"
     ]

@@ -57,8 +57,12 @@ class GuardStation:
         """Publishes a target of the present time, or before; returns it."""
         message = JointState(**{"name": NAMES, "position": position, **fields})
         message.header.stamp = rospy.Time.from_sec(time.time() - age_s)
-        self._publisher.publish(message)
+        self.publish(message)
         return message
+
+    def publish(self, message: JointState) -> None:
+        """Publishes a target as it is."""
+        self._publisher.publish(message)
 
     def send_unstamped(self, *position: float) -> None:
         """Publishes a target that does not say of when it is."""

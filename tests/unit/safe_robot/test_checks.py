@@ -481,12 +481,13 @@ def test_a_box_the_wrong_way_round_is_refused(tmp_path):
         check_of("link_box", slider(tmp_path), boxes={"hand": {"x": [1.0, -1.0]}})
 
 
-def test_stamps_must_go_on_and_targets_must_come_while_the_robot_moves():
+def test_stamps_must_not_go_back_and_targets_must_come_while_the_robot_moves():
     check = check_of("staleness", GuardedRobot(KUKA))
     still = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     moving = State(np.array(HOME), np.full(7, 0.1), np.zeros(7))
     assert check.check(still, CheckContext(stamp_step_s=0.01, since_command_s=60.0)) is None
-    for step_s in (0.0, -0.01, float("nan")):
+    assert check.check(still, CheckContext(stamp_step_s=0.0)) is None
+    for step_s in (-0.01, float("nan")):
         assert check.check(still, CheckContext(stamp_step_s=step_s)) is not None
     goes_on = CommandedMotion(check.robot, moving, np.array(HOME), 0.01)
     assert check.check(goes_on, CheckContext(since_command_s=0.05)) is None

@@ -145,6 +145,31 @@ def test_it_says_when_targets_fail_to_come_while_the_robot_moves_and_only_then(t
     assert guard.is_halted
 
 
+@pytest.mark.parametrize("policy", ["reject", "limit"])
+def test_targets_of_one_stamp_are_one_target(tmp_path, policy):
+    """A busy machine repeats stamps, since simulated time stands still between two messages of /clock."""
+    robot = slider(tmp_path)
+    once, repeated = guard_of(robot, policy=policy), guard_of(robot, policy=policy)
+    for target in smooth(robot, 1.0):
+        assert decide(repeated, target, stamp_step_s=PERIOD_S) == decide(once, target)
+        for _ in range(3):
+            assert decide(repeated, (0.9, 0.9), stamp_step_s=0.0, since_command_s=0.05) == Decision(None)
+    assert np.array_equal(repeated.stop_commands, once.stop_commands)
+
+
+@pytest.mark.parametrize("policy", ["reject", "limit"])
+def test_a_stamp_that_stands_still_stops_a_moving_robot(tmp_path, policy):
+    guard = guard_of(slider(tmp_path), policy=policy)
+    for target in list(smooth(guard.robot, 1.0))[:50]:
+        decide(guard, target)
+    known, repeated = guard.stop_commands, {"stamp_step_s": 0.0, "since_command_s": 0.11}
+    first = decide(guard, target, **repeated)
+    assert first.violation.check == "staleness" and first.is_halted == (policy == "reject")
+    commands = [first.command, *(decide(guard, target, **repeated).command for _ in known)]
+    braking = [*map(tuple, known), None] if policy == "limit" else [None] * (len(known) + 1)
+    assert commands == braking, "once the robot rests, nothing more is commanded"
+
+
 class TestLimitPolicy:
     """Something safe in the place of what is not."""
 

@@ -83,7 +83,8 @@ class CheckContext(NamedTuple):
         now_s: The present time [s], of a clock that never goes back.
         age_s: Age of the target [s]; 0 if unknown.
         stamp_step_s: Difference to the stamp of the target before [s]; None without one.
-        since_command_s: Time since the command before [s].
+        since_command_s: Time since the command before [s]; for a target with the stamp of the one before, since that
+            stamp was new.
         measured: Measured positions by joint [rad or m], empty if there are none.
         measured_age_s: Their age [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].

@@ -33,7 +33,8 @@ class Decision(NamedTuple):
     """Answer of a guard to a target.
 
     Attributes:
-        command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent.
+        command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent,
+            as for a target with the stamp of the one before.
         violation: Why the target is not safe; None if it is.
         is_halted: Whether nothing is sent from now on until `Guard.start`.
         is_shaped: Whether the target was smoothed.
@@ -61,6 +62,9 @@ class Guard:
 
     The reference is the command before, never a measurement. Every command counts as one period, whatever its stamp, so
     that stamps cannot make the robot faster; the sender ensures that no command follows sooner.
+
+    Targets of one stamp are one target: the first one gives a command. Only a new stamp shows that targets continue, so
+    `staleness` applies while the stamp stands still.
 
     With `shape`, the command on the way to a target that joints cannot follow is checked instead of it.
 
@@ -187,16 +191,20 @@ class Guard:
         """Returns what is wrong while no target comes; if anything is, it halts."""
         if self.is_halted or self._is_first or self._state is None:
             return None
-        motion = CommandedMotion(self.robot, self._state, self._state.position, self.config.period_s)
         try:
-            found = (each.check(motion, context) for each in self.checks if each.watches)
-            violation = next(filter(None, found), None)
+            violation = self._watchdog_violation(context)
         except BaseException:
             self.halt()
             raise
         if violation is not None:
             self.halt()
         return violation
+
+    def _watchdog_violation(self, context: CheckContext) -> Violation | None:
+        assert self._state is not None
+        motion = CommandedMotion(self.robot, self._state, self._state.position, self.config.period_s)
+        found = (each.check(motion, context) for each in self.checks if each.watches)
+        return next(filter(None, found), None)
 
     def _decide(self, target: tuple[float, ...], context: CheckContext) -> Decision:
         if violation := self._input_problem(target):
@@ -205,6 +213,9 @@ class Guard:
         if is_first and (violation := self._start_at(target, context)):
             return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
         assert self._state is not None
+        if context.stamp_step_s == 0.0 and not is_first:
+            repeated = self._watchdog_violation(context)
+            return Decision(None) if repeated is None else self._refused(repeated)
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
             wanted = (

@@ -27,10 +27,12 @@ class Staleness(Check):
         if not abs(context.age_s) <= timeout_s:
             return too_old(context.age_s, timeout_s, "checks.staleness.timeout_s")
         step_s = context.stamp_step_s
-        if step_s is not None and not step_s > 0.0:
-            return Violation(
-                self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=_order(step_s)
+        if step_s is not None and not step_s >= 0.0:
+            words = (
+                f"the stamp of the target is {-step_s:.3g} s before that of the target before; give each target a later"
+                " stamp, or none, and let one source publish"
             )
+            return Violation(self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=words)
         if not motion.start.is_at_rest and not context.since_command_s <= timeout_s:
             since_s = context.since_command_s
             words = (
@@ -53,12 +55,3 @@ def too_old(age_s: float, limit_s: float, key: str) -> Violation:
             f" or raise {key}"
         )
     return Violation(Staleness.name, "the age of the target", age_s, limit_s, "s", words=words)
-
-
-def _order(step_s: float) -> str:
-    """Returns what is wrong with a stamp that comes some time [s] after that of the target before."""
-    if step_s == 0.0:
-        found = "two targets have the same stamp"
-    else:
-        found = f"the stamp of the target is {-step_s:.3g} s before that of the target before"
-    return f"{found}; give each target a later stamp, or none, and let one source publish"

@@ -37,6 +37,7 @@ JUMP_S = 0.5
 FIRST_STATE_S = 1.0
 """Longest time for which the node waits for a measured state before it subscribes to targets [s]."""
 NEVER_S = float("-inf")
+REPEATED = "the stamp is that of the target before: both are one target, with one command"
 SWITCH_S = 0.0005
 """Time after which Python switches to a waiting thread, such as one that has just received a target [s]."""
 
@@ -53,7 +54,7 @@ class GuardNode:
         self._as_joint_state = config.publish_as_joint_state
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
-        self._sent_s = NEVER_S
+        self._sent_s = self._repeated_s = NEVER_S
         self._last_stamp: tuple[rospy.Time, float] | None = None
         self._target_topic = rospy.resolve_name("joint_states/target")
         self._command = rospy.Publisher(
@@ -116,7 +117,8 @@ class GuardNode:
         if decision.is_halted:
             self._halt(decision.violation, message.header)
         else:
-            self._status.publish(message.header, decision.violation, self._measurements.obstacles)
+            note = REPEATED if decision.command is None and decision.violation is None else ""
+            self._status.publish(message.header, decision.violation, self._measurements.obstacles, note)
         return decision.command is not None
 
     def _end_wait(self, age_s: float) -> None:
@@ -153,20 +155,23 @@ class GuardNode:
             values = self._checked(message)
         except (InterfaceError, ValueError) as error:
             return self._guard.refuse(str(error))
-        stamp = message.header.stamp
-        age_s, step_s = 0.0, None
-        if self._last_stamp is not None and not stamp:
+        stamp, last = message.header.stamp, self._last_stamp
+        age_s, step_s, since_s = 0.0, None, self._sent_s
+        if last is not None and not stamp:
             return self._guard.refuse("expected a stamp, as the targets before had")
         if stamp:
             age_s, now_s = (_now() - stamp).to_sec(), time.monotonic()
-            if self._last_stamp is not None:
-                step_s = (stamp - self._last_stamp[0]).to_sec()
-                if step_s > now_s - self._last_stamp[1] + JUMP_S:
-                    return self._guard.refuse(f"stamps jump by {step_s:g} s")
             self._last_stamp = stamp, now_s
+            if last is not None:
+                step_s = (stamp - last[0]).to_sec()
+                if step_s > now_s - last[1] + JUMP_S:
+                    self._last_stamp = last
+                    return self._guard.refuse(f"stamps jump by {step_s:g} s")
+                if step_s == 0.0:
+                    self._last_stamp, self._repeated_s, since_s = last, now_s, last[1]
             if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
                 return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
-        return self._guard.decide(values.position, self._measurements.context(self._sent_s, age_s, step_s))
+        return self._guard.decide(values.position, self._measurements.context(since_s, age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:
         """Returns the positions of the guarded joints, in order.
@@ -219,7 +224,8 @@ class GuardNode:
                 self._halt(violation_of("source", reason))
                 return
             try:
-                violation = self._guard.check_watchdogs(self._measurements.context(self._sent_s))
+                last_s = max(self._sent_s, self._repeated_s)  # repeated targets are judged when they come
+                violation = self._guard.check_watchdogs(self._measurements.context(last_s))
             except Exception as error:
                 violation = violation_of("input", f"the context cannot be judged: {error!r}")
             if violation is not None:

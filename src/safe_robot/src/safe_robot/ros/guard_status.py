@@ -39,7 +39,11 @@ class GuardStatus:
         self._way_out_words = ""
 
     def publish(
-        self, header: Header, violation: Violation | None, obstacles: tuple[Obstacle, ...] | None = None
+        self,
+        header: Header,
+        violation: Violation | None,
+        obstacles: tuple[Obstacle, ...] | None = None,
+        note: str = "",
     ) -> None:
         """Reports a decision.
 
@@ -47,9 +51,10 @@ class GuardStatus:
             header: The target's.
             violation: Its violation; None if it is safe.
             obstacles: Bodies of the environment; equal ones are the same tuple.
+            note: The message of a safe target.
         """
         if violation is None:
-            self._status.publish(Status(header=header, message="", is_safe=True))
+            self._status.publish(Status(header=header, message=note, is_safe=True))
             return
         message = f"{violation}{self._way_out(obstacles)}"
         self._status.publish(Status(header=header, message=message, is_safe=False))

@@ -59,7 +59,7 @@ class Measurements:
         """Returns the context of the checks of a target.
 
         Args:
-            sent_s: Time of the last command [s], by the monotonic clock.
+            sent_s: Time from which `since_command_s` counts [s], by the monotonic clock.
             age_s: Age of the target [s].
             stamp_step_s: Difference to the stamp before [s].
         """
