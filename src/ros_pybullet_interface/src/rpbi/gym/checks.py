@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
+from custom_ros_tools.errors import shortened
 from rpbi.plugins import is_foreign, raise_plugin_error
 
 from .task import WorldTask
@@ -111,6 +112,34 @@ def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> 
     if isinstance(space, spaces.Box):
         return _box_problems(space, value, key)
     return [] if space.contains(value) else [f"{key}: expected one of {space}, got {value!r}"]
+
+
+def check_action(space: spaces.Space[Any], action: Any, key: str = "action") -> None:
+    """Checks an action, before anything acts. Numbers beyond the bounds of a box are allowed, since tasks clip them.
+
+    Raises:
+        ValueError: If its type or shape is not that of the space, or a number in it is not finite.
+    """
+    if isinstance(space, spaces.Dict) and isinstance(action, Mapping) and action.keys() == space.spaces.keys():
+        for name, one in space.spaces.items():
+            check_action(one, action[name], f"{key}['{name}']")
+    elif isinstance(space, spaces.Box):
+        _check_numbers(space.shape, action, key)
+    elif not space.contains(action):
+        raise ValueError(f"{key}: expected one of {space}, got {shortened(repr(action))}")
+
+
+def _check_numbers(shape: tuple[int, ...], given: Any, key: str) -> None:
+    try:
+        values = np.asarray(given)
+    except (TypeError, ValueError):  # lists of different lengths
+        values = np.asarray(None)
+    if values.dtype.kind not in "biuf":
+        raise ValueError(f"{key}: expected numbers of shape {shape}, got {shortened(repr(given))}")
+    if values.shape != shape:
+        raise ValueError(f"{key}: expected the shape {shape}, got {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{key}: expected finite numbers, got {shortened(str(values))}")
 
 
 def _box_problems(space: spaces.Box, value: Any, key: str) -> list[str]:

@@ -21,7 +21,7 @@ try:
 except ImportError:
     raise MissingDependency("gymnasium", "./rpbi setup gym") from None
 
-from .checks import CheckedTask
+from .checks import CheckedTask, check_action
 from .randomization import Randomization, Randomizer
 from .task import WorldTask
 from .tasks import TASKS
@@ -105,7 +105,12 @@ class WorldEnv(gymnasium.Env[Any, Any]):
 
         Returns:
             Observation, reward, whether the episode is over, whether all of its actions are used, and `is_success`.
+
+        Raises:
+            ValueError: If the action has another type or shape than the space, or a number that is not finite. Then
+                nothing has happened.
         """
+        check_action(self.action_space, action)
         self._task.count += 1
         observation = self._line.run(action, self._task.act, self._step, self._observe)
         reward, has_succeeded = self._task.reward(), self._task.has_succeeded()
@@ -206,7 +211,7 @@ class DelayLine:
                 step()
             return observe()
         actions = self._actions
-        actions.append((self._tick + self._action_ticks, action))
+        actions.append((self._tick + self._action_ticks, deepcopy(action)))
         for tick in range(1, self._ticks + 1):
             if actions and actions[0][0] <= self._tick:
                 act(actions.popleft()[1])

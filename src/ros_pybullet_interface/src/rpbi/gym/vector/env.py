@@ -21,6 +21,7 @@ from gymnasium.vector.utils import batch_space, iterate
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.processes.child import start_child
+from rpbi.gym.checks import check_action
 from rpbi.gym.env import WorldEnv
 
 from .arrays import SharedArrays
@@ -113,13 +114,16 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
             Observations, rewards, ends, truncations, and information.
 
         Raises:
-            ValueError: If there are more or fewer actions than environments.
+            ValueError: If there are more or fewer actions than environments, or one is refused by `WorldEnv.step`. Then
+                nothing has happened.
             PluginError: If a task of another package fails.
             InterfaceError: If a process has ended.
         """
         each = actions if isinstance(actions, np.ndarray) else list(iterate(self.action_space, actions))
         if len(each) != self.num_envs:
             raise ValueError(f"expected {self.num_envs} actions, got {len(each)}")
+        for index, action in enumerate(each):
+            check_action(self.single_action_space, action, f"actions[{index}]")
         answers = self._ask_all("step", [(each[part],) for part in self._parts])
         infos: Info = {}
         for index, (info, final) in enumerate(one for answer in answers for one in answer):
