@@ -16,7 +16,7 @@ from physics.scene import Span, Table  # noqa: E402
 
 PAGE = physics.PAGE.read_text()
 measured = cache(lambda name: physics.TABLES[name]())
-CHEAP = ("turning", "falling", "swinging", "resting")
+CHEAP = ("turning", "falling", "swinging", "tumbling", "resting")
 
 
 def test_every_table_has_its_place_and_the_other_way_round():

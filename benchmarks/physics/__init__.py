@@ -7,7 +7,7 @@ from pathlib import Path
 
 from result import Result
 
-from . import contact, friction, motion, soft, tasks
+from . import contact, energy, friction, motion, soft, tasks
 from .scene import Table
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "physics.md"
@@ -15,7 +15,8 @@ TABLES: Mapping[str, Callable[[], Table]] = {
     each.__name__: each
     for each in (
         *(friction.sliding, friction.sliding_by_setting, friction.slope, friction.creep, friction.turning),
-        *(motion.falling, motion.swinging, motion.bouncing),
+        *(motion.falling, motion.swinging, motion.bouncing, motion.bouncing_by_floor),
+        *(energy.tumbling, energy.cradling),
         *(contact.resting, contact.stiffness, contact.stacking, contact.loading),
         *(tasks.pushing, tasks.grasping, tasks.wiping, soft.weighing),
     )

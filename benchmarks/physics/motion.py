@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.world import World
 
 from .friction import KINDS
-from .scene import CLOSED_FORM, GRAVITY, MAXIMAL, UNDAMPED, Span, Table, ball, box_floor, height, run, scene
+from .scene import (
+    CLOSED_FORM,
+    GRAVITY,
+    MAXIMAL,
+    UNDAMPED,
+    Span,
+    Table,
+    ball,
+    box_floor,
+    floor_of_tf,
+    height,
+    plane_floor,
+    run,
+    scene,
+)
 
 TIME_STEPS_S = (1 / 240, 0.002, 0.001)
 PYBULLET_DAMPING = 0.04
@@ -38,7 +53,7 @@ def falling() -> Table:
                     run(world, 1.0)
                     found.append(100.0 - height(world, "ball"))
             rows.append((f"{name}, {kind}", (*found, GRAVITY / 2)))
-    return Table(("fallen in 1 s [m]", *map(_step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("fallen in 1 s [m]", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def swinging() -> Table:
@@ -69,7 +84,7 @@ def swinging() -> Table:
         ("period [s], damping 0", (*periods, closed_s)),
         *((f"energy kept over 10 periods, {name}", (*found, 1.0)) for name, found in kept.items()),
     ]
-    return Table(("pendulum", *map(_step_name, TIME_STEPS_S), CLOSED_FORM), rows)
+    return Table(("pendulum", *map(step_name, TIME_STEPS_S), CLOSED_FORM), rows)
 
 
 def _energy_at_bottom(world: World, crossings: list[float]) -> float:
@@ -96,25 +111,48 @@ def bouncing() -> Table:
     for name, (keys, engine) in REBOUNDS.items():
         cells = []
         for restitution in (0.5, 0.8, 1.0):
-            found = [rebound(restitution, 1.0 + 0.0041 * index, keys, engine) for index in range(5)]
+            floor = box_floor(**keys)
+            found = [rebound(restitution, 1.0 + 0.0041 * index, keys, engine, floor) for index in range(5)]
             cells.append(Span(min(found), max(found)))
         rows.append((name, tuple(cells)))
     return Table(("rebound over closed form", *(f"`restitution: {each}`" for each in (0.5, 0.8, 1.0))), rows)
 
 
-def rebound(restitution: float, height_m: float, keys: dict[str, Any], engine: dict[str, Any]) -> float:
-    """Returns how high a ball comes back at 1 kHz, over the closed form."""
+FLOORS: dict[str, Callable[..., dict[str, Any]]] = {
+    "box by `collisionFramePosition`": box_floor,
+    "box by `basePosition`": lambda **keys: floor_of_tf(basePosition=[0.0, 0.0, -0.5], object_tf=None, **keys),
+    "`GEOM_PLANE`": plane_floor,
+}
+
+
+def bouncing_by_floor() -> Table:
+    """How high a ball of restitution 1 comes back from ten heights 0.5 mm apart, by the kind of floor."""
+    rows = []
+    for name, (keys, engine) in REBOUNDS.items():
+        cells = []
+        for floor in FLOORS.values():
+            found = [rebound(1.0, 1.0 + 0.0005 * index, keys, engine, floor(**keys)) for index in range(10)]
+            cells.append(Span(min(found), max(found)))
+        rows.append((name, tuple(cells)))
+    return Table(("rebound over closed form", *FLOORS), rows)
+
+
+def rebound(
+    restitution: float, height_m: float, keys: dict[str, Any], engine: dict[str, Any], floor: dict[str, Any]
+) -> float:
+    """Returns how high a ball comes back at 1 kHz, over the closed form; 0 if it stays down."""
     thing = ball("ball", 0.05, 0.05 + height_m, changeDynamics={"restitution": restitution}, **keys)
-    with scene(engine=engine, collision_objects=[box_floor(**keys)], dynamic_objects=[thing]) as world:
+    with scene(engine=engine, collision_objects=[floor], dynamic_objects=[thing]) as world:
         heights = []
         for _ in range(1100):
             world.step()
             heights.append(height(world, "ball") - 0.05)
     lowest = heights.index(min(heights[:600]))
-    return max(heights[lowest:]) / (restitution**2 * height_m)
+    return max(0.0, *heights[lowest:]) / (restitution**2 * height_m)
 
 
-def _step_name(time_step_s: float) -> str:
+def step_name(time_step_s: float) -> str:
+    """Returns a time step as the head of a column."""
     return f"{1000 * time_step_s:.3g} ms"
 
 
