@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from terminal import Terminal
+from terminal import PROMPT, Terminal
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from robustness.completion import UNGUARDED, make_launch, trial  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +69,13 @@ def test_arguments_of_a_launch_file_are_offered(terminal):
 
 def test_other_files_are_not_offered(terminal):
     assert terminal.offered("./rpbi replay \t") == {"my", "worlds/", "run.bag"}
+
+
+def test_no_code_in_a_launch_file_runs(tmp_path):
+    lines = [make_launch(seed, tmp_path) for seed in range(24)]
+    terminal = Terminal(tmp_path)
+    assert {trial(terminal, tmp_path, line)[0] for line in lines} == {"fine"}
+    terminal.send(UNGUARDED)
+    terminal.read_until(f"\n{PROMPT}")
+    assert trial(terminal, tmp_path, lines[0])[0] == "code", "the control"
+    terminal.close()

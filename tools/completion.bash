@@ -7,6 +7,20 @@ _rpbi_root() {
   command=$(readlink -f "$(type -P -- "$command")") && dirname "$command"
 }
 
+# Prints those of the lines of others, such as names in a launch file, that bash inserts and reads as they are: without
+# `$`, backquotes, quotes, spaces and control characters, and no option. At most 2000.
+_rpbi_plain() {
+  head -c 1000000 | LC_ALL=C grep -axE '[A-Za-z0-9_][A-Za-z0-9_./:=@%+,-]{0,249}' | head -n 2000
+}
+
+# Prints the lines that start with a word. `compgen -W` would run what is in `$(...)` of a line.
+_rpbi_starting_with() {
+  local each
+  while IFS= read -r each; do
+    [[ $each != "$1"* ]] || printf '%s\n' "$each"
+  done
+}
+
 # What arguments may be: functions of these names print words. Arguments: the checkout, the words after the command.
 
 _rpbi_examples() { (cd "$1/src/rpbi_examples/launch" && printf '%s\n' *.launch | sed 's/\.launch$//'); }
@@ -18,14 +32,17 @@ _rpbi_launch_arguments() {
   local file=$2
   [[ -e $file && $file == *.launch ]] || file=$1/src/rpbi_examples/launch/${2%.launch}.launch
   [[ $2 != *.yaml ]] || file=$1/src/rpbi_examples/launch/world.launch
-  sed -n 's/^ *<arg name="\([^"]*\)" default=.*/\1:=/p' "$file" 2>/dev/null
+  [[ -f $file ]] || return
+  timeout 2 head -c 1000000 -- "$file" 2>/dev/null | # some files of /proc wait for ever
+    sed -n 's/^ *<arg name="\([^"]*\)" default=.*/\1:=/p' | _rpbi_plain
 }
 
 # Prints what is in the running world; sets nothing up, unlike ./rpbi list. An attachment has the name of what it holds.
 _rpbi_objects() (
   # shellcheck disable=SC1091 # catkin writes it
-  { source "$1/devel/setup.bash" && timeout 5 "$1/.venv/bin/python3" "$1/src/rpbi_utils/nodes/world" list; } 2>/dev/null |
-    sed 's/ .*//'
+  { source "$1/devel/setup.bash" && ulimit -v 2000000 &&
+    timeout -k 1 5 "$1/.venv/bin/python3" "$1/src/rpbi_utils/nodes/world" list; } 2>/dev/null |
+    sed 's/ .*//' | _rpbi_plain
 )
 
 # Prints what the argument under the cursor may be, as lines of tools/completion.txt without command and place.
@@ -70,7 +87,7 @@ _rpbi() {
   unset 'words[-1]'
   local kept=${whole%"$word"} # what stands before the cursor's word already, such as NAME:=
   [[ $whole == *"$word" ]] || kept=
-  mapfile -t COMPREPLY < <(compgen -W "$(_rpbi_words "$root" "$whole" "${words[@]}")" -- "$whole")
+  mapfile -t COMPREPLY < <(_rpbi_words "$root" "$whole" "${words[@]}" | _rpbi_starting_with "$whole")
   COMPREPLY=("${COMPREPLY[@]#"$kept"}")
   [[ ${COMPREPLY[*]} != *:= ]] || compopt -o nospace
   pattern=$(_rpbi_files "$root" "${words[@]}")
@@ -78,7 +95,7 @@ _rpbi() {
   compopt -o filenames
   while IFS= read -r file; do
     # shellcheck disable=SC2053 # it is a pattern
-    [[ ! -d $file && ${file##*/} != $pattern ]] || COMPREPLY+=("$file")
+    [[ $file == *[[:cntrl:]]* || (! -d $file && ${file##*/} != $pattern) ]] || COMPREPLY+=("$file")
   done < <(compgen -f -- "$word")
 }
 

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import rospy
 from mobile_base import mobile_base
 from nav_msgs.msg import Odometry
 from node_world import main_config, objects
@@ -17,6 +18,7 @@ from worlds import FLOOR, box, iiwa
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.console.modules import command_of
+from ros_pybullet_interface.srv import ListObjects, ListObjectsResponse
 from rpbi.bodies import BODY_TYPES
 from rpbi.world.loading import load_world
 from rpbi_utils.ros.console.spawn import kind_in
@@ -202,6 +204,20 @@ def test_names_are_completed_in_bash(ros, tmp_path):
         assert terminal.offered("./rpbi remove \t") == {"floor", "arm", "mobile"}
     finally:
         terminal.close()
+
+
+def test_names_that_a_rogue_node_lists_run_nothing(ros, tmp_path):
+    names = ["ball", "$(>canary)", "`>canary`", "x;>canary", "a'", "--help", "\x1b]0;x\x07", "b b"]
+    rogue = rospy.Service("/rogue/rpbi/list_objects", ListObjects, lambda _: ListObjectsResponse(names, names))
+    kept = {name: os.environ[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME")}
+    terminal = Terminal(tmp_path, ROS_NAMESPACE="rogue", **kept)
+    try:
+        assert terminal.offered("./rpbi remove \t") == {"ball", "b"}
+        assert "--help" not in terminal.shown("./rpbi remove \t")
+        assert not (tmp_path / "canary").exists()
+    finally:
+        terminal.close()
+        rogue.shutdown()
 
 
 def test_kinds_are_known_by_their_keys():

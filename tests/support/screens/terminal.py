@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PROMPT = "ready> "
 INPUTRC = (
     "set enable-bracketed-paste off\nset show-all-if-ambiguous on\nset page-completions off\nset bell-style none\n"
+    "set completion-query-items 0\n"
 )
 
 
@@ -48,14 +49,17 @@ class Terminal:
         while not seen.endswith(end):
             ready, _, _ = select.select([self._us], [], [], max(0.0, give_up_s - time.monotonic()))
             assert ready, f"expected {end!r} at the end of {seen!r}"
-            seen += os.read(self._us, 4096).decode().replace("\r", "")
+            seen += os.read(self._us, 4096).decode(errors="replace").replace("\r", "")
         return seen
 
     def completed(self, line: str) -> str:
         """Types a line that ends with a tab, and returns the line that bash makes of it."""
-        self.send(f"{line}\x01echo \x05;\n")  # to the line's start, and to its end
-        seen = self.read_until(f"\n{PROMPT}")
-        return seen.splitlines()[-2]
+        return self.shown(line).splitlines()[-3]
+
+    def shown(self, line: str) -> str:
+        """Types a line that ends with a tab, has it printed, and returns all that bash writes meanwhile."""
+        self.send(f"{line}\x01echo \x05;echo end\n")  # to the line's start, and to its end
+        return self.read_until(f"\nend\n{PROMPT}")
 
     def offered(self, line: str) -> set[str]:
         """Types a line that ends with a tab, and returns what bash offers."""
