@@ -6,11 +6,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 import rospy
 import yaml
 from ros_system import RosSystem, wait_until
 from std_srvs.srv import Trigger
 
+from custom_ros_tools.errors import InterfaceError
 from robot_model.asset_files import find_file
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.msg import MpcStatus
@@ -84,5 +86,8 @@ def test_late_messages_change_no_decision_and_a_failing_solver_stops_the_hand(ro
     stopped = pushing.joints()
     pushing.table(5)
     assert np.allclose(pushing.joints(), stopped, rtol=0.0, atol=1e-3), "the robot stands"
+    pushing.node._ends = pushing.node._running = True
+    with pytest.raises(InterfaceError, match="the task is not done: .* did not converge"):  # which ends the node with 1
+        pushing.node.run()
     for each in (first, pushing):
         each.node._status.unregister()  # other tests of this process would receive its last status

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from rpbi_mpc import LockStep
 from rpbi_mpc.pushing.controller import PushingConfig, PushingController
+from rpbi_mpc.pushing.outcome import ToleranceConfig
 from rpbi_mpc.pushing.planar.paths import PathConfig, PushPath
 from rpbi_mpc.pushing.planner import ProgramPlanner
 from rpbi_mpc.pushing.program import ProgramConfig
@@ -17,6 +19,7 @@ from rpbi_mpc.pushing.simulated import PushingWorld
 from rpbi_mpc.pushing.trials import HEIGHT, Variation, pushing_world, run_trial, shove
 
 LINE, S = PathConfig(shape="line", size=0.2), PathConfig(shape="s", size=0.2, angle=0.7)
+ARC = PathConfig(shape="arc", size=0.25, angle=0.8)
 UNLIKE = Variation(
     seed=901, table=1.3, pusher=0.7, centre=(0.01, -0.01), start=(0.0, 0.008, 0.1), noise_m=0.002, latency_s=0.02
 )
@@ -67,6 +70,41 @@ def test_the_best_of_simulated_pushes_follows_a_line_and_is_what_then_happens():
     happened = [trial.truth[2 * cycle.index + 3, 1:4] for cycle in sampled]
     predicted = [cycle.plan.states[1, :3] for cycle in sampled]
     assert np.allclose(predicted, happened, atol=1e-9), "what the first command does, until the next one acts"
+
+
+@pytest.mark.parametrize(
+    ("path", "variation", "expected"),
+    [
+        (
+            LINE,
+            Variation(size=0.6),
+            r"the box is 20.\d mm from its goal, .* pushed face is 20.0 mm nearer to its middle",
+        ),
+        (
+            ARC,
+            Variation(pusher=0.2),
+            r"the box is 1\d.\d mm from its goal, expected at most 5 mm; .* by 2\d % of its speed",
+        ),
+    ],
+    ids=["size", "friction"],
+)
+def test_a_push_that_misses_its_goal_is_not_finished(path, variation, expected):
+    """Judged by the estimate, which follows the model, both would be called finished."""
+    trial = run_trial(PushingConfig(path=path), variation)
+    assert not trial.finished and trial.cycles[-1].status == "stopped"
+    assert re.match(expected, trial.cycles[-1].reason), trial.cycles[-1].reason
+
+
+def test_a_large_tracking_error_is_not_finished():
+    config = PushingConfig(path=LINE, tolerance=ToleranceConfig(tracking=0.0001))
+    trial = run_trial(config, Variation(seed=904, noise_m=0.002))
+    assert not trial.finished and "mm from the reference on average, expected at most 0.1 mm" in trial.cycles[-1].reason
+
+
+def test_a_finished_push_reports_a_small_misfit():
+    trial = run_trial(PushingConfig(path=LINE), Variation())
+    last = trial.cycles[-1]
+    assert last.status == "finished" and re.match(r"0.\d mm and 0.\d deg from the goal, .* by 0 % of its", last.reason)
 
 
 def test_a_shoved_box_comes_back():

@@ -73,6 +73,11 @@ class MpcController(ABC):
         return False
 
     @property
+    def result(self) -> str:
+        """A clause on the task that is done."""
+        return "the task is done"
+
+    @property
     def failure(self) -> str:
         """Reason why the task cannot be done any more, with which the loop stops; empty while it can."""
         return ""

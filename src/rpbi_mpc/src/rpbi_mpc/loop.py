@@ -167,7 +167,7 @@ class LockStep:
         if self._stopped:
             return plan, Status.STOPPED, self._stopped
         if self.controller.is_finished:
-            return plan, Status.FINISHED, "the task is done"
+            return plan, Status.FINISHED, self.controller.result
         fault = self._fault_of(plan)
         if not fault:
             self._check("command", plan.commands[0], self.controller.command_names)

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres, Seconds, Unit
 
+from .outcome import ToleranceConfig
 from .planar.estimate import EstimatorConfig
 from .planar.motion import ApproachConfig
 from .planar.paths import PathConfig
@@ -28,6 +29,7 @@ class PushingConfig(ConfigModel):
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
         max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
         max_off: Distance of the slider from the path beyond which the task has failed [m].
+        tolerance: Largest errors of a push that counts as finished.
         settle_s: Time after the end of the path for which the last pose is aimed at [s].
         cycle_s: Time of a cycle, for which a command acts [s].
         lag_s: Time from a command until the pusher moves by it, beside the delay of the loop [s].
@@ -44,6 +46,7 @@ class PushingConfig(ConfigModel):
     gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(5.0, description="Rate at which a gap is closed in contact.")
     max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
     max_off: PositiveMetres = Field(0.15, description="Distance of the slider from the path at which the loop stops.")
+    tolerance: ToleranceConfig = Field(ToleranceConfig(), description="Largest errors of a push that is finished.")
     settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
     cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
     lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Time until the pusher moves by a command.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import deque
 
 import numpy as np
 
@@ -11,17 +12,21 @@ from rpbi_mpc.controller import ControlPlan, MpcController
 from rpbi_mpc.plant import Sensed
 
 from .config import PushingConfig
+from .outcome import PushOutcome, PushRecord
 from .planar.estimate import SceneEstimator
 from .planar.motion import PlanarScene, approach_velocity, gap_and_contact, is_pushable, moved, rotation
 from .planar.paths import PushPath
 from .planner import ProgramPlanner, PushPlanner, PushSituation
+
+KEPT_REFERENCES = 100
+"""Number of references that are kept, to be compared with measurements of their time."""
 
 
 class PushingController(MpcController):
     """Pushes a slider along a path by a round pusher, whose velocity is commanded.
 
     The time of the path stands still while the pusher is not at the slider, and while the slider is too far behind
-    the reference.
+    the reference. The measured slider decides whether the task is done, not the estimated one, which follows the model.
 
     Args:
         config: Slider, pusher, path and cost.
@@ -47,15 +52,33 @@ class PushingController(MpcController):
         self._settled_s = 0.0
         self._off_m = 0.0
         self._pushes = False
+        self._references: deque[tuple[float, float]] = deque(maxlen=KEPT_REFERENCES)
+        final_cycles = max(round(0.5 * self.config.settle_s / self.config.cycle_s), 1)
+        self._record = PushRecord(self.config.slider, self.path.speed, final_cycles)
+
+    @property
+    def outcome(self) -> PushOutcome:
+        """Errors of the measured slider, and the misfit of the model, up to now."""
+        return self._record.outcome
+
+    @property
+    def _is_settled(self) -> bool:
+        return self._settled_s > self.config.settle_s
 
     @property
     def is_finished(self) -> bool:
-        return self._settled_s > self.config.settle_s
+        return self._is_settled and not self.failure
+
+    @property
+    def result(self) -> str:
+        return str(self.outcome)
 
     @property
     def failure(self) -> str:
         most_m = self.config.max_off
-        return f"the box is {self._off_m:.3g} m off its path, max_off is {most_m:g} m" if self._off_m > most_m else ""
+        if self._off_m > most_m:
+            return f"the box is {self._off_m:.3g} m off its path, max_off is {most_m:g} m"
+        return self.outcome.fault(self.config.tolerance) if self._is_settled else ""
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
         self._estimator.executed(time_s + self.config.lag_s, command)
@@ -65,21 +88,37 @@ class PushingController(MpcController):
 
         A plan of the approach has commands and no solution; its cost is NaN.
         """
-        assert sensed.values is not None
-        scene = self._estimator.update(sensed, sensed.time_s + delay_s + self.config.lag_s)
+        acts_s = sensed.time_s + delay_s + self.config.lag_s
+        self._references.append((acts_s, self.path_time_s))
+        scene = self._estimator.update(sensed, acts_s)
         self._off_m = self.path.distance(scene.slider[:2])
         gap, contact = gap_and_contact(scene, self.config.slider, self.config.radius)
         self._pushes = is_pushable(gap, contact, self.config.slider, self.config.approach, self._pushes)
         target = self.path.poses(self.path_time_s)[0]
         lag = float((target[:2] - scene.slider[:2]) @ rotation(target[2])[:, 0])
+        error_m = self._note(sensed)
         if self._pushes:
             plan = self._planner.plan(PushSituation(scene, gap, contact, delay_s, self.path, self.path_time_s))
             self._go_on(lag)
         else:
             plan = self._approach(scene)
-        extras = {"gap": gap, "contact": contact, "path_time_s": self.path_time_s, "lag": lag}
+        extras = {"gap": gap, "contact": contact, "path_time_s": self.path_time_s, "lag": lag, "error_m": error_m}
         extras |= dict(zip(("reference_x", "reference_y", "reference_yaw"), map(float, target)))
         return dataclasses.replace(plan, extras=extras | plan.extras)
+
+    def _note(self, sensed: Sensed) -> float:
+        """Notes what was measured, and returns the distance from the reference of that time [m]."""
+        assert sensed.values is not None
+        measured = PlanarScene.of(sensed.values)
+        times_s, path_times_s = zip(*self._references)
+        time_s = float(np.interp(sensed.time_s - sensed.age_s, times_s, path_times_s))
+        deviation = measured.slider - self.path.poses(time_s)[0]
+        deviation[2] = math.remainder(deviation[2], 2 * math.pi)
+        self._record.track(deviation, at_end=time_s >= self.path.duration_s)
+        if self._pushes:
+            gap, _ = gap_and_contact(measured, self.config.slider, self.config.radius)
+            self._record.push(self._estimator.drift, gap)
+        return float(np.hypot(*deviation[:2]))
 
     def _go_on(self, lag: float) -> None:
         """Moves the reference on by a cycle, unless the slider is too far behind it."""

@@ -28,7 +28,7 @@ AHEAD_S = (0.4, 1.2)
 def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingController) -> dict[str, Any]:
     """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder; returns the summary.
 
-    Errors are those of the estimated slider, when the command of a cycle acts, to the reference of that time.
+    Errors are those of the measured slider to the reference of the time of the measurement.
 
     Raises:
         OSError: If the folder cannot be written.
@@ -36,14 +36,18 @@ def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingContr
     path = folder.expanduser()
     path.mkdir(parents=True, exist_ok=True)
     table = table_of(cycles, controller)
-    table["error_m"] = _errors(table)
     table.to_csv(path / "cycles.csv", index=False)
-    seen = table["error_m"].dropna()
+    seen, outcome = table["error_m"].dropna() if "error_m" in table else [], controller.outcome
     summary = {
         **summary_of(table),
-        "mean_error_mm": 1e3 * float(seen.mean()) if len(seen) else None,
-        "largest_error_mm": 1e3 * float(seen.max()) if len(seen) else None,
+        "mean_error_mm": 1e3 * float(np.mean(seen)) if len(seen) else None,
+        "largest_error_mm": 1e3 * float(np.max(seen)) if len(seen) else None,
         "finished": controller.is_finished,
+        "failure": controller.failure,
+        "goal_error_mm": _finite(1e3 * outcome.goal_m),
+        "goal_error_deg": _finite(np.degrees(outcome.goal_rad)),
+        "model_misfit": _finite(outcome.misfit),
+        "model_face_mm": _finite(1e3 * outcome.face_m),
         "path_m": controller.path.length,
         "duration_s": float(table["time_s"].iloc[-1] - table["time_s"].iloc[0]) if len(table) else 0.0,
     }
@@ -55,11 +59,9 @@ def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingContr
     return summary
 
 
-def _errors(table: pandas.DataFrame) -> Any:
-    """Returns distances of the slider from the reference [m]; NaN where there was no measurement."""
-    if "reference_x" not in table:
-        return np.full(len(table), np.nan)
-    return np.hypot(table["state.x"] - table["reference_x"], table["state.y"] - table["reference_y"])
+def _finite(value: float) -> float | None:
+    """Returns a number, None in place of NaN, which JSON lacks."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:

@@ -42,6 +42,7 @@ class Variation(NamedTuple):
         start: Pose of the box at the start, relative to that of the path [m, m, rad].
         noise_m: Standard deviation of measured positions [m]; that of yaw is 5 rad/m times this.
         latency_s: Age of measurements [s].
+        size: Factor of length and width of the box.
     """
 
     seed: int = 1
@@ -51,6 +52,7 @@ class Variation(NamedTuple):
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     noise_m: float = 0.0
     latency_s: float = 0.0
+    size: float = 1.0
 
     @classmethod
     def random(cls, seed: int, noise_m: float = 0.002, latency_s: float = 0.02) -> Variation:
@@ -72,7 +74,7 @@ class PushingTrial(NamedTuple):
         off_path: Distance from the path, wherever along it, likewise [m].
         cycles: The cycles.
         truth: Time, x, y, yaw, pusher x, pusher y after each half of a cycle.
-        finished: Whether the end of the path was reached.
+        finished: Whether the end of the path was reached, with errors within the tolerance of the configuration.
         recovered_s: Time from the shove until the error stays below a limit [s]; NaN without a shove, inf if never.
     """
 
@@ -93,7 +95,7 @@ def pushing_world(variation: Variation, path: PushPath) -> World:
     yaw += turned
     axes = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     box = middle + axes @ variation.centre
-    pusher = middle + axes @ (-SIZE[0] / 2 - 0.011, 0.0)
+    pusher = middle + axes @ (-variation.size * SIZE[0] / 2 - 0.011, 0.0)
     return World(load_world(WORLD, overrides=_overrides(variation, box, yaw, pusher)))
 
 
@@ -108,6 +110,7 @@ def _overrides(variation: Variation, box: np.ndarray, yaw: float, pusher: np.nda
         "noise_rad": 5.0 * variation.noise_m,
         "seed": variation.seed,
     }
+    half = [*(0.5 * variation.size * np.array(SIZE)).tolist(), HEIGHT]
     offset = [-variation.centre[0], -variation.centre[1], 0.0]
     return {
         "collision_objects": [
@@ -118,8 +121,8 @@ def _overrides(variation: Variation, box: np.ndarray, yaw: float, pusher: np.nda
                 "file": f"{folder}/box.yaml",
                 "basePosition": [float(box[0]), float(box[1]), HEIGHT],
                 "baseOrientation": [0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)],
-                "createCollisionShape": {"collisionFramePosition": offset},
-                "createVisualShape": {"visualFramePosition": offset},
+                "createCollisionShape": {"halfExtents": half, "collisionFramePosition": offset},
+                "createVisualShape": {"halfExtents": half, "visualFramePosition": offset},
                 "sensors": [sensor],
             }
         ],

@@ -10,6 +10,7 @@ from pathlib import Path
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
+from custom_ros_tools.errors import InterfaceError
 from rpbi_mpc.controller import MpcController
 from rpbi_mpc.loop import Cycle, LockStep, LoopConfig, Status
 from rpbi_mpc.msg import MpcStatus
@@ -73,7 +74,8 @@ class LoopNode:
         """Runs cycles as requested until ROS shuts down, or the task is done and `~end` is true.
 
         Raises:
-            InterfaceError: If the simulator refuses to be stepped, or no joint states arrive.
+            InterfaceError: If the simulator refuses to be stepped, or no joint states arrive; with `~end`, also if the
+                loop stops before the task is done.
         """
         while not rospy.is_shutdown():
             if self._is_due():
@@ -83,6 +85,8 @@ class LoopNode:
                 self._warn_if_slow()
                 if cycle.status in (Status.FINISHED, Status.STOPPED):
                     self._end()
+                    if self._ends and cycle.status == Status.STOPPED:
+                        raise InterfaceError(f"the task is not done: {cycle.reason}")
                     if self._ends:
                         rospy.signal_shutdown("the task is done")
             elif self._loop.plant.is_timed:

@@ -11,11 +11,14 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel
 from rpbi_mpc.plant import Sensed
 
-from .motion import PlanarScene, moved
+from .motion import PlanarScene, moved, rotation
 from .slider import SliderConfig
 
 KEPT_S = 2.0
 """Time for which commands are kept [s]; a measurement that is older counts as new."""
+
+DRIFT_S = 1.0
+"""Time over which the motion unlike the model is smoothed [s]."""
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
@@ -45,6 +48,9 @@ class SceneEstimator:
         config: Gains.
         slider: The slider.
         radius: Radius of the pusher [m].
+
+    Attributes:
+        drift: Twist by which the slider moves unlike the model, in its axes, smoothed [m/s, m/s, rad/s].
     """
 
     def __init__(self, config: EstimatorConfig, slider: SliderConfig, radius: float) -> None:
@@ -55,6 +61,7 @@ class SceneEstimator:
         """Forgets measurements and commands."""
         self._estimate: PlanarScene | None = None
         self._time_s = -math.inf
+        self.drift = np.zeros(3)
         self._commands: list[tuple[float, np.ndarray]] = []
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
@@ -76,15 +83,20 @@ class SceneEstimator:
         if self._estimate is None:
             self._estimate = measured
         else:
-            self._estimate = self._corrected(self._predicted(self._estimate, self._time_s, measured_s), measured)
+            expected = self._predicted(self._estimate, self._time_s, measured_s)
+            self._estimate = self._corrected(expected, measured, measured_s - self._time_s)
         self._time_s = measured_s
         return self._predicted(self._estimate, measured_s, ahead_s)
 
-    def _corrected(self, expected: PlanarScene, measured: PlanarScene) -> PlanarScene:
+    def _corrected(self, expected: PlanarScene, measured: PlanarScene, passed_s: float) -> PlanarScene:
         difference = measured.slider - expected.slider
         difference[2] = math.remainder(difference[2], 2 * math.pi)
         jumps = np.hypot(*difference[:2]) > self._config.jump or abs(difference[2]) > self._config.jump_rad
         gains = np.ones(3) if jumps else np.array([self._config.position, self._config.position, self._config.yaw])
+        if passed_s > 0.0:
+            change = gains * difference
+            rate = np.append(rotation(expected.slider[2]).T @ change[:2], change[2]) / passed_s
+            self.drift += min(passed_s / DRIFT_S, 1.0) * (rate - self.drift)
         return PlanarScene(expected.slider + gains * difference, measured.pusher)
 
     def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:

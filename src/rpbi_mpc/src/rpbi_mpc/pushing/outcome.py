@@ -1,0 +1,111 @@
+"""Result of a push by what was measured: errors at the goal and on the way, and how far the model is off."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Positive, PositiveMetres, Unit
+
+from .planar.slider import SliderConfig
+
+
+class ToleranceConfig(ConfigModel):
+    """Largest errors of a push that counts as finished.
+
+    Attributes:
+        goal: Distance of the measured slider from the end of the path, mean of the second half of the settling [m].
+        goal_rad: The same for yaw [rad].
+        tracking: Mean distance of the measured slider from the reference [m].
+    """
+
+    goal: PositiveMetres = Field(0.005, description="Largest distance of the slider from the end of the path.")
+    goal_rad: Annotated[Positive, Unit("rad")] = Field(0.26, description="Largest difference in yaw there.")
+    tracking: PositiveMetres = Field(0.015, description="Largest mean distance from the reference.")
+
+
+class PushOutcome(NamedTuple):
+    """Errors of a push, and the misfit of its model.
+
+    Attributes:
+        goal_m: Distance from the end of the path at the end [m]; NaN before it.
+        goal_rad: Angle from the direction of the path there [rad]; NaN before it.
+        tracking_m: Mean distance from the reference [m].
+        misfit: Mean speed by which the slider moves unlike the model while it is pushed, as a share of the speed along
+            the path; turning counts by the characteristic length.
+        face_m: By how much the pushed face is farther from the middle than in the model [m].
+    """
+
+    goal_m: float
+    goal_rad: float
+    tracking_m: float
+    misfit: float
+    face_m: float
+
+    def fault(self, tolerance: ToleranceConfig) -> str:
+        """Returns the errors that are too large, with the misfit; empty if there is none."""
+        faults = []
+        if self.goal_m > tolerance.goal:
+            faults.append(
+                f"the box is {1e3 * self.goal_m:.1f} mm from its goal, expected at most {1e3 * tolerance.goal:g} mm"
+            )
+        if self.goal_rad > tolerance.goal_rad:
+            degrees, most = math.degrees(self.goal_rad), math.degrees(tolerance.goal_rad)
+            faults.append(f"the box is turned by {degrees:.1f} deg from its goal, expected at most {most:.3g} deg")
+        if self.tracking_m > tolerance.tracking:
+            error, most = 1e3 * self.tracking_m, 1e3 * tolerance.tracking
+            faults.append(f"the box was {error:.1f} mm from the reference on average, expected at most {most:g} mm")
+        return "; ".join([*faults, self.of_model]) if faults else ""
+
+    @property
+    def of_model(self) -> str:
+        """The misfit of the model in words."""
+        side = "farther from" if self.face_m > 0.0 else "nearer to"
+        return (
+            f"unlike the model, the box moves by {100 * self.misfit:.0f} % of its speed, and its pushed face is "
+            f"{1e3 * abs(self.face_m):.1f} mm {side} its middle"
+        )
+
+    def __str__(self) -> str:
+        return (
+            f"{1e3 * self.goal_m:.1f} mm and {math.degrees(self.goal_rad):.1f} deg from the goal, "
+            f"{1e3 * self.tracking_m:.1f} mm from the reference on average; {self.of_model}"
+        )
+
+
+class PushRecord:
+    """Collects what is measured in each cycle.
+
+    Args:
+        slider: The slider of the model.
+        speed: Speed along the path [m/s].
+        final_cycles: Number of cycles at the end whose mean is the error at the goal.
+    """
+
+    def __init__(self, slider: SliderConfig, speed: float, final_cycles: int) -> None:
+        self._scale, self._speed = np.array([1.0, 1.0, slider.characteristic_length]), speed
+        self._ends: deque[np.ndarray] = deque(maxlen=final_cycles)
+        self._errors: list[float] = []
+        self._pushed: list[tuple[float, float]] = []
+
+    def track(self, deviation: np.ndarray, at_end: bool) -> None:
+        """Notes the deviation of the measured slider from the reference [m, m, rad]."""
+        self._errors.append(float(np.hypot(*deviation[:2])))
+        if at_end:
+            self._ends.append(deviation)
+
+    def push(self, drift: np.ndarray, gap: float) -> None:
+        """Notes by which twist the slider moves unlike the model [m/s, m/s, rad/s], and the measured gap [m]."""
+        self._pushed.append((float(np.linalg.norm(self._scale * drift)) / self._speed, gap))
+
+    @property
+    def outcome(self) -> PushOutcome:
+        """Errors and misfit up to now; NaN where nothing was noted yet."""
+        x, y, yaw = np.mean(self._ends, axis=0) if self._ends else np.full(3, math.nan)
+        misfit, gap = np.mean(self._pushed, axis=0) if self._pushed else np.full(2, math.nan)
+        tracking_m = float(np.mean(self._errors)) if self._errors else math.nan
+        return PushOutcome(float(np.hypot(x, y)), abs(float(yaw)), tracking_m, float(misfit), float(gap))
