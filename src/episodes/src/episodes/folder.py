@@ -25,6 +25,8 @@ BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
 """Files of an episode: the recording, its description, and commands that the topic no longer sends."""
 FILES, DISCARDED = "files", "discarded"
 SET_BACK = "set_back_s"
+SEAL = "sha256"
+"""Key of a topic with the SHA-256 of its messages."""
 UNREADABLE = "cannot be read"
 """State of an episode whose description cannot be read."""
 _COMPLETE = re.compile(r"episode_(\d{6,})")
@@ -223,7 +225,7 @@ def read_facts(folder: Path) -> Episode:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
         _require(data, "", ("number",), {each.name: type(getattr(Episode(0), each.name)) for each in fields(Episode)})
         for topic, each in data.get("topics", {}).items():
-            _require(each, f"topics: {topic}: ", _TOPIC_FACTS, {**_TOPIC_FACTS, SET_BACK: float})
+            _require(each, f"topics: {topic}: ", _TOPIC_FACTS, {**_TOPIC_FACTS, SET_BACK: float, SEAL: str})
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise EpisodeError(path, f"{UNREADABLE}: {' '.join(str(error).split())}") from error
     return Episode(**data)

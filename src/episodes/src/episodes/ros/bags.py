@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import rosbag
 
 from episodes.errors import DISK_FULL
-from episodes.folder import BAG, SET_BACK, UNREADABLE, Episode, EpisodeFolder, read_part
+from episodes.folder import BAG, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, read_part
 from rpbi_utils.bags.clock import MAX_BACK_S
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader
@@ -20,22 +21,39 @@ from rpbi_utils.ros.bags.topic_report import topic_report
 def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
     """Returns type, messages, mean rate [Hz] and longest gap [s] of each topic of a bag; a rate of 0 is unknown.
 
-    A topic whose clock was set back by more than 1 s has `set_back_s` [s], too.
+    The seal of a topic is the SHA-256 of its messages and their times of recording. A topic whose clock was set back by
+    more than 1 s has `set_back_s` [s], too.
 
     Raises:
         BagError: If it cannot be read.
     """
-    report = topic_report(bag, any_size=True)
+    report, seals = topic_report(bag, any_size=True), seals_of(bag)
     return {
         str(topic): {
             "type": str(row["type"]),
             "messages": int(row["messages"]),
             "rate_hz": 0.0 if math.isnan(row["rate_hz"]) else float(row["rate_hz"]),
             "max_gap_s": float(row["max_gap_s"]),
+            SEAL: seals[str(topic)],
             **({SET_BACK: float(row["set_back_s"])} if row["set_back_s"] > MAX_BACK_S else {}),
         }
         for topic, row in report.iterrows()
     }
+
+
+def seals_of(bag: Path) -> dict[str, str]:
+    """Returns the seal of each topic of a bag, see `measure_topics`.
+
+    Raises:
+        BagError: If it cannot be read.
+    """
+    digests: dict[str, Any] = {}
+    with BagReader(bag, any_size=True) as opened:
+        for message in opened.messages(opened.types):
+            digest = digests.setdefault(message.topic, hashlib.sha256())
+            digest.update(b"%d %d\n" % (message.record_time_ns, len(message.raw)))
+            digest.update(message.raw)
+    return {topic: digest.hexdigest() for topic, digest in digests.items()}
 
 
 def repair_all(folder: EpisodeFolder) -> Iterator[str]:

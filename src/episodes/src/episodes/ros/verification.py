@@ -13,12 +13,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
 from episodes.files import changed_files, newer_files, with_stored_files
-from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder
+from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_utils.ros.replay.recorded_session import read_recording
+
+from .bags import seals_of
+from .comparison import Comparison
 
 _PROGRAM = "import sys; from episodes.ros.verification import main; main(sys.argv[1:])"
 
@@ -84,7 +88,8 @@ def verify(folder: EpisodeFolder, number: int) -> Verdict:
     notes = [f"note: {each}" for each in newer_files(episode.files)]
     try:
         changed = list(changed_files(episode.files, folder.files))
-        is_same, text = _replay(folder, episode)
+        is_same, text, own_notes = _replay(folder, episode)
+        notes += own_notes
     except (InterfaceError, OSError) as error:
         return Verdict(number, False, "; ".join(str(error).splitlines()), episode.label, notes)
     except Exception as error:  # a bag may have anything in it
@@ -93,7 +98,8 @@ def verify(folder: EpisodeFolder, number: int) -> Verdict:
     return Verdict(number, is_same and not changed, "; ".join([*changed, text]), episode.label, notes)
 
 
-def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str]:
+def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str, list[str]]:
+    """Returns whether an episode is the same, the comparison in words, and notes."""
     place = folder.folder_of(episode.number)
     if not (place / BAG).exists():
         raise EpisodeError(place, episode.note or "has no bag")
@@ -106,16 +112,43 @@ def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str]:
             earlier=earlier if earlier.exists() else None,
             relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
         )
-        result = Replay(recording).run()
-    warnings = recording.description.warnings
-    return result.difference is None and not result.left_out, "; ".join([*warnings, _words(result)])
+        with Comparison(place / BAG, episode.namespace) as comparison:
+            result = Replay(recording, observe=comparison.observe).run()
+    faults, notes = _message_faults(place / BAG, episode, comparison)
+    words = [*recording.description.warnings, *faults, _words(result, comparison, bool(faults))]
+    return result.difference is None and not result.left_out and not faults, "; ".join(words), notes
 
 
-def _words(result: ReplayResult) -> str:
+def _message_faults(bag: Path, episode: Episode, comparison: Comparison) -> tuple[list[str], list[str]]:
+    """Returns sentences on topics that were changed, and notes on those that only the replay has otherwise.
+
+    The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
+    They are a fault unless the seal of their topic is whole.
+    """
+    seals = {topic: each[SEAL] for topic, each in episode.topics.items() if SEAL in each}
+    found = seals_of(bag) if seals else {}
+    broken = {topic for topic in seals.keys() | found.keys() if seals.get(topic) != found.get(topic)}
+    faults, notes = [], []
+    for topic, each in sorted(comparison.differences.items()):
+        text = f"{each} ({comparison.different[topic]} of {comparison.compared[topic]} differ)"
+        if each.is_certain or topic in broken or topic not in seals:
+            faults.append(text)
+        else:
+            notes.append(f"note: the replay differs, but the messages are those that were recorded: {text}")
+    for topic in sorted(broken - comparison.differences.keys()):
+        faults.append(f"{printable(topic)}: its messages are not those that were recorded")
+    return faults, notes
+
+
+def _words(result: ReplayResult, comparison: Comparison, has_faults: bool) -> str:
     if result.difference is not None:
         each, last = result.difference.checkpoint, result.difference.last_agreement
         since = "the first state" if last is None else f"the same until tick {last.tick}"
         return f"differs at {each} ({since}): recorded {each.state_hash}, now {result.difference.state_hash}"
     if result.left_out:
         return "; ".join(f"not simulated {text}" for text in result.left_out)
-    return f"same: {result.agreed} states over {result.ticks} ticks"
+    states = f"{result.agreed} states over {result.ticks} ticks"
+    if has_faults:
+        return f"its states are the same ({states})"
+    compared = comparison.compared
+    return f"same: {states}, {sum(compared.values())} messages of {len(compared)} topics"

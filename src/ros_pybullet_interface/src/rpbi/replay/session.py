@@ -81,13 +81,21 @@ class Replay:
     Args:
         recording: The recording.
         progress: Called with the number of ticks since the last call.
+        observe: Called with the world, the number of resets before in the recording, and the samples, at every start
+            and after every tick.
 
     Raises:
         ConfigError: If the world cannot be built here.
     """
 
-    def __init__(self, recording: Recording, progress: Callable[[int], Any] = lambda _: None) -> None:
-        self._recording, self._progress = recording, progress
+    def __init__(
+        self,
+        recording: Recording,
+        progress: Callable[[int], Any] = lambda _: None,
+        observe: Callable[[World, int, list[Any]], Any] = lambda *_: None,
+    ) -> None:
+        self._recording, self._progress, self._observe = recording, progress, observe
+        self._resets = 0
         self._world = World.from_description(recording.description)
         self._agreed = self._ticks = 0
         self._left_out: list[str] = []
@@ -102,6 +110,8 @@ class Replay:
             for turn, resets in enumerate(sorted(lives)):
                 if turn:
                     self._world.reset()
+                self._resets = resets
+                self._observe(self._world, resets, self._world.read_rest())
                 difference = self._live(sorted(lives[resets]), self._recording.commands.get(resets, {}))
                 if difference is not None:
                     break
@@ -144,7 +154,7 @@ class Replay:
                 done += 1
             if tick >= to.tick:
                 break
-            world.step()
+            self._observe(world, self._resets, world.step())
         self._ticks += to.tick - start
         self._progress(to.tick - start)
         return done

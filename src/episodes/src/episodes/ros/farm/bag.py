@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -13,17 +12,13 @@ from std_msgs.msg import String
 
 from custom_ros_tools.errors import InterfaceError
 from episodes.config import DEFAULT_TOPICS
+from episodes.ros.sample_messages import SampleMessages
 from rpbi.engine.clock import Schedule
-from rpbi.plugins import plugin_errors
-from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.inputs import input_messages
 from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION, commands_message
-from rpbi.ros.publishers.sample_topics import sample_topic
 from rpbi.ros.publishers.static_frames import TF_STATIC, static_frames_message
 from rpbi.ros.publishers.status import CLOCK, FREE_RUNNING_CLOCK_HZ, STATE, clock_message, state_message
-from rpbi.ros.publishers.topic_publisher import TF, SampleKey, TransformCollector
-from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 
 
@@ -46,9 +41,7 @@ class EpisodeBag:
         self._hashes = Schedule(config.state_hash_hz, dt_ns) if config.state_hash_hz else None
         self._states = Schedule(config.state_hz, dt_ns) if config.state_hz else None
         self._clock = Schedule(config.clock_hz or FREE_RUNNING_CLOCK_HZ, dt_ns)
-        self._routes: dict[SampleKey, Topic | None] = {}
-        """The topics of sensors that are recorded."""
-        self._transforms = TransformCollector()
+        self._samples = SampleMessages(world, lambda topic: _RECORDED.fullmatch(_full(topic)) is not None)
         self._commands = 0
         self._bag = rosbag.Bag(str(path), "w", compression="lz4")
 
@@ -115,35 +108,8 @@ class EpisodeBag:
         self._write(STATE.name, state_message(self._world, with_hash, running=True))
 
     def _write_samples(self, samples: list[Any]) -> None:
-        for sample in samples:
-            for topic, message in self._messages(sample):
-                self._write(topic, message)
-        if (transforms := self._transforms.drain()) is not None:
-            self._write(TF.name, transforms)
-
-    def _messages(self, sample: Any) -> Iterator[tuple[str, Any]]:
-        stamp_ns = self._world.clock.stamp_ns
-        if isinstance(sample, LinkPoseSample):
-            self._transforms.collect(sample, stamp_ns)
-        elif not isinstance(sample, SceneSample):
-            topic = self._topic(sample)
-            if topic is not None and topic.handler is not None:
-                with plugin_errors(topic.handler, f"the message of '{sample.name}'"):
-                    message = topic.handler(sample, stamp_ns)
-                yield topic.name.format(name=sample.name), message
-                if topic.on_tf is not None:
-                    self._transforms.collect(*topic.on_tf(sample, stamp_ns))
-
-    def _topic(self, sample: Any) -> Topic | None:
-        """Returns the topic of the sensor that a sample comes from; None if there is none."""
-        key = type(sample), sample.name
-        if key not in self._routes:
-            sensors = (sensor for name in self._world.bodies for sensor in self._world.sensors_of(name))
-            for sensor in sensors:
-                topic = sample_topic(sensor)
-                is_recorded = topic is not None and _RECORDED.fullmatch(_full(topic.name.format(name=sensor.name)))
-                self._routes[sensor.sample_type, sensor.name] = topic if is_recorded else None
-        return self._routes.get(key)
+        for topic, message in self._samples.of(samples, self._world.clock.stamp_ns):
+            self._write(topic, message)
 
     def _write(self, topic: str, message: Any) -> None:
         self._bag.write(_full(topic), message, to_ros_time(self._world.clock.stamp_ns))

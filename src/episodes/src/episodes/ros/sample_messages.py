@@ -1,0 +1,67 @@
+"""Messages of a world's samples, as its node publishes them, without a ROS master."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from rpbi.plugins import plugin_errors
+from rpbi.ros.endpoints import Topic
+from rpbi.ros.publishers.sample_topics import sample_topic
+from rpbi.ros.publishers.topic_publisher import TF, SampleKey, TransformCollector
+from rpbi.samples import LinkPoseSample, SceneSample
+from rpbi.world import World
+
+
+class SampleMessages:
+    """Turns samples into messages; those of cameras, which the renderer draws, are left out.
+
+    Args:
+        world: The world.
+        is_wanted: Returns whether messages of a topic are wanted, by its name without namespace.
+    """
+
+    def __init__(self, world: World, is_wanted: Callable[[str], bool]) -> None:
+        self._world, self._is_wanted = world, is_wanted
+        self._routes: dict[SampleKey, Topic | None] = {}
+        """The topics of sensors that are wanted."""
+        self._transforms = TransformCollector()
+
+    def of(self, samples: Iterable[Any], stamp_ns: int) -> Iterator[tuple[str, Any]]:
+        """Yields topic and message of samples of a stamp; all poses of links are one message at the end."""
+        for sample in samples:
+            if isinstance(sample, LinkPoseSample):
+                self._transforms.collect(sample, stamp_ns)
+            elif not isinstance(sample, SceneSample):
+                yield from self._message(sample, stamp_ns)
+        if (transforms := self._transforms.drain()) is not None:
+            yield TF.name, transforms
+
+    def keeps_state(self, topic: str) -> bool:
+        """Returns whether a sensor of a topic depends on more than the present state, such as a zero or a mean."""
+        return any(each.keeps_state for each in self._sensors() if self._name(each, sample_topic(each)) == topic)
+
+    def _message(self, sample: Any, stamp_ns: int) -> Iterator[tuple[str, Any]]:
+        topic = self._topic(sample)
+        if topic is not None and topic.handler is not None:
+            with plugin_errors(topic.handler, f"the message of '{sample.name}'"):
+                message = topic.handler(sample, stamp_ns)
+            yield topic.name.format(name=sample.name), message
+            if topic.on_tf is not None:
+                self._transforms.collect(*topic.on_tf(sample, stamp_ns))
+
+    def _topic(self, sample: Any) -> Topic | None:
+        """Returns the topic of the sensor that a sample comes from; None if there is none."""
+        key = type(sample), sample.name
+        if key not in self._routes:
+            for sensor in self._sensors():
+                topic = sample_topic(sensor)
+                is_wanted = topic is not None and self._is_wanted(self._name(sensor, topic))
+                self._routes[sensor.sample_type, sensor.name] = topic if is_wanted else None
+        return self._routes.get(key)
+
+    def _sensors(self) -> Iterator[Any]:
+        return (sensor for name in self._world.bodies for sensor in self._world.sensors_of(name))
+
+    def _name(self, sensor: Any, topic: Topic | None) -> str:
+        return "" if topic is None else topic.name.format(name=sensor.name)
