@@ -72,7 +72,7 @@ def test_files_that_cannot_be_are_named_and_the_world_stays(standing, tmp_path):
         save(tmp_path / "nowhere/here.world")
     with pytest.raises(InterfaceError, match=r"gone\.world: .*no such file"):
         restore(tmp_path / "gone.world")
-    (tmp_path / "cut.world").write_bytes(b"x\x9c")
+    (tmp_path / "cut.world").write_bytes(b"\x1f\x8b")
     with pytest.raises(InterfaceError, match=r"cut\.world: .*truncated"):
         restore(tmp_path / "cut.world")
     other = World.from_file("{rpbi_examples}/configs/run_kuka/config.yaml")

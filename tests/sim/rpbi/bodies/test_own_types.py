@@ -8,6 +8,7 @@ import pytest
 import yaml
 from worlds import FLOOR, box, write_world
 
+from custom_ros_tools import plugins
 from custom_ros_tools.errors import ConfigError, PluginError
 from rpbi.bodies import BODY_TYPES
 from rpbi.world import World
@@ -68,6 +69,18 @@ def test_an_object_of_an_own_type_acts_on_others(world):
     run(world, 1000)
     assert world.bodies["parcel"].base_pose().position[0] - start == pytest.approx(0.2, abs=0.005)
     assert BODY_TYPES.name_of(world.bodies["belt"]) == CONVEYOR
+
+
+def test_states_of_own_types_need_trust_in_another_process(world, monkeypatch):
+    run(world, 5)
+    state = world.save()
+    world.restore(state)
+    World.from_state(state).close()
+    monkeypatch.setattr(plugins, "_used", set())  # as in another process
+    with pytest.raises(ConfigError, match=f"'{CONVEYOR}' is not trusted"):
+        World.from_state(state)
+    World.from_state(state, trust=["my_robot_lab"]).close()
+    World.from_state(state, trust=None).close()
 
 
 def test_own_types_come_after_rigid_bodies_and_before_soft_ones(tmp_path):

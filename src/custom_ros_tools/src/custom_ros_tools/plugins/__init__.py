@@ -2,19 +2,32 @@
 
 import importlib
 import pkgutil
+import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import hint, shortened
 
 own_folders = [str(Path(__file__).parents[1])]
 """Folders of the packages that look classes up and call them; `cause_of` reports a place outside of them."""
-_found: set[str] = set()
-"""Names that `find_class` has found."""
-_trust: tuple[frozenset[str], str] | None = None
-"""Packages that `find_class` may import from, and advice for the message of a refusal; None allows any package."""
+_used: set[str] = set()
+"""Top-level packages of the classes that `find_class` has found."""
+
+
+class _Trust(NamedTuple):
+    """Packages that may be imported, and advice for the message of a refusal."""
+
+    packages: frozenset[str]
+    how: str
+
+
+_trust: _Trust | None = None
+"""Trust of the whole process; None allows any package."""
+_trust_here: ContextVar[_Trust | None] = ContextVar("trust of what is being read", default=None)
 
 
 class UntrustedError(ValueError):
@@ -22,7 +35,7 @@ class UntrustedError(ValueError):
 
 
 def trust_only(packages: Iterable[str], how: str) -> None:
-    """Restricts `find_class` from now on to these top-level packages and to names that it has found before.
+    """Restricts `find_class` from now on to these top-level packages and to classes that are imported already.
 
     Importing a module runs its code. Names read at the start come from the user. Names that arrive later, by services
     or from a bag, may come from anybody.
@@ -31,18 +44,37 @@ def trust_only(packages: Iterable[str], how: str) -> None:
         how: Advice for the message on how to trust another package.
     """
     global _trust
-    _trust = frozenset(packages), how
+    _trust = _Trust(frozenset(packages), how)
+
+
+@contextmanager
+def trusting_only(packages: Iterable[str], how: str) -> Iterator[None]:
+    """Does the same as `trust_only` within a context, for a recording that is read in a script.
+
+    In a process that `trust_only` restricts, the packages that it names are trusted, too.
+    """
+    token = _trust_here.set(_Trust(frozenset(packages), how))
+    try:
+        yield
+    finally:
+        _trust_here.reset(token)
 
 
 def check_trusted(name: str) -> None:
     """Checks a `module:Class` from outside.
 
+    A class is trusted if its package is, or if its module is imported already and `find_class` has found a class of its
+    package before.
+
     Raises:
         UntrustedError: If its package may not be imported.
     """
-    package = name.partition(":")[0].partition(".")[0]
-    if _trust is not None and name not in _found and package not in _trust[0]:
-        raise UntrustedError(f"'{shortened(name)}' is not trusted, so it is not imported: {_trust[1]}")
+    restrictions = [each for each in (_trust, _trust_here.get()) if each is not None]
+    module = name.partition(":")[0]
+    package = module.partition(".")[0]
+    is_used = package in _used and module in sys.modules
+    if restrictions and not is_used and not any(package in each.packages for each in restrictions):
+        raise UntrustedError(f"'{shortened(name)}' is not trusted, so it is not imported: {restrictions[0].how}")
 
 
 def find(name: str) -> Any:
@@ -77,7 +109,7 @@ def find_class(name: str, base: type) -> Any:
     check_trusted(name)
     found = find(name)
     if isinstance(found, type) and issubclass(found, base):
-        _found.add(name)
+        _used.add(name.partition(":")[0].partition(".")[0])
         return found
     raise ValueError(f"expected a subclass of {full_name(base)}, got '{name}'")
 

@@ -14,7 +14,7 @@ def main() -> None:
     """Follows the world whose state comes first."""
     connection = Connection(int(sys.argv[1]))
     state: WorldState = connection.recv()
-    serve(connection, lambda: World.from_state(state))
+    serve(connection, lambda: World.from_state(state, trust=None, max_ticks=state.tick))
 
 
 if __name__ == "__main__":

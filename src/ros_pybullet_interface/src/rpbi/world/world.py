@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,8 @@ from .forks.shadow import Fork, Shadow
 from .loading import LoadedWorld, load_object, load_world
 from .saved.command_log import CommandLog, WorldCommand
 from .saved.description import WorldDescription, describe
-from .saved.state import WorldState
+from .saved.state import MAX_TICKS, WorldState
+from .saved.values import trusting
 from .start_state import StartState
 
 log = logging.getLogger(__name__)
@@ -110,33 +111,49 @@ class World:
         return cls(load_world(path), **options)
 
     @classmethod
-    def from_description(cls, description: WorldDescription) -> World:
+    def from_description(cls, description: WorldDescription, trust: Collection[str] | None = ()) -> World:
         """Builds the world that a recording describes, without a window.
+
+        Args:
+            description: The description.
+            trust: Packages that it may import, beside `rpbi` and those that this program's configurations have used,
+                for types of the user's own. None: any package, for a recording that this program made.
 
         Raises:
             ConfigError: If it cannot be built here, for instance because a file is missing.
         """
-        return cls(description.load(), connection_mode=pybullet.DIRECT)
+        with trusting(trust):
+            return cls(description.load(trust), connection_mode=pybullet.DIRECT)
 
     @classmethod
-    def from_state(cls, state: WorldState | str | Path) -> World:
+    def from_state(
+        cls, state: WorldState | str | Path, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS
+    ) -> World:
         """Builds a world, without a window, and brings it to a saved state.
 
         Args:
             state: The state, or a file that `WorldState.write` wrote.
+            trust: Packages that it may import, see `from_description`.
+            max_ticks: Age of a state beyond which it is refused.
 
         Raises:
             ConfigError: If the file cannot be read, or the world cannot be built here.
-            InterfaceError: If the world does not come to the same state here, for instance with another PyBullet.
+            InterfaceError: If the state is too old, or the world does not come to the same state here, for instance
+                with another PyBullet.
         """
         state = state if isinstance(state, WorldState) else WorldState.read(state)
+        state.require_short(max_ticks)
         try:
             description = WorldDescription(state.description)
         except ValueError as error:
             raise InterfaceError(str(error)) from None
-        world = cls.from_description(description)
+        world = cls.from_description(description, trust)
         try:
-            state.run(world)
+            if world.start_hash != description.start_hash:
+                reasons = "; ".join(description.warnings) or "the processor or a library may be another"
+                raise InterfaceError(f"the world is not the saved one at its start: {reasons}")
+            for _ in state.run(world, trust):
+                pass
         except BaseException:
             world.close()
             raise
@@ -494,18 +511,32 @@ class World:
             state.write(file)
         return state
 
-    def restore(self, state: WorldState) -> None:
+    def restore(self, state: WorldState, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS) -> None:
         """Makes the world what it was when a state was saved; stamps go on.
 
+        Args:
+            state: The state.
+            trust: Packages that its commands may import, see `from_description`.
+            max_ticks: Age of a state beyond which it is refused.
+
         Raises:
-            InterfaceError: If the state is of another world, or the world does not come to the same state again; then
-                it is reset.
+            InterfaceError: If the state is of another world or too old; or if the world does not come to the same state
+                again, then it is reset.
         """
         self.require_own(state)
+        state.require_short(max_ticks)
+        for _ in self.restoring(state, trust):
+            pass
+
+    def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Iterator[int]:
+        """Does the same in steps, of a state that was checked; yields each tick on the way.
+
+        If the iterator is closed before its end, the world is reset.
+        """
         self._contents.move_cameras_back()
         self.reset()
         try:
-            state.run(self)
+            yield from state.run(self, trust)
         except BaseException:
             self.reset()
             raise

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 
 from .command_log import RecordedCommand
-from .values import from_text
+from .values import from_text, trusting
 
 _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "input": lambda world, slot, value: world.apply_input(slot, value),
@@ -26,20 +26,27 @@ _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
 """Commands to a world other than actions on its bodies."""
 
 
-def apply_command(world: Any, command: RecordedCommand) -> None:
+def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] | None = ()) -> None:
     """Applies a recorded command to a `World`.
+
+    Args:
+        world: The world.
+        command: The command.
+        trust: Packages that it may import, see `trusting`.
 
     Raises:
         InterfaceError: If the world refuses.
         ValueError: If the command cannot be read, or is unknown.
     """
-    name, what, value = command.name, command.what, from_text(command.data)
-    try:
-        apply(world, name, what, value)
-    except InterfaceError:
-        raise
-    except Exception as error:  # the value fits neither the command nor the world, in whatever way
-        raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error
+    name, what = command.name, command.what
+    with trusting(trust):
+        value = from_text(command.data)
+        try:
+            apply(world, name, what, value)
+        except InterfaceError:
+            raise
+        except Exception as error:  # the value fits neither the command nor the world, in whatever way
+            raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error
 
 
 def apply(world: Any, name: str, what: str, value: Any) -> None:

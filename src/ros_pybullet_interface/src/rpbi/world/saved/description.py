@@ -2,26 +2,33 @@
 
 import hashlib
 import json
-from collections.abc import Iterator
+import re
+from collections.abc import Collection, Iterator
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError, Problem, shortened
+from custom_ros_tools.foreign import load_foreign_json, printable
 from custom_ros_tools.plugins import full_name
 from custom_ros_tools.schema import ConfigModel
 from custom_ros_tools.schema.type_names import shown
 from robot_model.asset_files import LONGEST_PATH
 from robot_model.urdf.files import is_temporary, write_description
-from rpbi.bodies import BodyConfig
+from rpbi.bodies import BODY_TYPES, BodyConfig
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.world.loading import CameraConfig, LoadedWorld, ObjectConfig, WorldConfig
 
-from .values import from_text, to_text
+from .values import from_text, to_text, trusting
 
 FORMAT = 1
 """Version of the text's layout."""
+MAX_COMPARED_BYTES = 1 << 30
+"""Size of the files of a description that are compared with those of the recording [bytes]; others are not."""
+_WRITTEN = re.compile(r'(?<=")/[^"\\]*/robot_description-[0-9a-f]{12}\.urdf(?=")')
+"""Text that is the path of a file of `write_description`, in JSON."""
 
 
 def describe(loaded: LoadedWorld, start_hash: str) -> str:
@@ -91,51 +98,72 @@ class WorldDescription:
 
     def __init__(self, text: str) -> None:
         try:
-            data = json.loads(text)
+            data = load_foreign_json(text, "")
             if data["format"] != FORMAT:
-                raise ValueError(f"the world's description has format {data['format']}, this version reads {FORMAT}")
+                given = shortened(repr(data["format"]))
+                raise ValueError(f"the world's description has format {given}, this version reads {FORMAT}")
             described = {key: value for key, value in data.items() if key != "format"}
             read = _Description.parse(described, "")
         except ConfigError as error:
             raise ValueError(f"the world's description cannot be read: {error.problems[0]}") from None
-        except (json.JSONDecodeError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        except (KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"the world's description cannot be read: {shortened(repr(error))}") from None
+        if wrong := [path for path in read.descriptions if not _WRITTEN.search(json.dumps(path))]:
+            raise ValueError(f"the world's description has a text for '{shortened(printable(wrong[0]))}'")
         self.start_hash = read.start_hash
-        self._file, self._config = read.file, read.config
-        self._objects, self._cameras = read.objects, read.cameras
-        self._descriptions, written_by = read.descriptions, read.pybullet
-        self.warnings = [
-            f"{path}: is another file than when the world was recorded"
-            for path, digest in read.files.items()
-            if path not in self._descriptions and _has_changed(path, digest)
-        ]
-        if written_by != version("pybullet"):
-            self.warnings.append(f"recorded with PyBullet {written_by}, replayed with {version('pybullet')}")
+        self._read = read
 
-    def load(self) -> LoadedWorld:
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Differences of this machine from the recording one."""
+        read, left, found = self._read, MAX_COMPARED_BYTES, []
+        for path, digest in read.files.items():
+            if path in read.descriptions:
+                continue
+            try:
+                data = read_file(path, left)
+            except OSError:  # building the world reports what is wrong with it
+                continue
+            left -= len(data)
+            if hashlib.sha256(data).hexdigest() != digest:
+                found.append(f"{printable(path)}: is another file than when the world was recorded")
+        if read.pybullet != version("pybullet"):
+            found.append(f"recorded with PyBullet {printable(read.pybullet, 50)}, replayed with {version('pybullet')}")
+        return found
+
+    def load(self, trust: Collection[str] | None = ()) -> LoadedWorld:
         """Returns the configuration of the world.
+
+        Args:
+            trust: Packages that it may import, see `trusting`.
 
         Raises:
             ConfigError: If it is not valid here, for instance because a file is missing.
         """
-        config = self._read(self._config, self._file, WorldConfig)
-        objects = [ObjectConfig(each.type, self._read(each.config, each.file), each.file) for each in self._objects]
-        cameras = [
-            CameraConfig(self._read(each.config, each.file, RgbdSensorConfig), each.file) for each in self._cameras
-        ]
-        return LoadedWorld(config, tuple(objects), self._file, tuple(cameras))
+        read = self._read
+        with trusting(trust):
+            config = self._parse(read.config, read.file, WorldConfig)
+            for each in read.objects:
+                BODY_TYPES.configured(each.type, printable(each.file), "type")
+            objects = [ObjectConfig(each.type, self._parse(each.config, each.file), each.file) for each in read.objects]
+            cameras = [
+                CameraConfig(self._parse(each.config, each.file, RgbdSensorConfig), each.file) for each in read.cameras
+            ]
+        return LoadedWorld(config, tuple(objects), printable(read.file), tuple(cameras))
 
-    def _read(self, text: str, file: str, kind: type[ConfigModel] = BodyConfig) -> Any:
-        for path, description in self._descriptions.items():
-            if path in text:
-                text = text.replace(path, write_description(description))
+    def _parse(self, text: str, file: str, kind: type[ConfigModel] = BodyConfig) -> Any:
+        descriptions = self._read.descriptions
+
+        def here(path: re.Match[str]) -> str:
+            return write_description(descriptions[path[0]]) if path[0] in descriptions else path[0]
+
         try:
-            config = from_text(text)
+            config = from_text(_WRITTEN.sub(here, text))
             if not isinstance(config, kind):
                 raise ValueError(f"expected a {full_name(kind)}, got {shown(config)}")
             return config
         except ValueError as error:  # pydantic's are such, too
-            raise ConfigError([Problem(file, "", str(error))]) from None
+            raise ConfigError([Problem(printable(file), "", str(error))]) from None
 
 
 def _files(data: Any) -> Iterator[str]:
@@ -151,10 +179,3 @@ def _files(data: Any) -> Iterator[str]:
 
 def _hash_of(path: str) -> str:
     return hashlib.sha256(read_file(path)).hexdigest()
-
-
-def _has_changed(path: str, digest: str) -> bool:
-    try:
-        return Path(path).is_file() and _hash_of(path) != digest
-    except OSError:  # building the world tells what is wrong with it
-        return False

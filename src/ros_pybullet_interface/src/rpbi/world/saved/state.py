@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import gzip
+import hashlib
 import json
 import zlib
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from custom_ros_tools.config import MAX_BYTES as MAX_LINE_BYTES
+from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, shortened
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.foreign import load_foreign_json, printable
 
 from .command_log import RecordedCommand
 from .commands import apply_command
 
-FORMAT = 1
-"""Version of the file's layout."""
-_OTHERS = ("description", "tick", "state_hash")
-MAX_BYTES = 1 << 30
-"""Largest size of an unpacked file [bytes]."""
+FORMAT = 2
+"""Version of the file's layout: a header, a line for each command, and the SHA-256 of all lines before."""
+MAX_BYTES = 1 << 28
+"""Largest size of a file, packed or unpacked [bytes]."""
+MAX_COMMANDS = 2_000_000
+"""Largest number of commands in a file: 33 minutes of a target in each tick at 1 kHz."""
+MAX_TICKS = 20_000_000
+"""Age of a state beyond which it is refused without `max_ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+_BEGINNING = b'{"format": '
 
 
 class WorldState(NamedTuple):
@@ -39,60 +51,118 @@ class WorldState(NamedTuple):
         """Writes it to a file, `NAME.world` by custom.
 
         Raises:
+            InterfaceError: If it is larger than `read` allows.
             OSError: If it cannot be written; then no file of that name is left half-written.
         """
-        data = {"format": FORMAT, **self._asdict()}
-        with atomic_file(Path(path)) as part:
-            part.write_bytes(zlib.compress(json.dumps(data).encode()))
+        if len(self.commands) > MAX_COMMANDS:
+            raise InterfaceError(
+                f"{path}: expected at most {MAX_COMMANDS} commands since the world was built or reset, "
+                f"got {len(self.commands)}"
+            )
+        seal, size = hashlib.sha256(), 0
+        with atomic_file(Path(path)) as part, gzip.GzipFile(part, "wb", compresslevel=6, mtime=0) as file:
+            for line in self._lines():
+                size += file.write(line)
+                seal.update(line)
+                if size > MAX_BYTES:
+                    raise InterfaceError(f"{path}: expected at most {MAX_BYTES} bytes, got more")
+            file.write(seal.hexdigest().encode())
+
+    def _lines(self) -> Iterator[bytes]:
+        header = {"format": FORMAT, **self._asdict(), "commands": len(self.commands)}
+        for value in (header, *self.commands):
+            yield json.dumps(value).encode() + b"\n"
 
     @classmethod
     def read(cls, path: str | Path) -> WorldState:
         """Returns the state of a file.
 
         Raises:
-            ConfigError: If there is no such file, it is damaged, or of another version.
+            ConfigError: If there is no such file, it is none of `write`, too large, or of another version.
         """
         try:
-            unpacking = zlib.decompressobj()
-            text = unpacking.decompress(Path(path).read_bytes(), MAX_BYTES)
-            if not unpacking.eof:
-                reason = f"over {MAX_BYTES} bytes" if unpacking.unconsumed_tail else "it is truncated"
-                raise ValueError(reason)
-            return cls._of(json.loads(text))
+            packed = read_file(path, MAX_BYTES)
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-        except (zlib.error, ValueError, RecursionError) as error:
-            reason = f"expected a state that World.save wrote: {shortened(str(error))}"
-        raise ConfigError([Problem(str(path), "", reason)])
+            raise ConfigError([Problem(str(path), "", (error.strerror or str(error)).lower())]) from None
+        try:
+            with gzip.GzipFile(fileobj=BytesIO(packed)) as file:
+                return cls._of(file)
+        except (OSError, EOFError, zlib.error, ValueError, TypeError, KeyError, ConfigError) as error:
+            reason = "it is truncated" if isinstance(error, EOFError) else printable(str(error), 200)
+        raise ConfigError([Problem(str(path), "", f"expected a state that World.save of this version wrote: {reason}")])
 
     @classmethod
-    def _of(cls, data: Any) -> WorldState:
-        if not isinstance(data, dict) or "format" not in data:
-            raise ValueError("it has no format")
-        if data["format"] != FORMAT:
-            raise ValueError(f"it has format {shortened(repr(data['format']))}, this version reads {FORMAT}")
-        try:
-            commands = tuple(RecordedCommand(*_typed(each, int, str, str, str)) for each in data["commands"])
-            description, tick, state_hash = _typed([data[key] for key in _OTHERS], str, int, str)
-            return cls(description, commands, tick, state_hash)
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"its content is not as expected: {error!r}") from None
+    def _of(cls, file: gzip.GzipFile) -> WorldState:
+        """Reads an unpacked file line by line, so that neither its size nor a line can take the memory."""
+        seal = hashlib.sha256()
 
-    def run(self, world: Any) -> None:
-        """Brings a `World` that was just built or reset to this state.
+        def next_line() -> Any:
+            line = file.readline(MAX_LINE_BYTES + 1)
+            if file.tell() > MAX_BYTES:
+                raise ValueError(f"it has over {MAX_BYTES} bytes")
+            seal.update(line)
+            return load_foreign_json(line, f"byte {file.tell() - len(line)}", MAX_LINE_BYTES)
+
+        header = next_line()
+        if not isinstance(header, dict) or header.get("format") != FORMAT:
+            given = header.get("format") if isinstance(header, dict) else None
+            raise ValueError(f"it has format {shortened(repr(given))}, this version reads {FORMAT}")
+        kinds = {"description": str, "tick": int, "state_hash": str, "commands": int}
+        description, tick, state_hash, count = _typed([header[key] for key in kinds], *kinds.values())
+        if not 0 <= count <= MAX_COMMANDS:
+            raise ValueError(f"expected 0 to {MAX_COMMANDS} commands, got {shortened(str(count))}")
+        commands = tuple(RecordedCommand(*_typed(next_line(), int, str, str, str)) for _ in range(count))
+        ticks = [command.tick for command in commands]
+        if ticks != sorted(ticks) or (ticks and not 0 <= ticks[0] <= ticks[-1] <= tick) or tick < 0:
+            raise ValueError("the ticks of its commands are not in order, or beyond its own")
+        if file.read(65) != seal.hexdigest().encode():
+            raise ValueError("its content is not as it was written")
+        return cls(description, commands, tick, state_hash)
+
+    @classmethod
+    def is_file(cls, path: str | Path) -> bool:
+        """Returns whether a file begins as those of `write` do."""
+        with suppress(OSError, EOFError, zlib.error), gzip.open(path) as file:
+            return file.read(len(_BEGINNING)) == _BEGINNING
+        return False
+
+    def require_short(self, max_ticks: int) -> None:
+        """Checks that it is not older than that: a forged tick would be simulated for days.
 
         Raises:
-            InterfaceError: If its state then has another hash, or a command is refused.
+            InterfaceError: If it is.
+        """
+        if self.tick > max_ticks:
+            raise InterfaceError(
+                f"expected a state at most {max_ticks} ticks from the start, got one of {self.tick} ticks; "
+                f"max_ticks={self.tick}, if you know who made it"
+            )
+
+    def run(self, world: Any, trust: Collection[str] | None = ()) -> Iterator[int]:
+        """Brings a `World` that was just built or reset to this state, and yields each tick on the way.
+
+        Args:
+            world: The world.
+            trust: Packages that commands may import, see `trusting`.
+
+        Raises:
+            InterfaceError: If its state then has another hash, or a command is refused or makes no sense.
         """
         todo = iter(self.commands)
         command = next(todo, None)
         while True:
-            while command is not None and command.tick <= world.clock.tick:
-                apply_command(world, command)
-                command = next(todo, None)
-            if world.clock.tick >= self.tick:
-                break
-            world.step()
+            try:
+                while command is not None and command.tick <= world.clock.tick:
+                    apply_command(world, command, trust)
+                    command = next(todo, None)
+                if world.clock.tick >= self.tick:
+                    break
+                world.step()
+            except InterfaceError:
+                raise
+            except Exception as error:  # a command that makes no sense, at once or in the step after it
+                raise InterfaceError(f"tick {world.clock.tick}: {printable(str(error) or repr(error))}") from error
+            yield world.clock.tick
         if (found := world.state_hash()) != self.state_hash:
             raise InterfaceError(
                 f"the state at tick {self.tick} is not the saved one: its hash was {self.state_hash}, now it is {found}"

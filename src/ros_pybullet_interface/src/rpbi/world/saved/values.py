@@ -1,16 +1,30 @@
 """Values that enter a world as text that reads back exactly."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-from custom_ros_tools.plugins import UntrustedError, check_trusted, find
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.foreign import load_foreign_json
+from custom_ros_tools.plugins import UntrustedError, check_trusted, find, trusting_only
 from custom_ros_tools.schema import ConfigModel
 
 PAIRS = "pairs"
 """Key of a mapping whose keys are no texts, as a list of pairs."""
 QUOTED = 60
 """Characters of a text that cannot be read that a message has."""
+
+
+def trusting(packages: Collection[str] | None) -> AbstractContextManager[None]:
+    """Returns a context in which the classes that a recording names are those of `rpbi` and of these packages.
+
+    Args:
+        packages: Further packages that it may import. None: any package, for a recording that this program made.
+    """
+    if packages is None:
+        return nullcontext()
+    return trusting_only({"rpbi", *packages}, "name its package (trust=[...]), if you know who made it")
 
 
 def to_text(value: Any) -> str:
@@ -33,7 +47,11 @@ def from_text(text: str) -> Any:
         ConfigError: If a configuration in it is not valid here, for instance because a file is missing.
     """
     try:
-        return _value(json.loads(text))
+        plain = load_foreign_json(text, "recorded value")
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+    try:
+        return _value(plain)
     except (RecursionError, TypeError) as error:
         raise ValueError(f"expected what a recording has, got {text[:QUOTED]!r}...: {error}") from None
 
