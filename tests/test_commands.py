@@ -75,7 +75,8 @@ def words_of(command: str, argument: str) -> set[str]:
 def test_an_unknown_command_is_refused_with_the_list(bare):
     done = run([bare, "lanch"])
     assert done.returncode == 2
-    assert done.stderr.startswith("There is no command 'lanch'.\nUsage: ./rpbi COMMAND")
+    assert done.stderr.startswith("There is no command 'lanch'; did you mean 'launch'?\nUsage: ./rpbi COMMAND")
+    assert run([bare, "qqq"]).stderr.startswith("There is no command 'qqq'.\n")
 
 
 def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
@@ -176,6 +177,13 @@ def test_launch_refuses_an_example_that_is_not_there():
     done = run([ROOT / "rpbi", "launch", "basic_exmple_kuka_lwr"])
     assert done.returncode == 2
     assert re.match(r"launch: unknown example .*soft_body.*did you mean 'basic_example_kuka_lwr'\?\n$", done.stderr)
+
+
+def test_launch_takes_a_package_and_its_file_as_roslaunch_does():
+    done = run([ROOT / "rpbi", "launch", "safe_robot", "kuka_lwr.launch", "--ros-args"])
+    assert done.returncode == 0 and "  command" in done.stdout
+    missing = run([ROOT / "rpbi", "launch", "safe_robot", "nothing.launch"])
+    assert missing.returncode == 2 and "nothing.launch" in missing.stderr
 
 
 def test_launch_refuses_an_argument_that_the_launch_file_lacks():

@@ -14,6 +14,7 @@ import roslaunch
 from roslaunch.arg_dump import get_args
 from roslaunch.parent import ROSLaunchParent
 from roslaunch.pmon import ProcessListener
+from roslaunch.rlutil import resolve_launch_arguments
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.console.argument import Argument
@@ -50,7 +51,7 @@ def launch(
         ./rpbi launch world.yaml --ns right
 
     Usage:
-        ./rpbi launch [EXAMPLE | WORLD.yaml | FILE.launch [NAME:=VALUE ...]]
+        ./rpbi launch [EXAMPLE | WORLD.yaml | FILE.launch | PACKAGE FILE.launch [NAME:=VALUE ...]]
 
     Args:
         NAME:=VALUE: an argument of the launch file; examples have headless, rviz, gui, real_time_factor, start;
@@ -73,10 +74,7 @@ def launch(
     try:
         if name.endswith(WORLDS):
             name, rest = WORLD, [f"config:={name}", *_controls_of(name, rest), *rest]
-        is_file = name.endswith(".launch") and Path(name).is_file()
-        file = Path(name) if is_file else examples.get(name.removesuffix(".launch"))
-        if file is None:
-            raise UnknownNameError("example", name, list(examples))
+        file, rest = _launch_file(name, rest, examples)
         known = sorted(get_args([str(file)]))
         _check_arguments(file, rest, known)
         rest += _arguments_of(options, rest, known)
@@ -90,6 +88,22 @@ def launch(
     roslaunch.parent.ROSLaunchParent = partial(_Parent, parents)  # roslaunch itself returns 0 whatever happened
     roslaunch.main(sys.argv)
     return int(any(parent.has_failed for parent in parents))
+
+
+def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tuple[Path, list[str]]:
+    """Returns the launch file that the first words name, and the words after them.
+
+    Raises:
+        UnknownNameError: If there is no such example.
+        RLException: If a package has no such file, or there is no such package.
+    """
+    if name.endswith(".launch") and Path(name).is_file():
+        return Path(name), rest
+    if name.removesuffix(".launch") in examples:
+        return examples[name.removesuffix(".launch")], rest
+    if rest and rest[0].endswith(".launch"):
+        return Path(resolve_launch_arguments([name, rest[0]])[0]), rest[1:]
+    raise UnknownNameError("example", name, list(examples))
 
 
 class _Parent(ROSLaunchParent, ProcessListener):
