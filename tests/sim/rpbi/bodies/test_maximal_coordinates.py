@@ -77,6 +77,27 @@ def test_friction_of_other_objects_is_not(build):
     assert braked(build, 45, 45, 0.001, useMaximalCoordinates=False)[0] < 0.92
 
 
+@pytest.mark.parametrize("is_maximal", [True, False])
+def test_a_moving_plate_carries_or_warns_that_it_does_not(build, caplog, is_maximal):
+    keys = {"object_tf": {"tf_id": "plate", "hz": 50}, "useMaximalCoordinates": is_maximal}
+    plate = box("plate", basePosition=[0.0, 0.0, 0.5], **keys)
+    del plate["baseMass"]
+    world = build(box("load", (0.05, 0.05, 0.05), basePosition=[0.0, 0.0, 0.65]), floor=plate)
+    world.put("plate/pose", Pose((0.0, 0.0, 0.5)))
+    run(world, 100)
+    assert not caplog.records, "it was put there"
+    for step in range(1, 11):
+        world.put("plate/pose", Pose((0.005 * step, 0.0, 0.5)))
+        run(world, 20)
+    carried_m = world.bodies["load"].base_pose().position[0]
+    warnings = [each.message for each in caplog.records]
+    if is_maximal:
+        assert carried_m < 0.005 and len(warnings) == 1
+        assert warnings[0].startswith("plate: object_tf: moves without a velocity, because of useMaximalCoordinates")
+    else:
+        assert carried_m > 0.03 and not warnings
+
+
 def test_what_pybullet_does_not_tell_of_it_is_that_of_its_own(build):
     """PyBullet leaves in its place what it last told of another body, here of the arm."""
     bouncy = {"restitution": 0.3, "contactStiffness": 1.0e4, "contactDamping": 30.0}

@@ -194,6 +194,32 @@ def test_what_makes_no_sense_is_refused_and_nothing_changes(world, keys, message
     assert world.pb.getNumConstraints() == 1
 
 
+def maximal(name, x, **more):
+    return box(name, basePosition=[x, 2.0, 0.5], useMaximalCoordinates=True, **more)
+
+
+def test_bodies_in_maximal_coordinates_hold_without_a_limit(tmp_path, capfd):
+    bodies = (maximal("one", 0.0), maximal("two", 0.25), box("multi", basePosition=[0.5, 2.0, 0.5]))
+    world = World.from_file(write_world(tmp_path, dynamic=bodies))
+    for parent, child, more, message in (
+        ("one", "two", {"max_force": 5.0}, "max_force: PyBullet does not report the force between two bodies with"),
+        ("one", "multi", {}, "use 'multi' as the parent, 'one' as the child"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            attach(world, parent=parent, child=child, **more)
+    assert not world.attachments.configs
+    attach(world, name="pair", parent="one", child="two")
+    attach(world, name="mixed", parent="multi", child="two", kind="ball", max_force=1000.0)
+    before = world.bodies["one"].base_pose().inverse() @ world.bodies["two"].base_pose()
+    world.put("two/external_wrench", {"force": [0.0, 20.0, 0.0]})
+    run(world, 200)
+    after = world.bodies["one"].base_pose().inverse() @ world.bodies["two"].base_pose()
+    assert [each.name for each in world.attachments.configs] == ["pair", "mixed"]
+    assert after.position == pytest.approx(before.position, abs=1e-3)
+    world.close()
+    assert "failed" not in "".join(capfd.readouterr())
+
+
 def test_a_name_that_is_not_attached_cannot_be_detached(world):
     with pytest.raises(InterfaceError, match="unknown attachment 'tool': there is none"):
         world.detach("tool")

@@ -78,6 +78,8 @@ class Body:
         self._base = Pose()
         """PyBullet's last pose of the base, and the frame pose from it; cached since most bodies rest."""
         self.pose_follower: PoseFollower | None = None
+        self._has_jumped = False
+        """Whether it was warned that the body moves without a velocity."""
         """Moves a fixed base along the poses of `object_tf`; None if the base is set to them instead."""
         self.dynamics_changes = 0
         """Number of changes of its dynamics; caches of them compare it."""
@@ -153,7 +155,7 @@ class Body:
         """Lets a fixed base move along the poses of its TF frame, if there is one.
 
         A body loaded with `useMaximalCoordinates` is set to the poses instead: PyBullet ignores the velocity of its
-        base.
+        base, so it carries nothing.
         """
         self.object_tf = object_tf
         if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
@@ -210,7 +212,7 @@ class Body:
         """
         inputs: dict[str, Input] = {}
         if self.object_tf is not None:
-            apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.push
+            apply = self._jump if self.pose_follower is None else self.pose_follower.push
             is_tracked = isinstance(self.pose_follower, TrackedBase)
             inputs["pose"] = PoseInput.following(self.object_tf, apply, is_tracked)
         if self.has_physics and not self.is_soft and self.external_wrenches.can_act:
@@ -237,6 +239,17 @@ class Body:
     def set_base_pose(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world and leaves the velocity as it is."""
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
+
+    def _jump(self, pose: Pose) -> None:
+        """Puts a base that has no velocity at a pose of its TF frame; warns once if it moves while others touch it."""
+        if self.has_physics and not self._has_jumped and self.pb.getContactPoints(self.body_id):
+            self._has_jumped = True
+            log.warning(
+                "%s: object_tf: moves without a velocity, because of useMaximalCoordinates: it pushes away what it "
+                "meets, but neither carries nor rubs what touches it; remove useMaximalCoordinates",
+                self.name,
+            )
+        self.set_base_pose(pose)
 
     def base_twist(self) -> Twist:
         """Returns the twist of the base link's URDF frame in the world."""

@@ -14,7 +14,7 @@ from robot_model.geometry import Vector, scaled
 from rpbi.bodies.body import Body
 from rpbi.bodies.dynamics import link_index
 from rpbi.config.attachments import AttachmentConfig
-from rpbi.engine.client import Client
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.geometry import LinkWrench, Pose, rotated
 
 log = logging.getLogger(__name__)
@@ -34,6 +34,10 @@ class _End:
     @property
     def is_static(self) -> bool:
         return self.link < 0 and self.body.pb.getDynamicsInfo(self.body.body_id, -1)[0] == 0.0
+
+    @property
+    def is_maximal(self) -> bool:
+        return bool(self.body.pb.getDynamicsInfo(self.body.body_id, -1)[10] == MAXIMAL_COORDINATES)
 
     def link_pose(self) -> Pose:
         return self.body.link_pose(self.link)
@@ -103,6 +107,12 @@ class Attachments:
                 raise ValueError(f"child: '{config.child}' is attached to '{config.parent}' already, by '{name}'")
         if parent.is_static and child.is_static:
             raise ValueError(f"child: neither '{config.child}' nor '{config.parent}' can move: both are static")
+        if parent.is_maximal and not child.is_maximal:
+            message = "PyBullet cannot hold a body without useMaximalCoordinates by one that has it"
+            raise ValueError(f"parent: {message}; use '{config.child}' as the parent, '{config.parent}' as the child")
+        if config.max_force is not None and parent.is_maximal:
+            message = "PyBullet does not report the force between two bodies with useMaximalCoordinates"
+            raise ValueError(f"max_force: {message}; remove it, or that key of the parent '{config.parent}'")
         parent, child = _placed(config, parent, child)
         self._change(_Attachment(config, self._constrain(config, parent, child), parent, child), "holds")
 
@@ -195,7 +205,7 @@ class Attachments:
             )
             self._pb.changeConstraint(constraint, maxForce=_UNLIMITED_N)
         except pybullet.error as error:
-            raise PhysicsError(f"{config.name}: {error} (do both lack useMaximalCoordinates?)") from error
+            raise PhysicsError(f"{config.name}: {error}") from error
         return constraint
 
     def _change(self, attachment: _Attachment, what: str) -> None:
