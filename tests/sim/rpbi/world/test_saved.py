@@ -20,6 +20,8 @@ from soft_meshes import DEFORMABLE, GROUND, block
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
+from rpbi.config.pybullet_world_models import SetGravity
+from rpbi.geometry import Pose
 from rpbi.world import World
 from rpbi.world.forks import following
 from rpbi.world.forks.prediction import Prediction, PredictionJob
@@ -288,8 +290,48 @@ def test_states_of_other_worlds_and_versions_are_refused(arm, tmp_path):
     assert arm.clock.tick == 0, "it is reset"
 
 
-def test_something_that_is_not_recorded_is_noticed(arm):
+UNRECORDED = {
+    "changeDynamics": lambda world: world.pb.changeDynamics(world.bodies["box"].body_id, -1, mass=2.0),
+    "setGravity": lambda world: world.pb.setGravity(0.0, 0.0, -1.62),
+    "setPhysicsEngineParameter": lambda world: world.bodies["box"].pb.setPhysicsEngineParameter(numSolverIterations=5),
+    "resetBasePositionAndOrientation": lambda world: world.bodies["box"].teleport(Pose((0.0, 1.0, 1.0))),
+    "stepSimulation": lambda world: world.pb.stepSimulation(),
+}
+"""Changes of a world that no command repeats, by the function of PyBullet that makes them."""
+
+
+@pytest.mark.parametrize("name", UNRECORDED)
+def test_a_change_that_is_not_recorded_is_noticed(arm, name):
     arm.predict([[]], 1)
-    arm.bodies["box"].teleport(arm.bodies["box"].base_pose()._replace(position=(0.0, 1.0, 1.0)))
-    with pytest.raises(InterfaceError, match="something not recorded acts"):
-        arm.predict([[]], 1)
+    UNRECORDED[name](arm)
+    for use in (arm.save, arm.fork, lambda: arm.predict([[]], 1)):
+        with pytest.raises(InterfaceError, match=f"something not recorded acts: PyBullet's {name} was called"):
+            use()
+    arm.reset()
+    hash_later(arm, 20)
+    assert World.from_state(arm.save()).state_hash() == arm.state_hash()
+
+
+def test_a_reset_undoes_changes_that_are_not_recorded(arm):
+    arm.reset(rebuild=False)
+    expected = hash_later(arm, 50)
+    for change in UNRECORDED.values():
+        arm.reset(rebuild=False)
+        change(arm)
+        arm.reset(rebuild=False)
+        assert hash_later(arm, 50) == expected
+
+
+def test_changes_by_methods_of_the_world_are_recorded(arm):
+    arm.change_dynamics("box", {"mass": 2.0})
+    arm.change_physics(SetGravity(gravZ=-1.62))
+    arm.act("box", "teleport", Pose((0.0, 1.0, 1.0)))
+    arm.attach({"name": "rope", "parent": "iiwa/lbr_iiwa_link_7", "child": "box", "kind": "ball"})
+    arm.detach("rope")
+    arm.add("dynamic", box("other", basePosition=[0.0, -1.0, 0.5]))
+    arm.remove("box")
+    arm.halt("a stop")
+    arm.pause("a pause")
+    hash_later(arm, 20)
+    arm.read_rest()
+    assert World.from_state(arm.save()).state_hash() == arm.state_hash()

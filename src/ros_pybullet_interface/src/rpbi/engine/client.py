@@ -22,9 +22,20 @@ MAXIMAL_COORDINATES = 1
 
 PRINTING = frozenset(
     "resetSimulation loadURDF loadSDF loadMJCF loadSoftBody loadTexture loadPlugin createVisualShape "
-    "createCollisionShape createMultiBody createSoftBodyAnchor startStateLogging stopStateLogging vhacd".split()
+    "createCollisionShape createMultiBody createSoftBodyAnchor createConstraint changeConstraint removeConstraint "
+    "removeBody startStateLogging stopStateLogging vhacd".split()
 )
 """Functions in which PyBullet may print something; the others are called often, and print nothing."""
+CHANGING = frozenset(
+    "applyExternalForce applyExternalTorque changeConstraint changeDynamics createConstraint createMultiBody "
+    "createSoftBodyAnchor loadBullet loadMJCF loadSDF loadSoftBody loadURDF performCollisionDetection removeBody "
+    "removeConstraint resetBasePositionAndOrientation resetBaseVelocity resetJointState resetJointStateMultiDof "
+    "resetJointStatesMultiDof resetMeshData resetSimulation restoreState setCollisionFilterGroupMask "
+    "setCollisionFilterPair setGravity setJointMotorControl setJointMotorControl2 setJointMotorControlArray "
+    "setJointMotorControlMultiDof setJointMotorControlMultiDofArray setPhysicsEngineParameter setRealTimeSimulation "
+    "setTimeStep stepSimulation".split()
+)
+"""Functions after which a world moves in another way."""
 MAX_LINES = 20
 """Largest number of lines logged for one call; further ones are counted. PyBullet prints several for each link."""
 log = logging.getLogger("pybullet")
@@ -96,6 +107,29 @@ def _logged(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
+class ChangeWatch:
+    """Notes calls that change a world by other means than its methods, which record their effect as commands.
+
+    Attributes:
+        recording: Number of such methods under way.
+        unrecorded: The first of CHANGING that was called outside of them since the world was built or reset.
+    """
+
+    def __init__(self) -> None:
+        self.recording = 0
+        self.unrecorded = ""
+
+    def watched(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Returns a function whose calls are noted."""
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            if not self.recording and not self.unrecorded:
+                self.unrecorded = name
+            return function(*arguments, **options)
+
+        return call
+
+
 class Client:
     """PyBullet's functions and constants as attributes, bound to one connection.
 
@@ -124,6 +158,10 @@ class Client:
         """Gravity of its world, as last set [m/s^2]."""
         self.sub_steps = 0
         """Sub-steps of each step of its world, as last set; 0 is one."""
+        self.changes = ChangeWatch()
+        """Calls that change its world."""
+        self.advance: Callable[[], None] = partial(pybullet.stepSimulation, physicsClientId=self.client_id)
+        """`stepSimulation` for the ticks of its world, which is not watched."""
         if self.client_id < 0:
             raise PhysicsError("PyBullet did not connect")
         if mode in WINDOWS:
@@ -143,6 +181,7 @@ class Client:
         if callable(value):
             value = _logged(value) if name in PRINTING else value
             value = partial(value, physicsClientId=self.client_id)
+            value = self.changes.watched(name, value) if name in CHANGING else value
         setattr(self, name, value)
         return value
 

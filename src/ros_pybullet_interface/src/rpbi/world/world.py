@@ -7,8 +7,9 @@ import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import pybullet
 
@@ -41,6 +42,26 @@ from .saved.values import trusting
 from .start_state import StartState
 
 log = logging.getLogger(__name__)
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+def _recorded(
+    method: Callable[Concatenate[World, _Arguments], _Result],
+) -> Callable[Concatenate[World, _Arguments], _Result]:
+    """Marks a method whose effect on PyBullet the commands repeat; see `ChangeWatch`."""
+
+    @wraps(method)
+    def call(world: World, *arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
+        changes = world.pb.changes
+        changes.recording += 1
+        try:
+            return method(world, *arguments, **options)
+        finally:
+            changes.recording -= 1
+
+    return call
 
 
 class World:
@@ -95,6 +116,7 @@ class World:
         except BaseException:
             self.close()
             raise
+        self.pb.changes.unrecorded = ""
         self.start_hash = self.state_hash()
         """Hash of the state when it was built, or was reset the last time."""
         self._description = ""
@@ -159,6 +181,7 @@ class World:
             raise
         return world
 
+    @_recorded
     def add(self, kind: str, config: BodyConfig | Mapping[str, Any], file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.
 
@@ -196,6 +219,7 @@ class World:
         self._note(config.name, "add_camera", config)
         return camera
 
+    @_recorded
     def remove(self, name: str) -> None:
         """Removes a body or a camera.
 
@@ -220,6 +244,7 @@ class World:
         name, _, link = object_name.partition("/")
         return read_dynamics(self._contents.body(name), link)
 
+    @_recorded
     def change_dynamics(self, object_name: str, change: ChangeDynamics | Mapping[str, Any]) -> None:
         """Changes the dynamics of an object or a link; when it raises, nothing has changed.
 
@@ -239,6 +264,7 @@ class World:
         self._contents.change_dynamics(name, link, change)
         self._note(object_name, "dynamics", change)
 
+    @_recorded
     def attach(self, config: AttachmentConfig | Mapping[str, Any]) -> None:
         """Attaches a body to another; when it raises, nothing has changed.
 
@@ -256,6 +282,7 @@ class World:
         self.attachments.add(config)
         self._note(config.name, "attach", config)
 
+    @_recorded
     def detach(self, name: str) -> None:
         """Ends an attachment.
 
@@ -265,6 +292,7 @@ class World:
         self.attachments.remove(name)
         self._note(name, "detach", None)
 
+    @_recorded
     def change_physics(self, change: PhysicsChange) -> None:
         """Changes gravity, or the solver of contacts and joints; a reset undoes it."""
         self._contents.change_physics(change)
@@ -287,6 +315,7 @@ class World:
         self._sensors.set_rate(name, number, hz)
         self._note(name, "sensor_rate", (number, hz))
 
+    @_recorded
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
         """Applies an action to a body, and logs it as a command; when it raises, nothing is logged.
 
@@ -368,6 +397,7 @@ class World:
             if slot in self.inputs:
                 self.apply_input(slot, value)
 
+    @_recorded
     def apply_input(self, slot: str, value: Any) -> None:
         """Acts on a value that was checked, and notes it."""
         body = self.bodies.get(slot.split("/")[0])
@@ -387,6 +417,14 @@ class World:
             PhysicsError: If something in the world is not finite any more.
             PluginError: If a class of another package fails.
         """
+        changes = self.pb.changes
+        changes.recording += 1
+        try:
+            return self._step()
+        finally:
+            changes.recording -= 1
+
+    def _step(self) -> list[Any]:
         self.apply_inputs()
         for body in self._stepping:
             try:
@@ -400,7 +438,7 @@ class World:
         if watching:
             self._sensors.act("before_step")
         begin_s = time.perf_counter()
-        self.pb.stepSimulation()
+        self.pb.advance()
         self.physics_s += time.perf_counter() - begin_s
         self.contacts.invalidate()
         self.clock.advance()
@@ -418,12 +456,14 @@ class World:
         """Returns the samples that would have come due between two ticks, had the world not stood still."""
         return self._sensors.read_idle(tick, since)
 
+    @_recorded
     def halt(self, reason: str) -> None:
         """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
         for body in self.bodies.values():
             body.halt(reason)
         self._note("", "halt", reason)
 
+    @_recorded
     def pause(self, reason: str) -> None:
         """Breaks off what cannot wait until the world, which is stopped, runs again."""
         for body in self.bodies.values():
@@ -467,7 +507,7 @@ class World:
 
     def _rewind(self) -> bool:
         """Goes back to the start without loading anything, and returns whether it is the same."""
-        if self._start is None or not self._start.restore(self.commands):
+        if self._start is None or self.pb.changes.unrecorded or not self._start.restore(self.commands):
             return False
         self.clock.restart()
         self.contacts.invalidate()
@@ -479,6 +519,7 @@ class World:
     def _forget_commands(self) -> None:
         """Begins a life: without commands, but for the poses that cameras keep, and without inputs that wait."""
         self.commands.clear()
+        self.pb.changes.unrecorded = ""
         self.mailbox.drop()
         for slot, pose in self._contents.moved_cameras():
             self._note(slot, "input", pose)
@@ -499,12 +540,13 @@ class World:
             file: File that it is written to, too.
 
         Raises:
-            InterfaceError: If the world has soft bodies, whose motion is not reproducible, or a command that cannot be
-                recorded.
+            InterfaceError: If the world has soft bodies, whose motion is not reproducible, a command that cannot be
+                recorded, or a change that no command repeats.
             OSError: If the file cannot be written.
         """
         if soft := [body.name for body in self.bodies.values() if body.is_soft]:
             raise InterfaceError(f"expected no soft bodies, which never move the same way twice, got {', '.join(soft)}")
+        self._require_recorded()
         self.apply_inputs()
         state = WorldState(self.describe(), tuple(self.commands.records()), self.clock.tick, self.state_hash())
         if file is not None:
@@ -550,6 +592,18 @@ class World:
         if state.description != self.describe():
             raise InterfaceError(
                 "the state is of another world, or one of its files has changed: build that world by World.from_state"
+            )
+
+    def _require_recorded(self) -> None:
+        """Checks that all changes were recorded.
+
+        Raises:
+            InterfaceError: If PyBullet was told something that no command repeats.
+        """
+        if name := self.pb.changes.unrecorded:
+            raise InterfaceError(
+                f"something not recorded acts: PyBullet's {name} was called since the last reset, by other means than "
+                "the methods of World, such as put, act and change_dynamics"
             )
 
     def prepare_forks(self) -> None:
@@ -612,6 +666,7 @@ class World:
     @contextmanager
     def _followed(self) -> Iterator[Shadow]:
         """Yields the process that follows this world, at the present state; an error ends it."""
+        self._require_recorded()
         self.prepare_forks()
         assert self._shadow is not None
         try:
