@@ -70,7 +70,7 @@ class _Session:
         self.ros, self.folder = ros, EpisodeFolder(tmp_path / "demos")
         world = main_config(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),), state_hash_hz=20.0)
         ros.simulator(world, use_sim_time=True)
-        parameters = {"disk_reserve_mb": 1.0, **parameters}
+        parameters = {"disk_reserve_mb": 1.0, "copy_from": [str(tmp_path)], **parameters}
         words = shlex.split(command.replace("$HOME", str(tmp_path)))
         if words[0] == "roslaunch":
             words += [f"{name}:={value}" for name, value in parameters.items()]
@@ -212,6 +212,23 @@ def test_the_session_of_the_page_with_resets_keys_and_buttons_and_a_changed_urdf
     urdf.write_text(urdf.read_text().replace('<mass value="', '<mass value="1'))
     code, text = _run("verify", folder.path)
     assert code == 1 and f"{urdf.name}, the copy of" in text and "differs at tick" in text
+
+
+def test_a_second_recorder_leaves_the_running_episode_alone(ros: Any, tmp_path: Path) -> None:
+    session = _Session(ros, tmp_path)
+    folder = session.folder
+    for name, value in (("folder", str(folder.path)), ("disk_reserve_mb", 1.0)):
+        rospy.set_param(f"/second/{name}", value)
+    second = ros.listen("/second/status", String)
+    ros.start(["rosrun", "episodes", "record_node.py", "__name:=second"])
+    wait_until(lambda: second.messages, "the second one is up")
+    wait_until(lambda: "no rpbi/world" not in ros.call("/second/start", Trigger).message, "it records")
+    assert folder.partial() == [folder.part_of(0), folder.part_of(1)]
+    assert _run("episodes", folder.path)[1].endswith("2 more: being recorded\n")
+    assert _run("episodes", folder.path, "--repair")[1].count("is being recorded by another process") == 2
+    assert "episode 0 is complete" in _answer(session.call("stop"))
+    assert "episode 1 is complete" in _answer(ros.call("/second/stop", Trigger))
+    assert "expected a label of at most" in ros.call("/second/label", SetString, "x" * 101).message
 
 
 def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_path: Path) -> None:

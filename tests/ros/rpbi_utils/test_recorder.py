@@ -24,6 +24,8 @@ from std_msgs.msg import Float64, Int64
 from custom_ros_tools.ros.lifecycle.timed_master import allow_large_integers
 from rpbi_utils import Recorder, bag_to_dataframes
 from rpbi_utils.bags.errors import RecordingError
+from rpbi_utils.ros.bags import recorder as recorder_module
+from rpbi_utils.ros.bags.connections import count_received
 
 TALKER = """
 import rospy, sys
@@ -125,6 +127,34 @@ def test_a_recorder_that_gets_no_processor_for_a_while_misses_nothing(ros: Any, 
     going_on.join()
     publisher.unregister()
     assert list(bag_to_dataframes(tmp_path / "a.bag")["/burst"]["data"]) == list(numbers)
+
+
+def test_messages_are_not_lost_when_the_recorder_stands_still_for_long(
+    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a slow disk: at the end its process answers nothing for longer than the usual grace."""
+    monkeypatch.setattr(recorder_module, "_MOST_GRACE_S", 0.2)
+    publisher = rospy.Publisher("/burst", Float64, queue_size=2000)
+    with Recorder(tmp_path / "a.bag", ["/burst"]) as recorder:
+        end, arrived = recorder._end, []
+        monkeypatch.setattr(recorder, "_end", lambda: [arrived.append(count_received(recorder._node)), end()][1])
+        recorder._process.send_signal(signal.SIGSTOP)
+        for number in range(2000):
+            publisher.publish(number)
+        going_on = threading.Timer(2.5, recorder._process.send_signal, [signal.SIGCONT])
+        going_on.start()
+    going_on.join()
+    assert arrived == [{"/burst": 2000}], "it is not asked to end before it has read all"
+    assert len(bag_to_dataframes(tmp_path / "a.bag")["/burst"]) == 2000
+    with Recorder(tmp_path / "a.bag", ["/burst"]) as recorder:
+        monkeypatch.setattr(recorder, "_timeout_s", 0.0)
+        recorder._process.send_signal(signal.SIGSTOP)
+        publisher.publish(0)
+        recorder._wait_until_received()
+        assert recorder.missing == 1
+        recorder._process.send_signal(signal.SIGCONT)
+        monkeypatch.undo()
+    publisher.unregister()
 
 
 def test_a_topic_that_changes_its_type_is_recorded_with_both(ros: Any, tmp_path: Path) -> None:

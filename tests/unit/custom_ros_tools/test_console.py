@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Annotated
 
 import pytest
@@ -107,3 +109,37 @@ def test_a_parameter_without_an_argument_is_named():
 
     with pytest.raises(TypeError, match="wave: hand: expected Annotated"):
         _ = Command(wave).parameters
+
+
+def test_texts_are_safe_for_a_terminal(capsys):
+    odd = "\x1b[2J\x07\u202e"
+    assert Command(push).run([odd]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(r"\x1b[2J\x07\u202e ()")
+
+
+PROGRAM = """
+import sys
+from custom_ros_tools.console.command import Command
+from custom_ros_tools.ros.node import run_command
+
+def episodes():
+    sys.stdin.read()
+    if not LINES:
+        return "one line"
+    for _ in range(LINES):
+        print("x" * 100)
+
+run_command("builtins:print", lambda _: Command(episodes).run([]))
+"""
+
+
+@pytest.mark.parametrize("lines", [0, 10_000])
+def test_a_command_whose_output_is_closed_ends_quietly(lines):
+    """As `./rpbi episodes DIR | head` does; it ends as by SIGPIPE."""
+    program = PROGRAM.replace("LINES", str(lines))
+    with subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1, stderr=-1) as process:
+        process.stdout.close()
+        process.stdin.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141

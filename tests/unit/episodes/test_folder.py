@@ -72,11 +72,11 @@ def test_what_is_not_there_or_not_readable_is_named(tmp_path: Path) -> None:
     with pytest.raises(EpisodeError, match="expected a folder of episodes, there is none"):
         EpisodeFolder(tmp_path / "missing").numbers()
     for text, words in (
-        ("[", "while parsing"),
-        ("a: 1", "expected a mapping with 'number'"),
-        ("number: 0\nwrong: 1", "expected a mapping with 'number'"),
-        ("number: 0\nlabel: 1", "label: expected a value of the type str, got int"),
-        ("number: 0\ntopics: {/a: {messages: 1}}", "topics: /a: expected a mapping with 'type'"),
+        ("[", "line 1, column 2: expected"),
+        ("seeds: x", "number: missing"),
+        ("number: 0\nwrong: 1", "wrong: unknown key 'wrong'"),
+        ("number: 0\nlabel: 1", "label: expected text, got 1"),
+        ("number: 0\ntopics: {/a: {messages: 1}}", "topics./a.type: missing"),
     ):
         (tmp_path / "episode_000000" / FACTS).write_text(text)
         with pytest.raises(EpisodeError, match=f"episode.yaml: cannot be read: {words}"):

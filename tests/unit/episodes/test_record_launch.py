@@ -14,6 +14,7 @@ GIVEN = {
     "folder": "demos",
     "topics": ".*/joint_states(/[a-z_]+)*|/tf",
     "also": ["/rpbi/camera/colour/image"],
+    "copy_from": ["/data/robots"],
     "namespace": "left",
     "reset": True,
     "disk_reserve_mb": 2.0,

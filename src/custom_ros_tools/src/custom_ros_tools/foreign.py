@@ -65,8 +65,13 @@ def read_below(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> by
         raise ConfigError([Problem(str(path), "", (error.strerror or str(error)).lower())]) from None
 
 
-def entries_of(folder: str | Path, most: int = MAX_ENTRIES) -> list[os.DirEntry[str]]:
-    """Returns the entries of a foreign folder in the order of their names, without symbolic links.
+def entries_of(folder: str | Path, most: int = MAX_ENTRIES, *, links: bool = False) -> list[os.DirEntry[str]]:
+    """Returns the entries of a foreign folder in the order of their names.
+
+    Args:
+        folder: The folder.
+        most: Largest number of its entries.
+        links: Whether symbolic links are among them.
 
     Raises:
         OSError: If the folder cannot be read, or has more than `most` entries.
@@ -76,7 +81,7 @@ def entries_of(folder: str | Path, most: int = MAX_ENTRIES) -> list[os.DirEntry[
         for entry in entries:
             if len(found) == most:
                 raise OSError(errno.E2BIG, f"has more than {most} entries", str(folder))
-            if not entry.is_symlink():
+            if links or not entry.is_symlink():
                 found.append(entry)
     return sorted(found, key=lambda entry: entry.name)
 
@@ -122,6 +127,11 @@ def printable(text: str, most: int = 1000) -> str:
     """
     cut = text if len(text) <= most else f"{text[: max(most - 3, 0)]}..."
     return "".join(_escaped(each) if unicodedata.category(each) in _UNSAFE else each for each in cut)
+
+
+def printable_lines(text: str) -> str:
+    """Returns a text whose lines are all safe for a terminal, see `printable`; none is cut."""
+    return "\n".join(printable(line, len(line)) for line in text.split("\n"))
 
 
 _UNSAFE = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))

@@ -24,6 +24,9 @@ class RecordParameters(ConfigModel):
         DEFAULT_TOPICS, description="A list of topics, or a regular expression that the whole name matches."
     )
     also: ListOf[Text] = Field((), description="Further topics, such as images of cameras.")
+    copy_from: ListOf[Text] = Field(
+        (), description="Further folders whose files are stored with episodes if the world names them; `[/]` for all."
+    )
     namespace: Text = Field("/", description="Namespace of the simulator.")
     reset: Switch = Field(False, description="Whether the world is reset before each episode.")
     disk_reserve_mb: Positive = Field(1000.0, description="Free space of the disk that is never used [MB].")

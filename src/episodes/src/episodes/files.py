@@ -4,112 +4,219 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
-import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr, unescape
 
-from custom_ros_tools.config import read_file
-from custom_ros_tools.errors import ConfigError
+import rospkg
+
+from custom_ros_tools.config import load_config, read_file
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.foreign import load_foreign_json, path_below, printable, read_below
+from robot_model.asset_files import ASSETS, pybullet_data, resolve_package
 from robot_model.urdf.document import UrdfDocument
-from robot_model.urdf.files import found_mesh
+from robot_model.urdf.files import found_mesh, write_description
+from rpbi.config.world import main_file_model
+from rpbi.world.objects import object_sections
 
 from .errors import EpisodeError
+from .facts import MAX_FILES
 
 URDF = ".urdf"
+MAX_FILE_BYTES = 2**29
+"""Largest size of a file that is stored with an episode [bytes]."""
+MAX_ALL_BYTES = 2**31
+"""Largest size of all files of an episode together [bytes]."""
+_NAMED = 5
+"""Number of files that are not stored and named in a note; the others are counted."""
 
 
-def store_files(description: str, store: Path) -> tuple[list[dict[str, Any]], list[str]]:
+def store_files(
+    description: str, store: Path, folders: Sequence[Path] | None = None
+) -> tuple[list[dict[str, Any]], list[str]]:
     """Copies the files that a world's description names, and the meshes of its URDFs, into a folder.
 
     Args:
         description: JSON, as on `rpbi/world_description`.
         store: The folder; a file is `HASH.EXTENSION` there. Copies that exist are kept.
+        folders: Folders whose files are copied; None for all files.
 
     Returns:
         For each file its `path`, its `sha256`, and for a URDF `meshes`, their paths by the names in it; and sentences
-        on files that are not as they were when the world was loaded, or cannot be read.
+        on files that are not as they were when the world was loaded, cannot be read, or are not copied.
+
+    Raises:
+        ConfigError: If it is no description.
     """
-    data = json.loads(description)
-    stored: dict[str, dict[str, Any]] = {}
-    faults: list[str] = []
+    data = _described(description)
+    copies = _Copies(store, folders)
     for path, expected in data["files"].items():
         if path in data["descriptions"]:
-            faults += _store_meshes(path, path, stored, store)
+            copies.add_meshes(path, write_description(data["descriptions"][path]))
             continue
-        digest = _store(path, stored, store, faults)
+        digest = copies.add(path)
         if digest not in ("", expected):
-            faults.append(f"{path} has changed since the world was loaded")
-        if path.lower().endswith(URDF):
-            faults += _store_meshes(path, path, stored, store)
-    return list(stored.values()), faults
+            copies.faults.append(f"{path} has changed since the world was loaded")
+        if digest and path.lower().endswith(URDF):
+            copies.add_meshes(path, path)
+    return list(copies.stored.values()), copies.all_faults
 
 
-def _store_meshes(urdf: str, source: str, stored: dict[str, dict[str, Any]], store: Path) -> list[str]:
-    faults: list[str] = []
-    meshes: dict[str, str] = {}
-    try:
-        document = UrdfDocument(source)
-    except ConfigError as error:
-        return [str(error)]
-    for name in document.meshes:
+def folders_of_world(description: str) -> list[Path]:
+    """Returns the folders whose files belong to a world: those of ROS packages, of its main file and of robots' data.
+
+    The description may come from anybody. A folder that it names counts only if a main file is there.
+    """
+    data = load_foreign_json(description, "rpbi/world_description")
+    main = data.get("file") if isinstance(data, dict) else None
+    return [*_package_folders(), *([Path(main).parent] if isinstance(main, str) and _is_main_file(main) else ())]
+
+
+class _Copies:
+    """Copies of the files of one world, see `store_files`."""
+
+    def __init__(self, store: Path, folders: Sequence[Path] | None) -> None:
+        self.stored: dict[str, dict[str, Any]] = {}
+        self.faults: list[str] = []
+        self._store, self._left = store, MAX_ALL_BYTES
+        self._folders = None if folders is None else [os.path.realpath(each) for each in folders]
+        self._foreign: list[str] = []
+
+    @property
+    def all_faults(self) -> list[str]:
+        """The sentences, with one on files that are not copied."""
+        if not self._foreign:
+            return self.faults
+        more = f" and {len(self._foreign) - _NAMED} more" if len(self._foreign) > _NAMED else ""
+        names = ", ".join(self._foreign[:_NAMED])
+        return [*self.faults, f"not copied, since they are in no folder of the world or of copy_from: {names}{more}"]
+
+    def add(self, path: str) -> str:
+        """Copies a file, and returns its hash; empty if it cannot be read, or is not to be copied."""
+        if path in self.stored:
+            return str(self.stored[path]["sha256"])
+        if not self._is_own(path):
+            self._foreign.append(printable(path, 200))
+            return ""
         try:
-            path = str(found_mesh(name, Path(source)).absolute())
-        except (ConfigError, OSError):  # the world was loaded without it
-            continue
-        _store(path, stored, store, faults)
-        meshes[name] = path
-    stored.setdefault(urdf, {"path": urdf, "sha256": ""})["meshes"] = meshes
-    return faults
+            if len(self.stored) >= MAX_FILES:
+                raise OSError(0, f"expected at most {MAX_FILES} files in all")
+            data = read_file(path, min(MAX_FILE_BYTES, self._left))
+        except OSError as error:
+            self.faults.append(f"{path} cannot be read: {error.strerror or error}")
+            return ""
+        self._left -= len(data)
+        digest = hashlib.sha256(data).hexdigest()
+        target = stored_path(self._store, path, digest)
+        if not target.exists():
+            self._store.mkdir(parents=True, exist_ok=True)
+            with atomic_file(target) as part:
+                part.write_bytes(data)
+        self.stored[path] = {"path": path, "sha256": digest}
+        return digest
+
+    def add_meshes(self, urdf: str, source: str) -> None:
+        """Copies the meshes of a URDF.
+
+        Args:
+            urdf: Its name in the description.
+            source: The file to read.
+        """
+        meshes: dict[str, str] = {}
+        try:
+            document = UrdfDocument(urdf, source)
+        except ConfigError as error:
+            self.faults.append("; ".join(map(str, error.problems)))
+            return
+        for name in document.meshes:
+            try:
+                found = found_mesh(name, Path(urdf))
+            except (ConfigError, OSError):  # the world was loaded without it
+                continue
+            path = str(found.resolve() if ".." in found.parts else found.absolute())
+            if self.add(path):
+                meshes[name] = path
+        self.stored.setdefault(urdf, {"path": urdf, "sha256": ""})["meshes"] = meshes
+
+    def _is_own(self, path: str) -> bool:
+        if printable(path, len(path)) != path:
+            return False
+        real = Path(os.path.realpath(path))
+        return self._folders is None or any(real.is_relative_to(folder) for folder in self._folders)
 
 
-def _store(path: str, stored: dict[str, dict[str, Any]], store: Path, faults: list[str]) -> str:
-    """Copies a file, and returns its hash; empty if it cannot be read."""
+def _described(description: str) -> dict[str, Any]:
+    """Returns a world's description, whose files, descriptions and configurations have the types of `describe`."""
+    data = load_foreign_json(description, "rpbi/world_description")
     try:
-        data = read_file(path)
-    except OSError as error:
-        faults.append(f"{path} cannot be read: {error.strerror or error}")
-        return ""
-    digest = hashlib.sha256(data).hexdigest()
-    target = stored_path(store, path, digest)
-    if not target.exists():
-        store.mkdir(parents=True, exist_ok=True)
-        with atomic_file(target) as part:
-            part.write_bytes(data)
-    stored[path] = {"path": path, "sha256": digest}
-    return digest
+        texts = [*data["files"].items(), *data["descriptions"].items()]
+        configs = [data["config"], *(each["config"] for each in data["objects"])]
+        is_valid = all(isinstance(each, str) for each in (*configs, *(text for pair in texts for text in pair)))
+    except (AttributeError, KeyError, TypeError):
+        is_valid = False
+    if not is_valid:
+        raise ConfigError([Problem("rpbi/world_description", "", "expected the description of a world")])
+    return dict(data)
 
 
-def _digest(path: str | Path) -> str:
-    return hashlib.sha256(read_file(path)).hexdigest()
+@lru_cache(maxsize=1)
+def _package_folders() -> tuple[Path, ...]:
+    """Returns the folders of all ROS packages, of example-robot-data and of PyBullet's data."""
+    packages = rospkg.RosPack()
+    folders = [*(packages.get_path(name) for name in packages.list()), *pybullet_data()]
+    with suppress(ValueError):  # not installed
+        folders.append(str(resolve_package(f"{{{ASSETS}}}/")))
+    return tuple(map(Path, folders))
+
+
+def _is_main_file(path: str) -> bool:
+    """Returns whether a file has keys of a main file, and no others."""
+    try:
+        keys = set(load_config(path))
+    except ConfigError:
+        return False
+    return bool(keys & set(object_sections())) and keys <= set(main_file_model(object_sections()).model_fields)
 
 
 def stored_path(store: Path, path: str, digest: str) -> Path:
-    """Returns the copy of a file with a hash."""
-    return store / f"{digest}{Path(path).suffix}"
+    """Returns the copy of a file with a hash.
+
+    Raises:
+        ConfigError: If it is a link.
+    """
+    return path_below(store.parent, f"{store.name}/{digest}{Path(path).suffix}")
 
 
 def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[str]:
     """Yields a sentence for each copy that is missing or has another content than when it was stored."""
+    known: dict[str, str] = {}
     for each in files:
         if not each["sha256"]:
             continue
-        copy = stored_path(store, each["path"], each["sha256"])
-        try:
-            if _digest(copy) != each["sha256"]:
-                yield f"{copy.parent.name}/{copy.name}, the copy of {each['path']}, was changed"
-        except OSError:
-            yield f"{copy.parent.name}/{copy.name}, the copy of {each['path']}, is missing"
+        name = f"{each['sha256']}{Path(each['path']).suffix}"
+        if name not in known:
+            try:
+                content = read_below(store.parent, f"{store.name}/{name}", MAX_FILE_BYTES)
+                known[name] = "" if hashlib.sha256(content).hexdigest() == each["sha256"] else "was changed"
+            except ConfigError as error:
+                is_there = os.path.lexists(store / name)
+                known[name] = error.problems[0].message if is_there else "is missing"
+        if known[name]:
+            yield f"{store.name}/{name}, the copy of {each['path']}, {known[name]}"
 
 
 def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """Yields a sentence for each file that is there, with another content than was stored."""
     for each in files:
         with suppress(OSError):  # it is not there any more
-            if each["sha256"] and _digest(each["path"]) != each["sha256"]:
+            data = read_file(each["path"], MAX_FILE_BYTES)
+            if each["sha256"] and hashlib.sha256(data).hexdigest() != each["sha256"]:
                 yield f"{each['path']} differs from its copy in the episode"
 
 
@@ -123,45 +230,49 @@ def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], stor
         folder: An empty folder, in which the files are laid out as they were. URDFs name the meshes there.
 
     Raises:
-        EpisodeError: If a copy cannot be read.
+        ConfigError: If it is no description, or the name of a file leaves the folder.
+        EpisodeError: If a copy cannot be read, or all together are too large.
     """
-    data = json.loads(description)
+    data = _described(description)
     files = list(files)
+    left = MAX_ALL_BYTES
     for each in files:
         if each["sha256"]:
-            copy, target = stored_path(store, each["path"], each["sha256"]), _below(folder, each["path"])
-            target.parent.mkdir(parents=True, exist_ok=True)
+            copy, target = stored_path(store, each["path"], each["sha256"]), path_below(folder, each["path"])
             try:
-                shutil.copyfile(copy, target)
+                content = read_file(copy, min(MAX_FILE_BYTES, left))
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(content)
             except OSError as error:
                 raise EpisodeError(copy, f"cannot be read: {error.strerror or error}") from error
+            left -= len(content)
     for each in files:
-        if meshes := {name: str(_below(folder, path)) for name, path in each.get("meshes", {}).items()}:
+        if meshes := {name: str(path_below(folder, path)) for name, path in each.get("meshes", {}).items()}:
             if each["path"] in data["descriptions"]:
                 text = data["descriptions"][each["path"]]
                 data["descriptions"][each["path"]] = _with_meshes(text, meshes)
-            else:
-                urdf = _below(folder, each["path"])
+            elif each["sha256"]:
+                urdf = path_below(folder, each["path"])
                 text = urdf.read_text(encoding="utf-8", errors="surrogateescape")
                 urdf.write_text(_with_meshes(text, meshes), encoding="utf-8", errors="surrogateescape")
     moved = {
-        json.dumps(each["path"]): json.dumps(str(_below(folder, each["path"]))) for each in files if each["sha256"]
+        json.dumps(each["path"]): json.dumps(str(path_below(folder, each["path"]))) for each in files if each["sha256"]
     }
     for holder in (data, *data["objects"]):
-        for old, new in moved.items():
-            holder["config"] = holder["config"].replace(old, new)
+        holder["config"] = _JSON_TEXT.sub(lambda match: moved.get(match[0], match[0]), holder["config"])
     data["files"] = {path: digest for path, digest in data["files"].items() if path in data["descriptions"]}
     return json.dumps(data)
 
 
-def _below(folder: Path, path: str) -> Path:
-    return folder / path.lstrip("/")
+_QUOTES = {"&quot;": '"', "&apos;": "'"}
+_JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 
 
 def _with_meshes(urdf: str, meshes: Mapping[str, str]) -> str:
     """Returns a URDF whose attributes `filename` name other files."""
 
     def renamed(match: re.Match[str]) -> str:
-        return f"{match[1]}{match[2]}{meshes.get(match[3], match[3])}{match[2]}"
+        path = meshes.get(unescape(match[3], _QUOTES))
+        return match[0] if path is None else match[1] + quoteattr(path)
 
     return re.sub(r"(\bfilename\s*=\s*)([\"'])(.*?)\2", renamed, urdf)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import platform
 import re
 import shutil
+import stat
 import subprocess
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,9 +21,12 @@ import rospkg
 import yaml
 
 from custom_ros_tools.console.modules import workspace
+from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.foreign import entries_of, path_below, printable, read_below
 
 from .errors import EpisodeError
+from .facts import MAX_BYTES, MAX_LABEL, MAX_NOTE, MAX_NUMBER, checked_label, facts_in
 
 BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
 """Files of an episode: the recording, its description, and commands that the topic no longer sends."""
@@ -29,8 +36,9 @@ SEAL = "sha256"
 """Key of a topic with the SHA-256 of its messages."""
 UNREADABLE = "cannot be read"
 """State of an episode whose description cannot be read."""
-_COMPLETE = re.compile(r"episode_(\d{6,})")
-_PARTIAL = re.compile(r"\.episode_(\d{6,})\.part")
+_POLL_S = 0.05
+_COMPLETE = re.compile(r"episode_([0-9]{6}|[1-9][0-9]{6,11})")
+_PARTIAL = re.compile(r"\.episode_([0-9]{6}|[1-9][0-9]{6,11})\.part")
 
 
 @dataclass
@@ -145,7 +153,7 @@ class EpisodeFolder:
             EpisodeError: If it does not exist, or its description cannot be read.
         """
         if number not in self.numbers():
-            known = ", ".join(map(str, self.numbers())) or "none"
+            known = printable(", ".join(map(str, self.numbers())), MAX_LABEL) or "none"
             raise EpisodeError(self.path, f"no episode {number}; there are {known}")
         return read_facts(self.folder_of(number))
 
@@ -172,12 +180,17 @@ class EpisodeFolder:
             OSError: If it cannot be written; there is no folder then.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        used = self.taken() | set(_numbers(self.path, _PARTIAL))
-        if number in used:
-            raise EpisodeError(self.path, f"expected a number that is not used, got {number}")
-        episode = Episode(max(used, default=-1) + 1 if number is None else number, **facts)
-        part = self.part_of(episode.number)
-        part.mkdir()
+        while True:
+            used = self.taken() | set(_numbers(self.path, _PARTIAL))
+            chosen = max(used, default=-1) + 1 if number is None else number
+            if number in used or chosen > MAX_NUMBER:
+                raise EpisodeError(self.path, f"expected a number that is not used, got {chosen}")
+            try:
+                self.part_of(chosen).mkdir()
+                break
+            except FileExistsError:  # another process has just begun it
+                continue
+        episode, part = Episode(chosen, **facts), self.part_of(chosen)
         try:
             write_facts(part, episode)
         except OSError:
@@ -195,16 +208,26 @@ class EpisodeFolder:
         return sorted(map(self.part_of, _numbers(self.path, _PARTIAL)))
 
     def discard(self, number: int) -> Path:
-        """Moves an episode into `discarded` and returns its new folder; raises an EpisodeError if it does not exist."""
+        """Moves an episode into `discarded` and returns its new folder.
+
+        Raises:
+            EpisodeError: If it does not exist.
+            ConfigError: If `discarded` is a link.
+        """
         self.read(number)
-        target = self.path / DISCARDED / self.folder_of(number).name
+        target = path_below(self.path, f"{DISCARDED}/{self.folder_of(number).name}")
         target.parent.mkdir(exist_ok=True)
         return self.folder_of(number).rename(target)
 
     def relabel(self, number: int, label: str) -> Episode:
-        """Changes the label of an episode and returns it; raises an EpisodeError if it does not exist."""
+        """Changes the label of an episode and returns it.
+
+        Raises:
+            EpisodeError: If it does not exist.
+            InterfaceError: If the label is too long, or has control characters.
+        """
         episode = self.read(number)
-        episode.label = label
+        episode.label = checked_label(label)
         write_facts(self.folder_of(number), episode)
         return episode
 
@@ -215,34 +238,21 @@ class EpisodeFolder:
 
 
 def read_facts(folder: Path) -> Episode:
-    """Reads the description of an episode in its folder.
+    """Reads the description of an episode in its folder, whose name has its number.
 
     Raises:
         EpisodeError: If it cannot be read.
     """
     path = folder / FACTS
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        _require(data, "", ("number",), {each.name: type(getattr(Episode(0), each.name)) for each in fields(Episode)})
-        for topic, each in data.get("topics", {}).items():
-            _require(each, f"topics: {topic}: ", _TOPIC_FACTS, {**_TOPIC_FACTS, SET_BACK: float, SEAL: str})
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise EpisodeError(path, f"{UNREADABLE}: {' '.join(str(error).split())}") from error
-    return Episode(**data)
-
-
-_TOPIC_FACTS = {"type": str, "messages": int, "rate_hz": float, "max_gap_s": float}
-
-
-def _require(data: Any, place: str, needed: Collection[str], kinds: Mapping[str, type]) -> None:
-    """Raises a ValueError unless it is a mapping with values of some types, and of these keys alone."""
-    if not isinstance(data, Mapping) or set(needed) - set(data) or set(data) - set(kinds):
-        keys = " and ".join(map(repr, needed))
-        raise ValueError(f"{place}expected a mapping with {keys} and of {', '.join(sorted(kinds))}")
-    for key, value in data.items():
-        if not isinstance(value, (float, int) if kinds[key] is float else kinds[key]):
-            expected, got = kinds[key].__name__, type(value).__name__
-            raise ValueError(f"{place}{key}: expected a value of the type {expected}, got {got}")
+        text = read_below(folder.parent, f"{folder.name}/{FACTS}", MAX_BYTES).decode()
+        facts = facts_in(text, str(path))
+    except (ConfigError, UnicodeDecodeError) as error:
+        problems = error.problems if isinstance(error, ConfigError) else (error,)
+        words = "; ".join(str(each).removeprefix(f"{path}: ") for each in problems[:3])
+        raise EpisodeError(path, f"{UNREADABLE}: {printable(words)}") from error
+    match = _COMPLETE.fullmatch(folder.name) or _PARTIAL.fullmatch(folder.name)
+    return Episode(**facts | ({"number": int(match[1])} if match else {}))
 
 
 def read_part(part: Path) -> Episode:
@@ -257,14 +267,72 @@ def read_part(part: Path) -> Episode:
 
 def write_facts(folder: Path, episode: Episode) -> None:
     """Writes the description of an episode into its folder; the former one stays until the new one is complete."""
+    episode.note = printable(episode.note, MAX_NOTE)
     with atomic_file(folder / FACTS) as part:
         part.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
+
+
+def file_in(place: Path, name: str) -> Path | None:
+    """Returns a file of an episode; None if there is none.
+
+    Raises:
+        EpisodeError: If it is a link, a pipe, a device or a folder.
+    """
+    try:
+        path = path_below(place.parent, f"{place.name}/{name}")
+        status = path.lstat()
+    except FileNotFoundError:
+        return None
+    except ConfigError as error:
+        raise EpisodeError(place / name, error.problems[0].message) from None
+    except OSError as error:
+        raise EpisodeError(place / name, error.strerror or str(error)) from None
+    if not stat.S_ISREG(status.st_mode):
+        raise EpisodeError(path, "expected an ordinary file")
+    return path
+
+
+def hold(part: Path, wait_s: float = 0.0) -> int:
+    """Locks a temporary folder, so that no other process repairs it.
+
+    Args:
+        part: The folder.
+        wait_s: Longest time to wait until another process releases it [s].
+
+    Returns:
+        A file handle. The lock ends when it is closed, here and in child processes that have inherited it.
+
+    Raises:
+        BlockingIOError: If another process records into the folder.
+        OSError: If it is no folder, or a link to one.
+    """
+    handle, deadline = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW), time.monotonic() + wait_s
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return handle
+        except OSError as error:
+            if not isinstance(error, BlockingIOError) or time.monotonic() > deadline:
+                os.close(handle)
+                raise
+            time.sleep(_POLL_S)
+
+
+def is_held(part: Path) -> bool:
+    """Returns whether a process records into a temporary folder."""
+    try:
+        os.close(hold(part))
+    except BlockingIOError:
+        return True
+    except OSError:  # it is complete by now
+        pass
+    return False
 
 
 def _numbers(folder: Path, pattern: re.Pattern[str]) -> list[int]:
     if not folder.is_dir():
         return []
-    return [int(match[1]) for each in folder.iterdir() if (match := pattern.fullmatch(each.name))]
+    return [int(match[1]) for each in entries_of(folder, links=True) if (match := pattern.fullmatch(each.name))]
 
 
 def versions() -> dict[str, str]:

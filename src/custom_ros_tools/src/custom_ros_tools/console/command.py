@@ -9,8 +9,10 @@ from functools import cached_property
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable_lines
 
 from .argument import Argument, UsageError
+from .output import is_output_closed
 
 PROGRAM = "./rpbi"
 NAME_WIDTH = 16
@@ -131,10 +133,13 @@ class Command:
                 yield f"{self.name} {where} files {argument.files}"
 
     def run(self, words: Sequence[str]) -> int:
-        """Runs the command with its words.
+        """Runs the command with its words; characters of the text that a terminal may act on are escaped.
 
         Returns:
             The exit code: 0, 1 if something went wrong, with the message on stderr, or that of the function.
+
+        Raises:
+            BrokenPipeError: If nobody reads the standard output any more, see `run_command`.
         """
         if {"-h", "--help"} & set(words):
             print(self.section, end="")
@@ -142,12 +147,15 @@ class Command:
         try:
             result = self._function(*words) if self._is_raw else self._call(words)
         except (InterfaceError, OSError) as error:
+            if isinstance(error, BrokenPipeError) and is_output_closed():
+                raise
+            message = printable_lines(str(error))
             if isinstance(error, UsageError):
-                self._parser().error(str(error))
-            print(f"{self.name}: {error}", file=sys.stderr)
+                self._parser().error(message)
+            print(f"{self.name}: {message}", file=sys.stderr)
             return 1
         if isinstance(result, str):
-            print(result)
+            print(printable_lines(result))
         return result if isinstance(result, int) else 0
 
     @property

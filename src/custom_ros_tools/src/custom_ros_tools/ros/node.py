@@ -8,6 +8,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from custom_ros_tools.console.output import is_output_closed
+
 MIN_MEMORY_BYTES = 500_000_000
 """Bytes of address space that NumPy and PyBullet need; with less, they end the process."""
 
@@ -28,7 +30,8 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
 
     Until the function is imported, Ctrl-C ends the process at once, from then on it is a KeyboardInterrupt. A process
     that starts with SIGINT blocked, as by `env --block-signal=INT`, is safe before that too. In a process that ignores
-    SIGINT, as behind the `&` of a script, it stays ignored.
+    SIGINT, as behind the `&` of a script, it stays ignored. When nobody reads its output any more, as behind
+    `| head`, it ends as by SIGPIPE, with 141.
 
     Args:
         main: The function.
@@ -43,9 +46,18 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
     try:
         if heeds:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        sys.exit(call(function))
+        try:
+            code = call(function)
+        finally:
+            sys.stdout.flush()
+        sys.exit(code)
     except KeyboardInterrupt:
         sys.exit(130)
+    except BrokenPipeError:
+        if not is_output_closed():
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python writes when it ends
+        sys.exit(128 + signal.SIGPIPE)
     finally:
         if heeds:  # while Python is ending, too
             signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 
 from .annotations import AlsoTakes as AlsoTakes
 from .annotations import Expects as Expects
@@ -99,7 +99,8 @@ def _within(largest: float, unit: str = "") -> AfterValidator:
     def check(value: Any) -> Any:
         for number in value if isinstance(value, tuple) else (value,):
             if abs(number) > largest:
-                raise ValueError(f"must be within +-{largest:g}{unit and f' [{unit}]'}, got {number:g}")
+                got = f"{number:g}" if isinstance(number, float) else shortened(str(number))
+                raise ValueError(f"must be within +-{largest:g}{unit and f' [{unit}]'}, got {got}")
         return value
 
     return AfterValidator(check)

@@ -4,30 +4,39 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import rosbag
 
-from episodes.errors import DISK_FULL
-from episodes.folder import BAG, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, read_part
+from episodes.errors import DISK_FULL, EpisodeError
+from episodes.farm.job import FARM
+from episodes.folder import BAG, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, file_in, hold, read_part
 from rpbi_utils.bags.clock import MAX_BACK_S
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader
 from rpbi_utils.ros.bags.topic_report import topic_report
 
+MAX_CLOSE_S = 2.0
+"""Longest time to wait for a process that closes the bag of a recorder that was killed [s]."""
 
-def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
+
+def measure_topics(bag: Path, *, any_size: bool = True) -> dict[str, dict[str, Any]]:
     """Returns type, messages, mean rate [Hz] and longest gap [s] of each topic of a bag; a rate of 0 is unknown.
 
     The seal of a topic is the SHA-256 of its messages and their times of recording. A topic whose clock was set back by
     more than 1 s has `set_back_s` [s], too.
 
+    Args:
+        bag: The bag.
+        any_size: Whether it may exceed the limits on bags, see `BagReader`.
+
     Raises:
         BagError: If it cannot be read.
     """
-    report, seals = topic_report(bag, any_size=True), seals_of(bag)
+    report, seals = topic_report(bag, any_size=any_size), seals_of(bag, any_size=any_size)
     return {
         str(topic): {
             "type": str(row["type"]),
@@ -41,14 +50,14 @@ def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def seals_of(bag: Path) -> dict[str, str]:
-    """Returns the seal of each topic of a bag, see `measure_topics`.
+def seals_of(bag: Path, *, any_size: bool = True) -> dict[str, str]:
+    """Returns the seal of each topic of a bag, see `measure_topics`, with the same arguments.
 
     Raises:
         BagError: If it cannot be read.
     """
     digests: dict[str, Any] = {}
-    with BagReader(bag, any_size=True) as opened:
+    with BagReader(bag, any_size) as opened:
         for message in opened.messages(opened.types):
             digest = digests.setdefault(message.topic, hashlib.sha256())
             digest.update(b"%d %d\n" % (message.record_time_ns, len(message.raw)))
@@ -57,13 +66,32 @@ def seals_of(bag: Path) -> dict[str, str]:
 
 
 def repair_all(folder: EpisodeFolder) -> Iterator[str]:
-    """Completes all episodes whose recorder was killed, and yields a sentence for each."""
+    """Completes all episodes whose recorder was killed, and yields a sentence for each.
+
+    Those that another process records are left alone.
+
+    Raises:
+        EpisodeError: If they are of a farm, which makes them again itself.
+    """
+    if os.path.lexists(folder.path / FARM):
+        message = "expected episodes of a recorder, these are of a farm: it makes them again itself"
+        raise EpisodeError(folder.path, message)
     for part in folder.partial():
+        try:
+            handle = hold(part, MAX_CLOSE_S)
+        except BlockingIOError:
+            yield f"{part.name} is being recorded by another process, and left alone"
+            continue
+        except OSError as error:
+            yield f"{part} cannot be repaired: {error.strerror or error}"
+            continue
         try:
             episode = repair(folder, part)
             yield f"episode {episode.number}: {episode.state}: {episode.note}"
-        except OSError as error:
-            yield f"{part} cannot be repaired: {error.strerror or error}"
+        except (EpisodeError, OSError) as error:
+            yield f"{part} cannot be repaired: {error}"
+        finally:
+            os.close(handle)
 
 
 def repair(folder: EpisodeFolder, part: Path) -> Episode:
@@ -74,19 +102,23 @@ def repair(folder: EpisodeFolder, part: Path) -> Episode:
 
     Raises:
         OSError: If it cannot be written; it stays in the temporary folder.
+        EpisodeError: If its bag is a link, a pipe or a device, or has another name outside of the folder; likewise.
     """
     episode = read_part(part)
     fault = f"; {episode.note}" if episode.state == UNREADABLE else ""
-    bag, active = part / BAG, part / f"{BAG}.active"
-    if active.exists():
+    bag = part / BAG
+    active = file_in(part, f"{BAG}.active")
+    if active is not None:
         active.rename(bag)
+    if file_in(part, BAG) is not None and bag.stat().st_nlink > 1:
+        raise EpisodeError(bag, "expected a file with one name, got one with several hard links")
     episode.state = "recovered"
     try:
         if not bag.exists():
             raise BagError(bag, "there is none")
         if not _is_complete(bag):
             _reindex(bag)
-        episode.topics = measure_topics(bag)
+        episode.topics = measure_topics(bag, any_size=False)
         episode.note = f"the recorder was killed, {episode.messages} messages recovered"
         sent = sum(episode.published.values())
         if sent:
@@ -103,7 +135,7 @@ def repair(folder: EpisodeFolder, part: Path) -> Episode:
 
 def _is_complete(bag: Path) -> bool:
     try:
-        with BagReader(bag, any_size=True):
+        with BagReader(bag):
             return True
     except BagError:
         return False

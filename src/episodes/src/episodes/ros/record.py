@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import re
 import threading
 import time
@@ -30,8 +31,9 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from episodes.config import RecordParameters
 from episodes.errors import EpisodeError
-from episodes.files import store_files
-from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, versions, write_facts
+from episodes.facts import checked_label
+from episodes.files import folders_of_world, store_files
+from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, hold, versions, write_facts
 from episodes.listing import clock_note
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi_utils.bags.errors import BagError
@@ -43,6 +45,8 @@ CHECK_HZ = 1.0
 """Rate of checks of disk, recorder and counters, and of the status [Hz]."""
 MAX_HASH_WAIT_S = 1.5
 """Longest time to wait for the hash of a state at the end of an episode [s]."""
+MAX_LOCK_WAIT_S = 1.0
+"""Longest time to wait for the lock of a new episode, which a listing holds for a moment [s]."""
 MAX_RESET_WAIT_S = 10.0
 """Longest time to wait for the state after a reset [s]."""
 POLL_S = 0.01
@@ -148,6 +152,7 @@ class RecordNode:
         self._part = Path()
         self._episode = Episode(-1)
         self._begin_s = 0.0
+        self._part_lock = -1
         self._status = rospy.Publisher("~status", String, queue_size=1, latch=True)
         for sentence in repair_all(self._folder):
             rospy.logwarn("%s", sentence)
@@ -197,7 +202,7 @@ class RecordNode:
         with self._lock:
             if self._episode.number < 0:
                 raise EpisodeError(self._folder.path, "nothing to label: this node has not recorded an episode")
-            self._episode.label = label
+            self._episode.label = checked_label(label)
             if self._recorder is not None:
                 write_facts(self._part, self._episode)
             else:
@@ -212,7 +217,9 @@ class RecordNode:
 
     def _begin(self, topics: list[str]) -> None:
         parameters = self._parameters
-        files, faults = store_files(self._simulator.description, self._folder.files)
+        description = self._simulator.description
+        folders = [*folders_of_world(description), *(Path(each).expanduser() for each in parameters.copy_from)]
+        files, faults = store_files(description, self._folder.files, folders)
         self._episode, self._part = self._folder.begin(
             started=datetime.now().astimezone().isoformat(timespec="seconds"),
             namespace=parameters.namespace,
@@ -222,7 +229,9 @@ class RecordNode:
             files=files,
             note="; ".join(faults),
         )
-        recorder = Recorder(self._part / BAG, topics, min_space_mb=parameters.disk_reserve_mb / 2.0)
+        part_lock = hold(self._part, MAX_LOCK_WAIT_S)
+        space_mb = parameters.disk_reserve_mb / 2.0
+        recorder = Recorder(self._part / BAG, topics, min_space_mb=space_mb, handles=(part_lock,))
         try:
             recorder.start()
             if fault := self._simulator.write_commands(self._part / EARLIER):
@@ -230,11 +239,21 @@ class RecordNode:
                 self._episode.note = "; ".join(filter(None, (self._episode.note, fault)))
         except BaseException as error:
             self._episode.state, self._episode.note = "incomplete", str(error)
-            self._folder.complete(self._part, self._episode)
+            try:
+                self._folder.complete(self._part, self._episode)
+            finally:
+                os.close(part_lock)
             raise
-        self._recorder, self._begin_s = recorder, time.monotonic()
+        self._recorder, self._part_lock, self._begin_s = recorder, part_lock, time.monotonic()
 
     def _end(self, state: str, note: str) -> str:
+        """Ends the episode that is recorded, and returns a sentence."""
+        try:
+            return self._ended(state, note)
+        finally:
+            os.close(self._part_lock)
+
+    def _ended(self, state: str, note: str) -> str:
         assert self._recorder is not None
         recorder, self._recorder = self._recorder, None
         episode = self._episode
@@ -246,6 +265,9 @@ class RecordNode:
             episode.topics = measure_topics(self._part / BAG)
             late = sorted(set(_existing_topics(self._topics)) - set(recorder.topics))
             notes = [episode.note, note, f"began later, not recorded: {', '.join(late)}" if late else ""]
+            if recorder.missing and episode.lost:
+                episode.state = "incomplete"
+                notes.append(f"{sum(episode.lost.values())} messages lost: the recorder did not read them at the end")
             episode.note = "; ".join(filter(None, notes))
         except BagError as error:
             return self._repair(error)

@@ -10,7 +10,7 @@ import pandas as pd
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from episodes.errors import EpisodeError
-from episodes.folder import BAG, FACTS, UNREADABLE, EpisodeFolder
+from episodes.folder import BAG, FACTS, UNREADABLE, EpisodeFolder, file_in
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
 
 EPISODE = "episode"
@@ -49,8 +49,9 @@ def episodes_to_dataframes(
         chosen = None if wanted is None else sorted(wanted & episode.topics.keys())
         if not episode.topics or chosen == []:
             continue
-        bag = folder.folder_of(episode.number) / BAG
+        place = folder.folder_of(episode.number)
         try:
+            bag = file_in(place, BAG) or place / BAG
             found = bag_to_dataframes(bag, chosen, images=images, any_size=any_size)
         except InterfaceError as error:
             faults.append(str(error))

@@ -17,14 +17,29 @@ from custom_ros_tools.foreign import printable
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
 from episodes.files import changed_files, newer_files, with_stored_files
-from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder
+from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
 from rpbi.replay.session import Replay, ReplayResult
-from rpbi_utils.ros.replay.recorded_session import read_recording
+from rpbi_utils.ros.replay.recorded_session import MAX_TICKS, read_recording, require_few_ticks
 
 from .bags import seals_of
 from .comparison import Comparison
 
 _PROGRAM = "import sys; from episodes.ros.verification import main; main(sys.argv[1:])"
+
+
+class ReplayLimits(NamedTuple):
+    """Limits on a recording, as those of `replay`.
+
+    Attributes:
+        max_ticks: Largest number of ticks.
+        any_size: Whether its bag may exceed the limits of `BagReader`.
+    """
+
+    max_ticks: int = MAX_TICKS
+    any_size: bool = False
+
+
+USUAL_LIMITS = ReplayLimits()
 
 
 class Verdict(NamedTuple):
@@ -45,7 +60,9 @@ class Verdict(NamedTuple):
     notes: Sequence[str] = ()
 
 
-def verify_all(folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str]) -> Iterator[Verdict]:
+def verify_all(
+    folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str], limits: ReplayLimits = USUAL_LIMITS
+) -> Iterator[Verdict]:
     """Simulates episodes again, each in a process of its own, and yields the results in order.
 
     Args:
@@ -53,13 +70,14 @@ def verify_all(folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: 
         numbers: The episodes.
         jobs: Number of processes at once.
         trust: Python packages that the episodes may import, for types of the user's own.
+        limits: Limits on each episode.
     """
     with ThreadPoolExecutor(jobs) as pool:
-        yield from pool.map(partial(_verify_in_process, folder, trust), numbers)
+        yield from pool.map(partial(_verify_in_process, folder, trust, limits), numbers)
 
 
-def _verify_in_process(folder: EpisodeFolder, trust: Sequence[str], number: int) -> Verdict:
-    command = [sys.executable, "-c", _PROGRAM, str(folder.path), str(number), *trust]
+def _verify_in_process(folder: EpisodeFolder, trust: Sequence[str], limits: ReplayLimits, number: int) -> Verdict:
+    command = [sys.executable, "-c", _PROGRAM, str(folder.path), str(number), json.dumps(limits), *trust]
     done = subprocess.run(command, capture_output=True, text=True)
     try:
         return Verdict(*json.loads(done.stdout.splitlines()[-1]))
@@ -72,14 +90,14 @@ def main(words: Sequence[str]) -> None:
     """Verifies one episode and prints the result as JSON.
 
     Args:
-        words: Folder, number, and packages to trust.
+        words: Folder, number, limits as JSON, and packages to trust.
     """
-    path, number, *trust = words
+    path, number, limits, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
-    print(f"\n{json.dumps(verify(EpisodeFolder(path), int(number)))}", flush=True)
+    print(f"\n{json.dumps(verify(EpisodeFolder(path), int(number), ReplayLimits(*json.loads(limits))))}", flush=True)
 
 
-def verify(folder: EpisodeFolder, number: int) -> Verdict:
+def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS) -> Verdict:
     """Simulates an episode again in this process, with the files that are stored with it."""
     try:
         episode = folder.read(number)
@@ -88,7 +106,7 @@ def verify(folder: EpisodeFolder, number: int) -> Verdict:
     notes = [f"note: {each}" for each in newer_files(episode.files)]
     try:
         changed = list(changed_files(episode.files, folder.files))
-        is_same, text, own_notes = _replay(folder, episode)
+        is_same, text, own_notes = _replay(folder, episode, limits)
         notes += own_notes
     except (InterfaceError, OSError) as error:
         return Verdict(number, False, "; ".join(str(error).splitlines()), episode.label, notes)
@@ -98,35 +116,36 @@ def verify(folder: EpisodeFolder, number: int) -> Verdict:
     return Verdict(number, is_same and not changed, "; ".join([*changed, text]), episode.label, notes)
 
 
-def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str, list[str]]:
+def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits) -> tuple[bool, str, list[str]]:
     """Returns whether an episode is the same, the comparison in words, and notes."""
     place = folder.folder_of(episode.number)
-    if not (place / BAG).exists():
+    bag = file_in(place, BAG)
+    if bag is None:
         raise EpisodeError(place, episode.note or "has no bag")
-    earlier = place / EARLIER
     with tempfile.TemporaryDirectory(prefix="verify-") as files:
         recording = read_recording(
-            place / BAG,
+            bag,
             episode.namespace,
-            any_size=True,
-            earlier=earlier if earlier.exists() else None,
+            any_size=limits.any_size,
+            earlier=file_in(place, EARLIER),
             relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
         )
-        with Comparison(place / BAG, episode.namespace) as comparison:
+        require_few_ticks(bag, recording, limits.max_ticks)
+        with Comparison(bag, episode.namespace) as comparison:
             result = Replay(recording, observe=comparison.observe).run()
-    faults, notes = _message_faults(place / BAG, episode, comparison)
+    faults, notes = _message_faults(bag, episode, comparison, limits.any_size)
     words = [*recording.description.warnings, *faults, _words(result, comparison, bool(faults))]
     return result.difference is None and not result.left_out and not faults, "; ".join(words), notes
 
 
-def _message_faults(bag: Path, episode: Episode, comparison: Comparison) -> tuple[list[str], list[str]]:
+def _message_faults(bag: Path, episode: Episode, comparison: Comparison, any_size: bool) -> tuple[list[str], list[str]]:
     """Returns sentences on topics that were changed, and notes on those that only the replay has otherwise.
 
     The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
     They are a fault unless the seal of their topic is whole.
     """
     seals = {topic: each[SEAL] for topic, each in episode.topics.items() if SEAL in each}
-    found = seals_of(bag) if seals else {}
+    found = seals_of(bag, any_size=any_size) if seals else {}
     broken = {topic for topic in seals.keys() | found.keys() if seals.get(topic) != found.get(topic)}
     faults, notes = [], []
     for topic, each in sorted(comparison.differences.items()):

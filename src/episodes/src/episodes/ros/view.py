@@ -12,7 +12,7 @@ import pandas as pd
 
 from episodes.errors import EpisodeError
 from episodes.files import with_stored_files
-from episodes.folder import BAG, EARLIER, EpisodeFolder
+from episodes.folder import BAG, EARLIER, EpisodeFolder, file_in
 from episodes.view.bodies import add_later_bodies, links_of
 from episodes.view.forces import contact_arrows, force_panels, wrench_arrows
 from episodes.view.frames import Frames
@@ -45,15 +45,15 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
         ConfigError: If its world cannot be built.
     """
     episode, place = folder.read(number), folder.folder_of(number)
-    bag, earlier = place / BAG, place / EARLIER
-    if not bag.exists():
+    bag = file_in(place, BAG)
+    if bag is None:
         raise EpisodeError(place, episode.note or "has no bag")
     with tempfile.TemporaryDirectory(prefix="view-") as files:
         recording = read_recording(
             bag,
             episode.namespace,
             any_size,
-            earlier=earlier if earlier.exists() else None,
+            earlier=file_in(place, EARLIER),
             relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
             needs_states=False,
         )

@@ -5,9 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument, UsageError
-from episodes.errors import EpisodeError
-from episodes.farm.job import FARM
-from episodes.folder import EpisodeFolder
+from episodes.folder import EpisodeFolder, is_held
 from episodes.listing import details_of, table_of
 from episodes.ros.bags import repair_all
 
@@ -27,7 +25,7 @@ def episodes(
         show: all that is stored of an episode, with its topics
         discard: moves an episode into DIR/discarded
         relabel: gives an episode another label
-        repair: completes episodes whose recorder was killed; not while a node records into DIR
+        repair: completes episodes whose recorder was killed; those that are being recorded are left alone
     """
     given = EpisodeFolder(folder)
     if show is not None:
@@ -40,11 +38,11 @@ def episodes(
         episode = given.relabel(int(relabel[0]), relabel[1])
         return f"episode {episode.number}: {episode.label}"
     if repair:
-        if (folder / FARM).exists():
-            raise EpisodeError(
-                folder, "expected episodes of a recorder, these are of a farm: it makes them again itself"
-            )
         return "\n".join(repair_all(given)) or "nothing to repair"
     text = table_of(given.all())
-    left = len(given.partial())
-    return f"{text}\n{left} more: being recorded, or its recorder was killed (--repair)" if left else text
+    parts = given.partial()
+    active = sum(map(is_held, parts))
+    lines = [f"{active} more: being recorded"] if active else []
+    if killed := len(parts) - active:
+        lines.append(f"{killed} more: the recorder was killed (--repair)")
+    return "\n".join([text, *lines])

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import yaml
 
 from custom_ros_tools.console.argument import Argument, UsageError, number
+from custom_ros_tools.foreign import printable
 from episodes.datasets.formats import FORMATS
 from episodes.folder import EpisodeFolder
 from episodes.ros.export.folder import Wish, export_folder
@@ -26,6 +27,7 @@ def export(
     images: Annotated[Sequence[str] | None, Argument("[TOPIC ...]")] = None,
     option: Annotated[Sequence[str], Argument("KEY=VALUE ...")] = (),
     disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
+    any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
     """Exports the episodes of a folder as a data set of another project.
 
@@ -37,7 +39,7 @@ def export(
     Usage:
         ./rpbi export DIR [--to FORMAT] [--out DIR] [--fps N] [--task TEXT] [--label LABEL ...]
                       [--state TOPIC ...] [--action TOPIC ...] [--images [TOPIC ...]]
-                      [--option KEY=VALUE ...] [--disk-reserve-mb MB]
+                      [--option KEY=VALUE ...] [--disk-reserve-mb MB] [--any-size]
 
     Args:
         folder: of the episodes
@@ -51,18 +53,19 @@ def export(
         images: topics of images; all cameras without it, none without a topic
         option: options of the format, such as preset=slow
         disk_reserve_mb: free space of the disk that is never used; 200 without it
+        any_size: also bags that unfold to more than 1 GiB and 255 times their size
     """
     if fps < 1:
         raise UsageError(f"--fps: expected at least 1, got {fps}")
     found = FORMATS.configured(to, "--to")
     made: Any = found
     choice = Choice(*(None if each is None else tuple(each) for each in (state, action, images)))
-    wish = Wish(fps, task or folder.absolute().name, tuple(label), choice, disk_reserve_mb)
+    wish = Wish(fps, task or folder.absolute().name, tuple(label), choice, disk_reserve_mb, any_size)
     target = out or folder.absolute().with_name(f"{folder.absolute().name}_{to.rpartition(':')[2]}")
     format_ = made(made.Config.parse(_options(option), "--option"))
     result = export_folder(EpisodeFolder(folder), target, to, format_, wish, lambda line: print(line, flush=True))
     for fault in result.faults:
-        print(fault)
+        print(printable(fault))
     count = len(result.exported)
     print(f"{target} has {count} episode{'s' * (count != 1)}")
     return 1 if result.faults else 0

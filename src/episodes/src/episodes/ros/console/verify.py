@@ -5,8 +5,13 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.foreign import printable
 from episodes.folder import EpisodeFolder
-from episodes.ros.verification import verify_all
+from episodes.ros.verification import ReplayLimits, verify_all
+from rpbi_utils.ros.replay.recorded_session import MAX_TICKS
+
+MAX_LINE = 10_000
+"""Characters of the line of an episode."""
 
 
 def verify(
@@ -14,6 +19,8 @@ def verify(
     *,
     jobs: Annotated[int, Argument("N", parse=int)] = 1,
     trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+    max_ticks: Annotated[int, Argument("N", parse=int)] = MAX_TICKS,
+    any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
     """Simulates recorded episodes again and compares their states, with the files that are stored with them.
 
@@ -24,15 +31,18 @@ def verify(
         folder: of the episodes
         jobs: episodes at once, each in a process of its own; 1 without it
         trust: Python packages that the episodes may import, for types of your own
+        max_ticks: episodes of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
+        any_size: also bags that unfold to more than 1 GiB and 255 times their size
     """
     if jobs < 1:
         raise UsageError(f"--jobs: expected at least 1, got {jobs}")
     episodes = EpisodeFolder(folder)
     numbers = episodes.numbers()
     same = 0
-    for verdict in verify_all(episodes, numbers, jobs, trust):
+    for verdict in verify_all(episodes, numbers, jobs, trust, ReplayLimits(max_ticks, any_size)):
         label = f" ({verdict.label})" if verdict.label else ""
-        print("; ".join([f"episode {verdict.number}{label}: {verdict.text}", *verdict.notes]), flush=True)
+        line = "; ".join([f"episode {verdict.number}{label}: {verdict.text}", *verdict.notes])
+        print(printable(line, MAX_LINE), flush=True)
         same += verdict.is_same
     print(f"{same} of {len(numbers)} episodes are the same")
     return 0 if numbers and same == len(numbers) else 1

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
@@ -41,11 +42,16 @@ def view(
     is_folder = recording.is_dir()
     if is_folder == (number is None):
         raise UsageError(f"expected a folder and the number of an episode, or a bag, got {recording}")
-    if number is not None:
-        scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
-    else:
-        scene = scene_of_bag(recording, ns, any_size=any_size)
-    page, scene = page_of(scene)
+    try:
+        if number is not None:
+            scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
+        else:
+            scene = scene_of_bag(recording, ns, any_size=any_size)
+        page, scene = page_of(scene)
+    except (InterfaceError, OSError):
+        raise
+    except Exception as error:  # a bag may have anything in it
+        raise EpisodeError(recording, f"cannot be shown: {type(error).__name__}: {error}") from error
     target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -24,7 +24,7 @@ from episodes.datasets.format import (
 )
 from episodes.datasets.provenance import remove_episode, write_episode, write_export
 from episodes.errors import DISK_FULL, EpisodeError
-from episodes.folder import BAG, Episode, EpisodeFolder
+from episodes.folder import BAG, Episode, EpisodeFolder, file_in
 
 from .signals import Choice, Signal
 from .source import SourceEpisode
@@ -39,6 +39,7 @@ class Wish(NamedTuple):
         labels: Labels of the episodes to export; empty for all.
         choice: Topics of features.
         disk_reserve_mb: Free space of the disk that is never used [MB].
+        any_size: Whether bags may exceed the limits of `BagReader`.
     """
 
     fps: int
@@ -46,6 +47,7 @@ class Wish(NamedTuple):
     labels: tuple[str, ...] = ()
     choice: Choice = Choice()
     disk_reserve_mb: float = 200.0
+    any_size: bool = False
 
 
 @dataclass
@@ -127,14 +129,16 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
             if wish.labels and episode.label not in wish.labels:
                 continue
             _require_complete(folder, episode)
-            source = SourceEpisode(folder, episode, wish.choice, wish.task)
+            source = SourceEpisode(folder, episode, wish.choice, wish.task, wish.any_size)
             if format_.has_rows:
                 source.signals, source.cameras  # noqa: B018 (reads the bag)
                 _forget(source)
             elif episode.set_back_s:
                 raise EpisodeError(source.bag, f"a clock was set back by {episode.set_back_s:.6g} s")
+            else:
+                source.check()
             sources.append(source)
-        except (InterfaceError, OSError, ValueError) as error:
+        except Exception as error:  # an episode may have anything in it
             result.faults.append(_fault(number, error))
     if not sources:
         wanted = f" with the label {' or '.join(wish.labels)}" if wish.labels else ""
@@ -161,9 +165,9 @@ def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFe
 def _require_complete(folder: EpisodeFolder, episode: Episode) -> None:
     if episode.state == "incomplete":
         raise EpisodeError(folder.folder_of(episode.number), f"is incomplete: {episode.note}")
-    bag = folder.folder_of(episode.number) / BAG
-    if not bag.exists():
-        raise EpisodeError(bag, "there is none")
+    place = folder.folder_of(episode.number)
+    if file_in(place, BAG) is None:
+        raise EpisodeError(place / BAG, "there is none")
 
 
 def _add_all(
@@ -188,7 +192,7 @@ def _add_all(
                 source.use(plan.schema, plan.signals)
             facts = source.facts()
             facts |= format_.add(index, source)
-        except (InterfaceError, OSError, ValueError) as error:
+        except Exception as error:  # as above
             result.faults.append(_fault(number, error))
             if getattr(error, "errno", None) in DISK_FULL:
                 result.faults += _not_exported(plan.sources[position + 1 :])
@@ -245,7 +249,8 @@ def _forget(source: SourceEpisode) -> None:
 
 
 def _fault(number: int, error: Exception) -> str:
-    return f"episode {number}: {'; '.join(str(error).splitlines())}"
+    kind = "" if isinstance(error, (InterfaceError, OSError, ValueError)) else f"{type(error).__name__}: "
+    return f"episode {number}: {kind}{'; '.join(str(error).splitlines())}"
 
 
 def _facts(folder: EpisodeFolder, name: str, wish: Wish, plan: _Plan, result: Result) -> dict[str, object]:

@@ -50,14 +50,21 @@ class SourceEpisode(ExportedEpisode):
         episode: The episode.
         choice: Topics that the user names.
         task: The task in words.
+        any_size: Whether its bag may exceed the limits of `BagReader`.
     """
 
-    def __init__(self, folder: EpisodeFolder, episode: Episode, choice: Choice, task: str) -> None:
+    def __init__(
+        self, folder: EpisodeFolder, episode: Episode, choice: Choice, task: str, any_size: bool = False
+    ) -> None:
         self.folder, self.episode, self.task, self.label = folder, episode, task, episode.label
         self.bag: Path = folder.folder_of(episode.number) / BAG
-        self._choice = choice
+        self._choice, self._any_size = choice, any_size
         self._schema = Schema(0, ())
         self._signals: tuple[Signal, ...] = ()
+
+    def check(self) -> None:
+        """Raises a BagError unless its bag can be read, within the limits."""
+        BagReader(self.bag, any_size=self._any_size).__exit__()
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -207,7 +214,7 @@ class SourceEpisode(ExportedEpisode):
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
         topics = wanted_topics(self._types, self._choice)
-        tables = bag_to_dataframes(self.bag, topics, any_size=True, nanoseconds=True) if topics else {}
+        tables = bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
         return by_frame(tables)
@@ -220,7 +227,7 @@ class SourceEpisode(ExportedEpisode):
             DatasetError: If a topic with features has several, or its clock was set back.
         """
         found = {}
-        with BagReader(self.bag, any_size=True) as bag:
+        with BagReader(self.bag, any_size=self._any_size) as bag:
             for topic, types in bag.types.items():
                 kinds = sorted({each.name for each in types})
                 if is_used(topic, kinds, self._choice):
@@ -242,7 +249,7 @@ class SourceEpisode(ExportedEpisode):
     def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
         """Yields a function that returns the pixels, and the stamp [ns], of each image, in the order of stamps."""
         waiting: list[tuple[int, int, BagMessage]] = []
-        with BagReader(self.bag, any_size=True) as bag:
+        with BagReader(self.bag, any_size=self._any_size) as bag:
             latest = 0
             for number, message in enumerate(bag.messages([topic])):
                 stamp = message_time_ns(message)
@@ -258,7 +265,7 @@ class SourceEpisode(ExportedEpisode):
         topic = f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
         if topic not in self._types:
             return
-        table = bag_to_dataframes(self.bag, topic, any_size=True)[topic]
+        table = bag_to_dataframes(self.bag, topic, any_size=self._any_size)[topic]
         if "state_hash" not in table:
             return
         for row in table[table["state_hash"].astype(bool)].itertuples():

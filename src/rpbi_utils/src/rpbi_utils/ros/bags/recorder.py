@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ _QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
 """Number, spacing [s] and duration [s] of checks that find the recorder idle at the end, to let the last messages
 arrive. Several checks, since a single time span might pass while the machine stands still.
 """
+_ACTIVE = ".active"
 _DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
 _numbers = itertools.count()
 
@@ -53,6 +54,11 @@ class Recorder:
         topics: Topics to record; relative names are resolved in the namespace of this process.
         timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
         min_space_mb: Free space of the disk below which the recording ends [MB].
+        handles: File handles that the process of the recorder holds open, too, such as of a lock.
+
+    Attributes:
+        missing: Number of messages that had been sent when it was stopped and that have not arrived, since its process
+            stood still for too long.
     """
 
     def __init__(
@@ -62,6 +68,7 @@ class Recorder:
         *,
         timeout_s: float = 30.0,
         min_space_mb: float = 1000.0,
+        handles: Collection[int] = (),
     ) -> None:
         self.path = Path(path)
         if self.path.suffix != ".bag":
@@ -71,6 +78,8 @@ class Recorder:
         self.topics = sorted({resolve_name(topic, get_ros_namespace()) for topic in topics})
         self._timeout_s = timeout_s
         self._min_space_mb = min_space_mb
+        self._handles = tuple(handles)
+        self.missing = 0
         self._node = f"/recorder_{os.getpid()}_{next(_numbers)}"
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -119,6 +128,7 @@ class Recorder:
         # SIGTERM has it close the bag; SIGINT is blocked in children of nodes
         environment = {key: value for key, value in os.environ.items() if key != "ROS_NAMESPACE"}
         options: dict[str, Any] = {"stdout": self._output, "stderr": subprocess.STDOUT, "env": environment}
+        options["pass_fds"] = self._handles
         self._process = start_child(self._command(), signal.SIGTERM, **options)
         try:
             self._wait_until_connected()
@@ -138,7 +148,7 @@ class Recorder:
         self._wait_until_quiet()
         died = not self.is_running
         closed = self._end()
-        active = self.path.with_name(self.path.name + ".active")
+        active = self.path.with_name(self.path.name + _ACTIVE)
         self._raise_if_not_writing()
         if died:
             raise RecordingError(self.path, f"the recorder ended early{self._last_line()}{_what_is_left(active)}")
@@ -173,14 +183,23 @@ class Recorder:
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
 
     def _wait_until_received(self) -> None:
-        """Waits for all that was sent before: TCP may rest for seconds after the recorder got no processor time."""
+        """Waits for all that was sent before: TCP may rest for seconds after the recorder got no processor time.
+
+        It waits as long as messages arrive, and a while longer for a process that does not even answer.
+        """
+        wanted, last = self.published(), -1
+        answer_end = time.monotonic() + self._timeout_s
         deadline = time.monotonic() + _MOST_GRACE_S
-        wanted = self.published()
-        while self.is_running and time.monotonic() < deadline:
+        while self.is_running and time.monotonic() < (answer_end if last < 0 else deadline):
             arrived = count_received(self._node)
-            if arrived is None or all(arrived.get(topic, 0) >= count for topic, count in wanted.items()):
-                return
+            if arrived is not None:
+                self.missing = sum(max(0, count - arrived.get(topic, 0)) for topic, count in wanted.items())
+                if not self.missing:
+                    return
+                if (total := sum(arrived.values())) > last:
+                    last, deadline = total, time.monotonic() + _MOST_GRACE_S
             time.sleep(_POLL_S)
+        self.missing = self.missing or sum(wanted.values())
 
     def _wait_until_quiet(self) -> None:
         assert self._process is not None
@@ -190,17 +209,29 @@ class Recorder:
             turns += _is_asleep(self._process.pid)
 
     def _end(self) -> bool:
-        """Ends the process; returns whether it did so by itself."""
+        """Ends the process, which may write for as long as its file grows; returns whether it did so by itself."""
         assert self._process is not None and self._process.stdin is not None
         self._process.send_signal(signal.SIGTERM)
+        size = self._written()
         try:
-            return self._process.wait(self._timeout_s) == 0
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-            return False
+            while True:
+                try:
+                    return self._process.wait(self._timeout_s) == 0
+                except subprocess.TimeoutExpired:
+                    if (now := self._written()) == size:
+                        self._process.kill()
+                        self._process.wait()
+                        return False
+                    size = now
         finally:
             self._process.stdin.close()
+
+    def _written(self) -> int:
+        """Returns the size of the bag that is being written [bytes]; -1 if it is closed."""
+        try:
+            return self.path.with_name(self.path.name + _ACTIVE).stat().st_size
+        except OSError:
+            return -1
 
     def _raise_if_not_writing(self) -> None:
         for line in self._lines():

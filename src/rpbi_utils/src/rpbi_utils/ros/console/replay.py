@@ -13,10 +13,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.plugins import trust_only
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_utils.bags.errors import BagError
-from rpbi_utils.ros.replay.recorded_session import read_recording
-
-MAX_TICKS = 20_000_000
-"""Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+from rpbi_utils.ros.replay.recorded_session import MAX_TICKS, read_recording, require_few_ticks
 
 
 def replay(
@@ -46,11 +43,7 @@ def replay(
         recording = read_recording(bag, ns, any_size)
         for warning in recording.description.warnings:
             print(f"replay: warning: {warning}", file=sys.stderr)
-        last_ticks = {each.resets: each.tick for each in sorted(recording.checkpoints)}
-        ticks = sum(last_ticks.values())
-        if ticks > max_ticks:
-            message = f"expected at most {max_ticks} ticks, got states that are {ticks} ticks from the start"
-            raise BagError(bag, f"{message}; --max-ticks {ticks}, if you know who made it")
+        ticks = require_few_ticks(bag, recording, max_ticks)
         with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=quiet) as bar:
             result = Replay(recording, bar.update).run()
     except (InterfaceError, OSError):

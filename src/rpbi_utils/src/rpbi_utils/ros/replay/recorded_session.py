@@ -14,6 +14,8 @@ from rpbi.world.saved.description import WorldDescription
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader
 
+MAX_TICKS = 20_000_000
+"""Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
 _TYPES: dict[str, Any] = {
     "rpbi/world_description": String,
     "rpbi/state": SimulationState,
@@ -76,6 +78,25 @@ def read_recording(
         return Recording(WorldDescription(relocate(descriptions[0])), commands, checkpoints)
     except ValueError as error:
         raise BagError(path, str(error)) from None
+
+
+def require_few_ticks(path: Path, recording: Recording, max_ticks: int) -> int:
+    """Returns the number of ticks of a recording, all its resets together.
+
+    Args:
+        path: Its bag, for the message.
+        recording: The recording.
+        max_ticks: The largest number.
+
+    Raises:
+        BagError: If it has more.
+    """
+    last_ticks = {each.resets: each.tick for each in sorted(recording.checkpoints)}
+    ticks = sum(last_ticks.values())
+    if ticks > max_ticks:
+        message = f"expected at most {max_ticks} ticks, got states that are {ticks} ticks from the start"
+        raise BagError(path, f"{message}; --max-ticks {ticks}, if you know who made it")
+    return ticks
 
 
 def _read_commands(path: Path, topic: str, any_size: bool, commands: _Commands) -> None:
