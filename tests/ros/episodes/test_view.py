@@ -117,6 +117,7 @@ def episode(module_ros: RosSystem, tmp_path_factory: pytest.TempPathFactory) -> 
     states = ros.listen("/rpbi/state", SimulationState)
     demos = EpisodeFolder(place / "demos")
     rospy.set_param("/record/folder", str(demos.path))
+    rospy.set_param("/record/copy_from", [str(place)])
     ros.start(["rosrun", "episodes", "record_node.py"])
     wait_until(lambda: ros.call("/record/start", Trigger).success, "it records")
 
