@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from robot_model.geometry import Vector
 
@@ -44,8 +45,9 @@ class Identification(NamedTuple):
 
     Attributes:
         payload: The payload, with the sensor's offsets.
-        mass_sd: Standard deviation of its mass [kg].
-        centre_sd: Largest standard deviation of a coordinate of its centre [m].
+        mass_sd: Standard deviation of its mass [kg]: the truth is within two of them in 95 % of cases, also with few
+            poses.
+        centre_sd: The same of a coordinate of its centre, the largest one [m]; that of the mass is part of it.
         force_residual: Root mean square of the residual forces [N].
         torque_residual: Root mean square of the residual torques [N m].
         poses: Number of poses.
@@ -80,7 +82,7 @@ def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameter
     gravity = np.array([each.gravity for each in samples])
     forces, torques = np.split(np.array([each.wrench for each in samples]), 2, axis=1)
     _check_spread((gravity - gravity.mean(axis=0)) / limits.gravity)
-    mass, mass_sd, force_offset, force_residual = _fit(-gravity[..., np.newaxis], forces)
+    mass, (mass_sd,), force_offset, force_residual = _fit(-gravity[..., np.newaxis], forces)
     moment, moment_sd, torque_offset, torque_residual = _fit(_cross(gravity), torques)
     for kind, unit, residual, most in (
         ("force", "N", force_residual, limits.max_residual_force),
@@ -93,15 +95,15 @@ def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameter
             )
     if abs(mass[0]) < max(MIN_SIGNIFICANCE * mass_sd, MIN_MASS_KG):
         raise UndeterminedError(f"expected a payload, got a mass of {mass[0]:.2g} kg (+-{mass_sd:.2g})")
+    centre = moment / mass[0]
+    centre_sd = float(np.hypot(moment_sd, centre * mass_sd).max()) / abs(float(mass[0]))
     payload = PayloadConfig(
         mass=float(mass[0]),
-        centre=tuple((moment / mass[0]).tolist()),
+        centre=tuple(centre.tolist()),
         force_offset=tuple(force_offset.tolist()),
         torque_offset=tuple(torque_offset.tolist()),
     )
-    return Identification(
-        payload, mass_sd, moment_sd / abs(float(mass[0])), force_residual, torque_residual, len(samples)
-    )
+    return Identification(payload, mass_sd, centre_sd, force_residual, torque_residual, len(samples))
 
 
 def _check_spread(directions: Array) -> None:
@@ -115,7 +117,7 @@ def _check_spread(directions: Array) -> None:
         )
 
 
-def _fit(factors: Array, values: Array) -> tuple[Array, float, Array, float]:
+def _fit(factors: Array, values: Array) -> tuple[Array, Array, Array, float]:
     """Fits `values = offset + factors @ x`.
 
     Args:
@@ -123,16 +125,18 @@ def _fit(factors: Array, values: Array) -> tuple[Array, float, Array, float]:
         values: Shape (N, 3).
 
     Returns:
-        x, shape (P,), its largest standard deviation, the offset, shape (3,), and the residual's root mean square.
+        x, shape (P,), its standard deviations, the offset, shape (3,), and the residual's root mean square. Twice a
+        standard deviation is a confidence interval of 95 % by Student's distribution, since the noise is estimated.
     """
     count, _, parameters = factors.shape
     A = (factors - factors.mean(axis=0)).reshape(3 * count, parameters)
     b = (values - values.mean(axis=0)).ravel()
     x = np.linalg.lstsq(A, b, rcond=None)[0]
     residual = b - A @ x
-    variance = float(residual @ residual) / (3 * count - parameters - 3)
-    deviation = float(np.sqrt(variance * np.linalg.inv(A.T @ A).diagonal().max()))
-    return x, deviation, values.mean(axis=0) - factors.mean(axis=0) @ x, float(np.sqrt(np.mean(residual**2)))
+    freedom = 3 * count - parameters - 3
+    variance = float(residual @ residual) / freedom
+    deviations = 0.5 * stdtrit(freedom, 0.975) * np.sqrt(variance * np.linalg.inv(A.T @ A).diagonal())
+    return x, deviations, values.mean(axis=0) - factors.mean(axis=0) @ x, float(np.sqrt(np.mean(residual**2)))
 
 
 def _cross(vectors: Array) -> Array:
