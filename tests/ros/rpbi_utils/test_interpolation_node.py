@@ -101,6 +101,29 @@ def test_joints_pause_repetitions_and_bad_waypoints(ros):
         assert motion()[len(got) + len(again)].position[0] == pytest.approx(0.0, abs=0.05), "from the first waypoint"
 
 
+JOINT = (
+    '<joint name="{0}" type="continuous"><parent link="{1}"/><child link="{0}_link"/><axis xyz="0 0 1"/>'
+    '<limit effort="1" velocity="1.5"/></joint><link name="{0}_link"/>'
+)
+ROBOT = f'<robot name="r"><link name="base"/>{JOINT.format("a", "base")}{JOINT.format("b", "a_link")}</robot>'
+
+
+def test_joints_keep_the_speeds_of_robot_description(ros):
+    rospy.set_param("robot_description", ROBOT)
+    start(ros, JOINTS)
+    motion, rosout = Motion(ros), Rosout(ros)
+    rosout.wait_to_hear("/interpolation")
+    with publishing(TOPIC, Float64MultiArray) as waypoints:
+        waypoints.publish(message([[0, 1], [0, 1], [0, -2]]))  # joint b would reach 3 rad/s
+        got = motion.wait_until_over(1.0)
+    assert max(abs(each.velocity[1]) for each in got) == pytest.approx(1.5, rel=0.01)
+    assert (got[-1].header.stamp - got[0].header.stamp).to_sec() == pytest.approx(2.0, abs=0.01)
+    slowed = (
+        "(limits): the motion takes 2 times as long, to keep interpolation.limits: as sent it has velocity of row 1 3"
+    )
+    rosout.wait_for([slowed, "interpolation.limits: there is no limit for acceleration 2.99 "])
+
+
 def test_a_frame_follows_simulated_time_at_any_rate(ros):
     """Time stands still, runs fast, and jumps back; the rate of ticks is lower than that of samples."""
     rospy.set_param("/use_sim_time", True)

@@ -211,6 +211,67 @@ def test_times_need_not_start_at_0():
     assert (got[-1].time_s, got[-1].state.position) == (pytest.approx(3.0), (2.0,))
 
 
+def peaks_of(got: list[TargetSample]) -> tuple[float, float]:
+    """Returns the largest speed and acceleration of the first row, by differences of the positions."""
+    steps = np.diff([each.time_s for each in got])
+    speeds = np.diff([each.state.position[0] for each in got]) / steps
+    return float(np.abs(speeds).max()), float(np.abs(2.0 * np.diff(speeds) / (steps[1:] + steps[:-1])).max())
+
+
+QUICK = [[0.0, 0.1, 0.2, 0.3], [0.0, 0.5, 0.45, 1.0]]
+"""A motion of 1 m in 0.3 s, with up to 200 m/s^2."""
+
+
+@pytest.mark.parametrize("method", ["cubic", "quintic"])
+def test_a_motion_is_slowed_down_to_its_limits(method):
+    free = Interpolator(joints("a", inter_dt=0.001, method=method))
+    add(free, joints("a"), QUICK, 0.0)
+    assert peaks_of(samples(free, 0.0, 0.4, 0.001))[1] > 150.0
+    config = joints("a", inter_dt=0.001, method=method, limits={"velocity": 1.5, "acceleration": 4.0})
+    plan = Interpolator(config)
+    added = plan.add(read_waypoints(np.array(QUICK), config.motion_dimensions), 0.0)
+    got = samples(plan, 0.0, 5.0, 0.001)
+    speed, acceleration = peaks_of(got)
+    assert speed <= 1.5 and 3.8 < acceleration <= 4.0
+    assert got[-1].state.position[0] == 1.0 and got[-1].time_s == pytest.approx(0.3 * added.stretch)
+    assert added.excess.text.startswith("acceleration 2") and added.excess.text.endswith("rad/s^2, limit 4")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_limits_hold_while_the_motion_is_replanned(seed):
+    rng = np.random.default_rng(seed)
+    config = joints("a", inter_dt=0.001, limits={"velocity": 1.0, "acceleration": 6.0})
+    plan, got = Interpolator(config), []
+    for start_s in (0.0, 0.4, 0.8):
+        add(plan, config, [[0.1, 0.3, 0.6], rng.uniform(-0.5, 0.5, 3)], start_s)
+        got += samples(plan, start_s, start_s + (0.4 if start_s < 0.8 else 8.0), 0.001)
+    speed, acceleration = peaks_of(got)
+    assert speed <= 1.001 and acceleration <= 6.05, "but for differences at knots"
+    assert plan.plan.scalars.end_s < 8.0
+
+
+def test_orientations_keep_their_limits():
+    config = motion(7, QUAT, limits={"angular_velocity": 0.5, "angular_acceleration": 2.0})
+    plan = Interpolator(config)
+    turned = quaternion_of((0.0, 0.0, 1.5))
+    rows = [[0.0, 0.1], *[[0.0, 0.1]] * 3, *zip((0.0, 0.0, 0.0, 1.0), turned)]
+    added = plan.add(read_waypoints(np.array(rows), config.motion_dimensions), 0.0)
+    assert added.peaks.angular_velocity == pytest.approx(0.5, rel=0.01) and added.stretch > 40.0
+    quats = [each.pose.quat_xyzw for each in samples(plan, 0.0, 10.0)]
+    assert max(angle(*pair) for pair in zip(quats, quats[1:])) / 0.01 <= 0.5
+
+
+def test_a_motion_beyond_its_limits_is_refused_on_request():
+    config = joints("a", "b", limits={"velocity": [9.0, 0.5], "exceeded": "refuse"})
+    plan = Interpolator(config)
+    with pytest.raises(
+        WaypointError, match="expected a motion within the limits, got velocity of row 1 1.5 .*limit 0.5"
+    ):
+        add(plan, config, [[0.0, 1.0], [0.0, 1.0], [0.0, 1.0]], 0.0)
+    assert plan.plan is None
+    add(plan, config, [[0.0, 4.0], [0.0, 1.0], [0.0, 1.0]], 0.0)
+
+
 def test_a_motion_that_has_not_begun_is_replaced():
     config = joints("a")
     plan = Interpolator(config)
@@ -385,6 +446,16 @@ def test_a_wrong_configuration_is_named_with_its_key(change, expected):
     with pytest.raises(ConfigError) as error:
         WaypointMotionConfig.parse({"motion_dimensions": dimensions, "communication": FRAMES}, "traj.yaml")
     assert "traj.yaml: motion_dimensions." in str(error.value) and expected in str(error.value)
+
+
+def test_limits_that_do_not_fit_are_named_with_their_key():
+    for more, expected in (
+        ({"limits": {"velocity": [1.0, 2.0, 3.0]}}, "velocity: expected one number, or 2, .* got 3"),
+        ({"limits": {"acceleration": 1.0}, "method": "linear"}, "acceleration: expected none with method 'linear'"),
+        ({"limits": {"velocity": -1.0}}, "velocity"),
+    ):
+        with pytest.raises(ConfigError, match=f"interpolation.limits.{expected}"):
+            joints("a", "b", **more)
 
 
 def test_a_frame_needs_its_names():

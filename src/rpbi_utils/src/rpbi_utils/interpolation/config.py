@@ -28,6 +28,8 @@ from custom_ros_tools.schema import (
 )
 from robot_model.geometry import Pose, Quaternion, normalized
 
+from .limits import MotionLimitsConfig
+
 AXES = ("x", "y", "z")
 MIN_NORM = 1e-6
 """Least length of a quaternion; shorter ones count as zero."""
@@ -198,6 +200,7 @@ class InterpolationConfig(ConfigModel):
     time_origin: Literal["arrival", "ros_time"] = Field(
         "arrival", description="Meaning of time 0 of the waypoints: when they arrive, or 0 of ROS time."
     )
+    limits: MotionLimitsConfig = Field(MotionLimitsConfig(), description="Largest speeds and accelerations.")
     hold: Switch = Field(False, description="Whether the last target is repeated when the waypoints end.")
     accept_repetitions: Switch = Field(
         False, description="Whether a message equal to the one before is a new motion, rather than a repetition."
@@ -232,4 +235,5 @@ class WaypointMotionConfig(ConfigModel):
             for key in ("header_frame_id", "msg_child_frame_id"):
                 if getattr(publisher, key) is None:
                     raise KeyedError(f"communication.publisher.{key}", "expected a TF frame, got none")
+        self.interpolation.limits.check_rows(len(self.motion_dimensions.scalar_rows), self.interpolation.method)
         return self

@@ -11,9 +11,16 @@ from robot_model.geometry import Pose
 from rpbi.control.trajectories.trajectory import DesiredState, Knot, Trajectory
 
 from .config import WaypointError, WaypointMotionConfig
+from .limits import Excess, MotionLimitsConfig, Peaks
 from .rotation import RotationKnot, RotationPath, angular_rates
 from .waypoints import Array, Waypoints, estimated_rates
 
+MAX_TRIES = 50
+"""Number of times that a motion is slowed down further until it keeps its limits."""
+KEPT = 1.0 + 1e-9
+"""Factor up to which a motion need not be slowed down, for rounding."""
+LEAST_STRETCH = 1.02
+"""Least factor by which it is then slowed down."""
 ROUNDING_S = 1e-9
 """Time by which a sample may be later than the present, for rounding [s]."""
 
@@ -57,6 +64,20 @@ class Plan(NamedTuple):
         return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
 
 
+class Added(NamedTuple):
+    """Answer to new waypoints.
+
+    Attributes:
+        peaks: Peaks of the new motion.
+        stretch: Factor by which it was slowed down; 1 if it was not.
+        excess: The limit that it would have exceeded most.
+    """
+
+    peaks: Peaks
+    stretch: float
+    excess: Excess
+
+
 class Interpolator:
     """Samples of a motion that new waypoints change while it lasts.
 
@@ -64,14 +85,22 @@ class Interpolator:
     waypoints take over after the protected samples, with the position and velocity of that moment; waypoints before
     the next sample are left out. Without interpolation, samples are the waypoints.
 
+    A motion that exceeds a limit takes longer: the times between its waypoints grow by one factor, or it is refused.
+    Without interpolation, limits do not count.
+
     All times are seconds of one clock, which must not go back.
+
+    Args:
+        config: The motion.
+        limits: In place of those of the configuration.
 
     Attributes:
         delay_s: Time that pauses have taken [s]; the plan is later than its waypoints by it.
     """
 
-    def __init__(self, config: WaypointMotionConfig) -> None:
+    def __init__(self, config: WaypointMotionConfig, limits: MotionLimitsConfig | None = None) -> None:
         self._dimensions, self._config = config.motion_dimensions, config.interpolation
+        self._limits = limits or config.interpolation.limits
         self._plan: Plan | None = None
         self._grid_s = 0.0
         """A time on the grid."""
@@ -85,11 +114,12 @@ class Interpolator:
         """The present plan, None if there is none."""
         return self._plan
 
-    def add(self, waypoints: Waypoints, now_s: float) -> None:
+    def add(self, waypoints: Waypoints, now_s: float) -> Added:
         """Plans a motion through waypoints, whose times are those of the clock.
 
         Raises:
-            WaypointError: If all of them are over, or before the end of the protected samples; the old plan stays.
+            WaypointError: If all of them are over, or before the end of the protected samples, or if the motion cannot
+                keep its limits; the old plan stays.
         """
         lead_s = self._own_s(now_s) - now_s
         now_s += lead_s
@@ -100,8 +130,9 @@ class Interpolator:
                 raise WaypointError(
                     f"data: expected a waypoint to come, the last one is {now_s - times_s[-1]:.6g} s old"
                 )
-            self._plan, self._grid_s = self._through(waypoints, times_s), times_s[0]
-            return
+            self._plan, added = self._within_limits(waypoints, times_s)
+            self._grid_s = times_s[0]
+            return added
         if self._sent_s >= old.scalars.end_s:  # at rest
             self._grid_s = now_s
         step_s, protected = self._config.inter_dt, self._config.nochange_window_length
@@ -111,8 +142,9 @@ class Interpolator:
             expected = f"expected a waypoint {from_s + step_s - now_s:.6g} s from now or later"
             got = f"the last one is {times_s[-1] - now_s:.6g} s from now"
             raise WaypointError(f"data: {expected}, after nochange_window_length, {protected}, and one sample; {got}")
-        new = self._through(waypoints, times_s, first, (from_s, old))
+        new, added = self._within_limits(waypoints, times_s, first, (from_s, old))
         self._plan = old.spliced(new, from_s).since(self._sent_s)
+        return added
 
     def newest(self, now_s: float) -> TargetSample | None:
         """Returns the newest sample up to a time [s] if there is one that has not been returned, else None."""
@@ -165,6 +197,36 @@ class Interpolator:
             quat = None if plan.path is None else plan.path.sample(time_s).quat_xyzw
             pose = self._dimensions.pose(state.position, quat)
         return TargetSample(time_s + self.delay_s, state, pose)
+
+    def _within_limits(
+        self,
+        waypoints: Waypoints,
+        times_s: tuple[float, ...],
+        first: int = 0,
+        after: tuple[float, Plan] | None = None,
+    ) -> tuple[Plan, Added]:
+        """Returns the plan of `_through`, slowed down as much as limits need.
+
+        Raises:
+            WaypointError: If the motion exceeds a limit that it is not to be slowed down for, or cannot be.
+        """
+        start_s, stretch, asked = times_s[0] if after is None else after[0], 1.0, Excess()
+        for _ in range(MAX_TRIES):
+            slow_s = times_s if stretch == 1.0 else tuple(start_s + stretch * (each - start_s) for each in times_s)
+            plan = self._through(waypoints.slower(stretch), slow_s, first, after)
+            peaks = Peaks.of(plan.scalars, plan.path)
+            excess = peaks.excess(self._limits) if self._config.use_interpolation else Excess()
+            if stretch == 1.0:
+                asked = excess
+            if excess.stretch <= KEPT:
+                return plan, Added(peaks, stretch, asked)
+            if self._limits.exceeded == "refuse":
+                raise WaypointError(f"interpolation.limits: expected a motion within the limits, got {asked.text}")
+            stretch *= max(excess.stretch, LEAST_STRETCH)
+        raise WaypointError(
+            f"interpolation.limits: expected a motion that keeps the limits when it is slower, got {excess.text}, even "
+            f"{stretch:.3g} times slower"
+        )
 
     def _through(
         self,

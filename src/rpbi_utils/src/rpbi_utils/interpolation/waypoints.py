@@ -32,6 +32,12 @@ class Waypoints(NamedTuple):
     accelerations: Array | None = None
     quats_xyzw: tuple[Quaternion, ...] | None = None
 
+    def slower(self, factor: float) -> Waypoints:
+        """Returns the same waypoints with the derivatives of a motion that takes longer by a factor."""
+        rates = None if self.rates is None else self.rates / factor
+        accelerations = None if self.accelerations is None else self.accelerations / factor**2
+        return self._replace(rates=rates, accelerations=accelerations)
+
 
 def waypoint_matrix(layout: Sequence[tuple[str, int]], data: Sequence[float], offset: int = 0) -> Array:
     """Returns the content of a Float64MultiArray as a matrix.

@@ -14,11 +14,15 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.config import load_config
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.transform_messages import transform_message
+from robot_model.asset_files import ROBOT_DESCRIPTION
+from robot_model.model import RobotModel
+from robot_model.urdf.files import write_description
 from rpbi_utils.interpolation.config import (
     InterpolationParameters,
     PublisherConfig,
@@ -26,6 +30,7 @@ from rpbi_utils.interpolation.config import (
     WaypointMotionConfig,
 )
 from rpbi_utils.interpolation.interpolator import Interpolator, TargetSample
+from rpbi_utils.interpolation.limits import UNITS, MotionLimitsConfig
 from rpbi_utils.interpolation.waypoints import Waypoints, read_waypoints, waypoint_matrix
 
 NAME = "ros_Traj_interface"
@@ -34,6 +39,8 @@ STREAMING = "/stream_interpolated_motion_flag"
 """Parameter that pauses the motion while it is not true."""
 LOOKS_HZ = 5.0
 """Rate at which that parameter is looked at [Hz of wall time]."""
+MORE = 1.5
+"""Factor by which a peak without limit is larger than the last one that was reported, to be reported again."""
 QUEUE_SIZE = 100
 NS_PER_S = 1_000_000_000
 
@@ -49,7 +56,10 @@ class InterpolationNode:
         parameters = private_parameters(InterpolationParameters)
         config = WaypointMotionConfig.parse(load_config(parameters.traj_config), parameters.traj_config)
         self._config, self._hz = config, parameters.consuming_freq
-        self._interpolator = Interpolator(config)
+        self._limits = _limits_of(config)
+        self._interpolator = Interpolator(config, self._limits)
+        self._unlimited: dict[str, float] = {}
+        """The largest peaks without limit that were reported, by the key of the limit."""
         self._arrived: deque[tuple[rospy.Time, Waypoints] | None] = deque()
         """Waypoints that the next tick adds; None ends the motion."""
         self._last: Float64MultiArray | None = None
@@ -130,12 +140,26 @@ class InterpolationNode:
         else:
             zero_s = (stamp - self._epoch).to_sec()
         try:
-            self._interpolator.add(
+            added = self._interpolator.add(
                 waypoints._replace(times_s=tuple(zero_s + t for t in waypoints.times_s)), self._now_s
             )
         except WaypointError as error:
             self._last = None
             self._warn(self._topic, f"waypoints rejected: {error}")
+            return
+        if added.stretch > 1.0:
+            text = f"the motion takes {added.stretch:.3g} times as long, to keep interpolation.limits"
+            self._warn(f"{self._topic} (limits)", f"{text}: as sent it has {added.excess.text}")
+        if self._config.interpolation.use_interpolation:
+            self._warn_of_no_limits(added.peaks.without_limit(self._limits))
+
+    def _warn_of_no_limits(self, peaks: dict[str, float]) -> None:
+        """Warns of peaks without limit, unless peaks almost as large were reported before."""
+        if all(peak <= MORE * self._unlimited.get(key, 0.0) for key, peak in peaks.items()):
+            return
+        self._unlimited |= peaks
+        text = ", ".join(f"{key} {peak:.3g} {UNITS[key]}" for key, peak in peaks.items())
+        rospy.logwarn("interpolation.limits: there is no limit for %s, the peaks of this motion", text)
 
     def _forget(self) -> None:
         self._last = None
@@ -159,6 +183,20 @@ class InterpolationNode:
             code, _, value = master.getParam(rospy.get_name(), STREAMING)
             if code == 1:
                 self._is_streaming = value is True
+
+
+def _limits_of(config: WaypointMotionConfig) -> MotionLimitsConfig:
+    """Returns the limits of a motion; missing velocities of joints are those of `robot_description`, if it has them."""
+    limits, joints = config.interpolation.limits, config.motion_dimensions.joint_names
+    parameter = rospy.resolve_name(ROBOT_DESCRIPTION)
+    if joints is None or limits.velocity is not None or not rospy.has_param(parameter):
+        return limits
+    try:
+        robot = RobotModel(write_description(str(rospy.get_param(parameter))), joints)
+    except InterfaceError as error:
+        rospy.logwarn("%s: expected a robot with the joints of the motion: %s", parameter, error)
+        return limits
+    return limits.model_copy(update={"velocity": tuple(each.max_velocity for each in robot.joints)})
 
 
 def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy.Time, TargetSample], None]:

@@ -1,0 +1,143 @@
+"""Limits of a motion through waypoints: its peaks, and by how much it has to be slowed down to keep them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf, Positive, Unit, optional
+from robot_model.geometry import norm
+from rpbi.control.trajectories.trajectory import Trajectory
+
+from .rotation import RotationPath
+
+POINTS = np.linspace(0.0, 1.0, 65)
+"""Shares of a segment at which peaks of numbers are looked for; they are at most 0.1 % higher in between."""
+TURN_POINTS = 17
+"""Number of points of a segment at which peaks of orientations are looked for."""
+MARGIN = 1e-3
+"""Share of a limit that is kept free."""
+UNITS = {
+    "velocity": "m/s or rad/s",
+    "acceleration": "m/s^2 or rad/s^2",
+    "angular_velocity": "rad/s",
+    "angular_acceleration": "rad/s^2",
+}
+
+Each = Positive | ListOf[Positive]
+
+
+class MotionLimitsConfig(ConfigModel):
+    """Limits of a motion through waypoints; those that are missing are not kept."""
+
+    velocity: Annotated[Each, Unit("m/s, rad/s")] | None = optional(
+        "Largest speed of each row that is interpolated as a number: one for all, or a list. For joints, the largest "
+        "speeds in the parameter `robot_description`, if it has them."
+    )
+    acceleration: Annotated[Each, Unit("m/s^2, rad/s^2")] | None = optional("Largest acceleration, likewise.")
+    angular_velocity: Annotated[Positive, Unit("rad/s")] | None = optional(
+        "Largest angular velocity of an interpolated orientation."
+    )
+    angular_acceleration: Annotated[Positive, Unit("rad/s^2")] | None = optional("Largest angular acceleration.")
+    exceeded: Literal["slow", "refuse"] = Field(
+        "slow", description="Whether a motion that exceeds a limit is slowed down as a whole, or refused."
+    )
+
+    def check_rows(self, count: int, method: str) -> None:
+        """Checks the limits against the number of rows and the method of interpolation.
+
+        Raises:
+            KeyedError: If a list has another length, or lines are to keep an acceleration.
+        """
+        for key in ("velocity", "acceleration"):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != count:
+                expected = f"expected one number, or {count}, one for each row that is interpolated as a number"
+                raise KeyedError(f"interpolation.limits.{key}", f"{expected}, got {len(value)}")
+        for key in ("acceleration", "angular_acceleration"):
+            if getattr(self, key) is not None and method == "linear":
+                raise KeyedError(f"interpolation.limits.{key}", "expected none with method 'linear', which has corners")
+
+
+class Excess(NamedTuple):
+    """The limit that a motion exceeds most.
+
+    Attributes:
+        stretch: Factor by which its times have to grow; at most 1 if all limits are kept.
+        text: Limit and peak in words; empty without limits.
+    """
+
+    stretch: float = 0.0
+    text: str = ""
+
+
+class Peaks(NamedTuple):
+    """Largest speeds and accelerations of a motion.
+
+    Attributes:
+        velocity: Of each row that is interpolated as a number [m/s or rad/s], shape (S,).
+        acceleration: Likewise [m/s^2 or rad/s^2].
+        angular_velocity: Of the orientation, if it is interpolated as one [rad/s].
+        angular_acceleration: Likewise [rad/s^2].
+    """
+
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    angular_velocity: float
+    angular_acceleration: float
+
+    @classmethod
+    def of(cls, scalars: Trajectory, path: RotationPath | None) -> Peaks:
+        """Returns the peaks of numbers and orientation from their first to their last knot."""
+        ends = [*(each.start_s for each in scalars.segments[1:]), scalars.end_s]
+        rows = np.array([each.polynomials for each in scalars.segments])  # segments x S x 6
+        spans = np.array(
+            [(each.start_s - each.origin_s, end - each.origin_s) for each, end in zip(scalars.segments, ends)]
+        )
+        times = spans[:, :1] + POINTS * (spans[:, 1:] - spans[:, :1])
+        powers = times[..., None] ** np.arange(6)  # segments x points x 6
+        orders = np.arange(1.0, 6.0)
+        rates = np.einsum("ksc,kpc->ksp", rows[..., 1:] * orders, powers[..., :5])
+        bends = np.einsum("ksc,kpc->ksp", rows[..., 2:] * (orders[1:] * orders[:-1]), powers[..., :4])
+        return cls(_largest(rates), _largest(bends), *_turning(path))
+
+    def excess(self, limits: MotionLimitsConfig) -> Excess:
+        """Returns the limit that is exceeded most."""
+        worst = Excess()
+        for key, power in zip(self._fields, (1.0, 0.5, 1.0, 0.5)):
+            limit, peaks = getattr(limits, key), np.atleast_1d(getattr(self, key))
+            if limit is None or not len(peaks):
+                continue
+            each = np.broadcast_to(limit, peaks.shape)
+            row = int(np.argmax(peaks / each))
+            stretch = float((1.0 + MARGIN) * peaks[row] / each[row]) ** power
+            if stretch > worst.stretch:
+                where = f" of row {row}" if len(peaks) > 1 else ""
+                worst = Excess(stretch, f"{key}{where} {peaks[row]:.3g} {UNITS[key]}, limit {each[row]:.3g}")
+        return worst
+
+    def without_limit(self, limits: MotionLimitsConfig) -> dict[str, float]:
+        """Returns the peaks that no limit bounds, by the key of the limit."""
+        peaks = {key: float(np.max(getattr(self, key), initial=0.0)) for key in self._fields}
+        return {key: peak for key, peak in peaks.items() if getattr(limits, key) is None and peak > 0.0}
+
+
+def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the largest magnitude of each row, shape (S,)."""
+    return np.asarray(np.abs(values).max(axis=(0, 2), initial=0.0))
+
+
+def _turning(path: RotationPath | None) -> tuple[float, float]:
+    if path is None or not path.segments:
+        return 0.0, 0.0
+    ends: Sequence[float] = [*(each.start_s for each in path.segments[1:]), path.end_s]
+    times = [
+        np.linspace(each.start_s, math.nextafter(end, -math.inf), TURN_POINTS) for each, end in zip(path.segments, ends)
+    ]
+    states = [path.sample(float(time_s)) for time_s in np.concatenate(times)]
+    return max(norm(each.rate) for each in states), max(norm(each.acceleration) for each in states)
