@@ -150,6 +150,8 @@ class ContactsSample:
         name: The body.
     """
 
+    not_in_keyframes = ("_points",)
+
     def __init__(self, name: str, points: Callable[[], tuple[ContactPoint, ...]]) -> None:
         self.name = name
         self._points = points

@@ -183,6 +183,9 @@ class Body:
         """
         return False
 
+    def resume(self) -> None:
+        """Tells PyBullet again what it keeps beside motion and dynamics, for a client into which the body has moved."""
+
     def pause(self, reason: str) -> None:
         """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all."""
         self.halt(reason)
@@ -290,6 +293,10 @@ class Body:
         joints = self.pb.getJointStatesMultiDof(self.body_id, self.joint_indices) if self.joint_indices else ()
         return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
+    def close(self) -> None:
+        """Closes what it has beside its part of the world."""
+
     def remove(self) -> None:
         """Removes the body from the world."""
+        self.close()
         self.pb.removeBody(self.body_id)

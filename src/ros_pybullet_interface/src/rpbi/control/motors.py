@@ -24,6 +24,8 @@ PERIOD_S = 5.0
 class LimitReports:
     """Logs when a joint exceeds its limits, once until it is back, and at most once in `PERIOD_S`."""
 
+    not_in_keyframes = ("_beyond", "_reported_s")
+
     def __init__(self, robot_name: str) -> None:
         self._robot_name = robot_name
         self._beyond: set[int] = set()
@@ -144,7 +146,14 @@ class Motors:
         self._expiry: dict[int, int] = {}
         """Tick at which the target of a joint expires, by joint index."""
         self._renewed: set[int] = set()
+        self._told: dict[int, tuple[int, dict[str, Any]]] = {}
+        """The mode of PyBullet's motor of each joint, and its arguments, as told last; PyBullet keeps them."""
         self.switch(mode)
+
+    def resume(self) -> None:
+        """Tells PyBullet again what it was told last, for another client that has the same robot."""
+        for index, (mode, arguments) in self._told.items():
+            self._tell(index, mode, arguments)
 
     def switch(self, mode: int) -> None:
         """Changes the control mode: the robot holds its position, or under torque control moves freely."""
@@ -224,14 +233,8 @@ class Motors:
         if self.mode == IMPEDANCE_CONTROL:
             self.impedance_setpoints[index] = position, velocity
         else:
-            self._pb.setJointMotorControl2(
-                self._body_id,
-                index,
-                pybullet.POSITION_CONTROL,
-                targetPosition=position,
-                targetVelocity=velocity,
-                **self._position_arguments[index],
-            )
+            arguments = {"targetPosition": position, "targetVelocity": velocity, **self._position_arguments[index]}
+            self._tell(index, pybullet.POSITION_CONTROL, arguments)
         if self.mode in POSITION_MODES:
             self.targets[index] = position + velocity * self._dt_s
 
@@ -319,10 +322,14 @@ class Motors:
         else:
             self._release(index)
             return
-        self._pb.setJointMotorControl2(self._body_id, index, self.mode, **arguments)
+        self._tell(index, self.mode, arguments)
 
     def _release(self, index: int) -> None:
-        self._pb.setJointMotorControl2(self._body_id, index, pybullet.VELOCITY_CONTROL, force=0.0)
+        self._tell(index, pybullet.VELOCITY_CONTROL, {"force": 0.0})
+
+    def _tell(self, index: int, mode: int, arguments: dict[str, Any]) -> None:
+        self._told[index] = mode, arguments
+        self._pb.setJointMotorControl2(self._body_id, index, mode, **arguments)
 
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
         """Returns the arguments of PyBullet's position motor of a joint beside its set point."""

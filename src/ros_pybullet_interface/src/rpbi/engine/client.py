@@ -1,5 +1,7 @@
 """One connection to PyBullet."""
 
+from __future__ import annotations
+
 import ctypes
 import logging
 import os
@@ -175,6 +177,12 @@ class Client:
         """
         with self._window_prints, _printed.to_log():
             pybullet.disconnect(self.client_id)
+
+    def become(self, other: Client) -> None:
+        """Becomes another connection, which only this object uses from then on; its own ends."""
+        self.disconnect()
+        vars(self).clear()
+        vars(self).update(vars(other))
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(pybullet, name)

@@ -49,6 +49,12 @@ class Clock:
         else:
             self.restamp()
 
+    def skip(self, ticks: int) -> None:
+        """Advances by ticks at once, for a world that is put into a later state."""
+        self.tick += ticks - 1
+        self._on_time_ns += (ticks - 1) * self.dt_ns if self.simulated else 0
+        self.advance()
+
     def restart(self) -> None:
         """Counts ticks from 0 again, for a world that was reset; stamps go on."""
         self.advance()

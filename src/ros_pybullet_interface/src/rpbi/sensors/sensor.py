@@ -33,6 +33,8 @@ class Sensor(ABC):
     """
     tf_frames: tuple[str, ...] = ()
     """TF frames that it publishes, without prefix."""
+    not_in_keyframes: ClassVar[tuple[str, ...]] = ("wanted",)
+    """Attributes that are no part of the world's state."""
     topic: str | None = None
     """Name of its topic, where it is not the one that the Topic has."""
 

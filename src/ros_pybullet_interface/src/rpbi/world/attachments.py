@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pybullet
 
@@ -130,6 +130,12 @@ class Attachments:
         """Ends the attachments of a body that is about to go."""
         for each in self._of(name):
             log.info("%s", self._release(each, f"ended, since '{name}' was removed"))
+
+    def resume(self) -> None:
+        """Has all hold in a client into which the bodies have moved."""
+        for name, each in self._holding.items():
+            constraint = self._constrain(each.config, each.parent, each.child)
+            self._holding[name] = replace(each, constraint=constraint)
 
     def refuse_moving(self, name: str) -> None:
         """Refuses to put a body elsewhere that would be pulled back at once.

@@ -2,7 +2,7 @@
 
 import hashlib
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, PluginError, Problem, UnknownNameError
@@ -26,6 +26,7 @@ from rpbi.sensors.sensor import Sensor
 from .attachments import Attachments
 from .load_log import LogEntry, apply
 from .loading import LoadedWorld
+from .saved.recipe import Recipe
 from .sensor_schedule import SensorSchedule
 
 DIGEST_BYTES = 16
@@ -91,6 +92,8 @@ class WorldContents:
         self._config = WorldConfig()
         self._filled_entries = 0
         """Number of entries of the log from filling it."""
+        self._changed: set[str] = set()
+        """Names of bodies that came or went before these entries."""
 
     def body(self, name: str) -> Body:
         """Returns the body of a name.
@@ -110,7 +113,7 @@ class WorldContents:
             self._append(LogEntry(name, "add", (kind, config)))
             body = self.bodies[name]
             try:
-                self._register(name, *sensors_and_inputs(body, config))
+                self._take_in(body, config)
             except Exception:
                 self._append(LogEntry(name, "remove"))
                 raise
@@ -118,10 +121,6 @@ class WorldContents:
             raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
         if body.object_tf is not None and (pose := self._config.pose_of(body.object_tf.tf_id)) is not None:
             body.teleport(pose)
-        if body.pose_follower is not None:
-            self.stepping.append(body.pose_follower)
-        if type(body).before_step is not Body.before_step:
-            self.stepping.append(body)
         return body
 
     def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
@@ -189,7 +188,7 @@ class WorldContents:
                 problems.append(Problem(item.file, "", str(error)))
         problems += self._fill_in_attachments(loaded)
         problems += self._fill_in_cameras(loaded)
-        self._filled_entries = len(self.log)
+        self._filled_entries, self._changed = len(self.log), set()
         # Those that were there before stay till their like has come, for who puts into them meanwhile
         self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
         if problems:
@@ -206,9 +205,39 @@ class WorldContents:
         for camera in self.cameras.values():
             camera.pose = self._configured_pose(camera)
 
+    def rebuild(self, recipe: Recipe, changed: Iterable[str]) -> None:
+        """Replaces all by what a recipe builds, bodies in a fresh client unless that has a window.
+
+        Args:
+            changed: Names of bodies that came or went since it was filled.
+
+        Raises:
+            ConfigError: If something cannot be loaded; then the rest is missing.
+            InterfaceError: If PyBullet refuses.
+        """
+        inputs_before, cameras_before = self.inputs, self.cameras
+        self.clear()
+        if not self._pb.has_window:
+            self._pb.become(Client())
+        for entry in recipe.entries(self._pb, self._config):
+            self._append(entry)
+            if entry.what == "add":
+                self._take_in(self.bodies[entry.name], entry.arguments[1])
+        recipe.check_ids(self.bodies)
+        self.cameras = {}
+        for config in recipe.cameras:
+            camera = cameras_before.get(config.name)
+            if camera is not None and camera.config == config:
+                self._insert_camera(camera)
+            else:
+                self.add_camera(config)
+        self._changed, self._filled_entries = set(changed), len(self.log)
+        self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
+
     def changed_names(self) -> set[str]:
         """Returns the names of all bodies that came or went since it was filled."""
-        return {entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove")}
+        new = (entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove"))
+        return {*self._changed, *new}
 
     def _fill_in_attachments(self, loaded: LoadedWorld) -> list[Problem]:
         problems: list[Problem] = []
@@ -243,6 +272,14 @@ class WorldContents:
 
     def _configured_pose(self, camera: RgbdSensor) -> Pose | None:
         return self._config.pose_of(camera.config.object_tf.tf_id)
+
+    def _take_in(self, body: Body, config: BodyConfig) -> None:
+        """Registers the sensors and inputs of a body that was added, and has it act before each tick."""
+        self._register(body.name, *sensors_and_inputs(body, config))
+        if body.pose_follower is not None:
+            self.stepping.append(body.pose_follower)
+        if type(body).before_step is not Body.before_step:
+            self.stepping.append(body)
 
     def _require_new(self, name: str, file: str | None) -> None:
         if name in self.sensors:

@@ -47,6 +47,8 @@ class _Scheduled:
 class SensorSchedule:
     """Reads each sensor of a world when it is due."""
 
+    not_in_keyframes = ("_warned",)
+
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._scheduled: dict[str, list[_Scheduled]] = {}

@@ -13,7 +13,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import pybullet
 
-from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.errors import InterfaceError, UnknownNameError, shortened
 from rpbi.bodies import Body, BodyConfig
 from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
 from rpbi.config.attachments import AttachmentConfig
@@ -34,9 +34,11 @@ from .actions import ACTIONS, MOVES_AT_ONCE
 from .contents import WorldContents, state_hash
 from .forks.prediction import Candidate, Cost, Prediction, PredictionJob
 from .forks.shadow import Fork, Shadow
+from .keyframes.keyframe import FreshClient, Keyframe, difference, move, refuse
 from .loading import LoadedWorld, load_object, load_world
 from .saved.command_log import CommandLog, WorldCommand
 from .saved.description import WorldDescription, describe
+from .saved.recipe import Recipe
 from .saved.state import MAX_TICKS, WorldState
 from .saved.values import trusting
 from .start_state import StartState
@@ -122,6 +124,8 @@ class World:
         self._description = ""
         self._start: StartState | None = None
         """Its start, once a reset without rebuilding was asked for."""
+        self._keyframe, self._keyframe_tick = "", 0
+        """Its last keyframe since it was built or reset, and its tick."""
 
     @classmethod
     def from_file(cls, path: str, **options: Any) -> World:
@@ -492,6 +496,7 @@ class World:
         if self._start is not None:
             self._start.close()
             self._start = None
+        self._keyframe, self._keyframe_tick = "", 0
         self.halt("the world was reset")
         self._contents.clear()
         self._pushed.clear()
@@ -530,25 +535,105 @@ class World:
             self._description = describe(self.loaded, self.start_hash)
         return self._description
 
-    def save(self, file: str | Path | None = None) -> WorldState:
+    def keyframe(self, recorded: str = "") -> None:
+        """Moves the world into a fresh client of PyBullet, such that what follows depends on the present state alone.
+
+        Commands before it are dropped: `save`, `restore`, `fork` and `predict` start from here. Bodies and sensors stay
+        the same objects. When it raises, nothing has changed, unless it is for a difference.
+
+        Args:
+            recorded: A keyframe of the same world at the same tick, which this one is compared with.
+
+        Raises:
+            InterfaceError: If the world has a window, a soft body, a body of another package, or an object with a state
+                that cannot be written; or if it differs from the recorded keyframe.
+            ConfigError: If a body cannot be loaded any more, for instance because its file has gone.
+        """
+        for _ in self.keyframe_in_parts():
+            pass
+        if recorded and (found := difference(self._keyframe, recorded)):
+            raise InterfaceError(f"the keyframe at tick {self.clock.tick} is not the recorded one: '{found}' differs")
+
+    def keyframe_in_parts(self) -> Iterator[None]:
+        """Does the same as `keyframe` in parts, one for each item, between which the world may step.
+
+        The fresh client is built beside the running one, a body in each part, and built again if bodies come, go or
+        change meanwhile. The world moves in the last part.
+        """
+        while True:
+            refuse(self)
+            recipe = Recipe.of(self._contents)
+            entries = len(self.log)
+            fresh = FreshClient(recipe, self.loaded.config)
+            try:
+                for _ in fresh.build():
+                    yield
+                    if len(self.log) != entries:
+                        break
+                self.apply_inputs()
+                if len(self.log) == entries and Recipe.of(self._contents) == recipe:
+                    self._move(fresh)
+                    return
+            except BaseException:
+                fresh.close()
+                raise
+            fresh.close()
+
+    def _move(self, fresh: FreshClient) -> None:
+        self._keyframe = move(self, self._contents, self._pushed, fresh)
+        self._keyframe_tick = self.clock.tick
+        self._end_shadow()
+        self._start = None  # PyBullet had it in the other client
+        self._note("", "keyframe", self._keyframe)
+        self.commands.forget()
+
+    def enter_keyframe(self, keyframe: str, trust: Collection[str] | None = ()) -> None:
+        """Brings the world, which was just built or reset, to a keyframe.
+
+        Args:
+            keyframe: Its text.
+            trust: Packages that it may import, see `from_description`.
+
+        Raises:
+            InterfaceError: If the text is no keyframe of such a world, or something in it cannot be loaded here.
+        """
+        try:
+            with trusting(trust):
+                read = Keyframe(keyframe)
+                self._contents.rebuild(read.recipe, read.changed)
+                self._pushed = read.enter(self, self._contents)
+        except InterfaceError:
+            raise
+        except Exception as error:  # the text may hold anything
+            raise InterfaceError(f"the keyframe makes no sense in this world: {shortened(str(error))}") from error
+        self.clock.skip(read.tick - self.clock.tick)
+        self._keyframe, self._keyframe_tick = keyframe, read.tick
+
+    def save(self, file: str | Path | None = None, *, keyframe: bool = False) -> WorldState:
         """Returns the present state, from which the same world goes on to the last bit.
 
         Inputs that wait act first, as they would before the next step. The state holds all commands since the world was
-        built or reset. The time that `restore` takes is therefore that of simulating again from there.
+        built or reset, or since its last keyframe. The time that `restore` takes is therefore that of simulating again
+        from there.
 
         Args:
             file: File that it is written to, too.
+            keyframe: Whether a keyframe is made first, see `keyframe`; then the state holds no commands.
 
         Raises:
             InterfaceError: If the world has soft bodies, whose motion is not reproducible, a command that cannot be
                 recorded, or a change that no command repeats.
             OSError: If the file cannot be written.
         """
+        if keyframe:
+            self.keyframe()
         if soft := [body.name for body in self.bodies.values() if body.is_soft]:
             raise InterfaceError(f"expected no soft bodies, which never move the same way twice, got {', '.join(soft)}")
         self._require_recorded()
         self.apply_inputs()
-        state = WorldState(self.describe(), tuple(self.commands.records()), self.clock.tick, self.state_hash())
+        commands = tuple(self.commands.records())
+        begin = self._keyframe, self._keyframe_tick
+        state = WorldState(self.describe(), commands, self.clock.tick, self.state_hash(), *begin)
         if file is not None:
             state.write(file)
         return state

@@ -139,11 +139,10 @@ class JointedBody(Body):
             self.model.with_mimic_joints(positions), self.model.with_mimic_joints(velocities, offsets=False)
         )
 
-    def remove(self) -> None:
-        """Removes it from the world, and closes its kinematics."""
+    def close(self) -> None:
+        """Closes its kinematics."""
         if "kinematics" in vars(self):
             self.kinematics.close()
-        super().remove()
 
     def _put_joints(self, positions: Mapping[int, float], velocities: Mapping[int, float] | None = None) -> None:
         """Sets positions [rad or m] of joints by index, with velocities, 0 by default, in one call of PyBullet.

@@ -183,6 +183,10 @@ class Robot(JointedBody):
         self._springs.restart()
         return True
 
+    def resume(self) -> None:
+        """Has its motors do the same as before."""
+        self.motors.resume()
+
     def switch_mode(self, mode: int) -> None:
         """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
         if mode != self.motors.mode:
@@ -216,9 +220,13 @@ class Robot(JointedBody):
     def remove(self) -> None:
         """Removes the robot from the world, and ends its motion."""
         self.halt("the robot was removed")
+        super().remove()
+
+    def close(self) -> None:
+        """Closes its kinematics, and its model."""
+        super().close()
         if self._robot_model is not None:
             self._robot_model.close()
-        super().remove()
 
     def _check_target(self, given: JointCommand | Mapping[str, float]) -> tuple[ResolvedCommand]:
         target = JointCommand.of(given, QUANTITIES[self.motors.mode])

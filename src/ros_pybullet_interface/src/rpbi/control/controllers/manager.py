@@ -68,6 +68,8 @@ class ControllerUpdate(NamedTuple):
 class _Managed:
     """A controller and its state."""
 
+    not_in_keyframes = ("slow",)
+
     def __init__(self, name: str, robot: ControlledRobot, config: ControllerConfig) -> None:
         self.name, self.robot = name, robot
         self.indices = [robot.model.joints[place].index for place in robot.chosen]

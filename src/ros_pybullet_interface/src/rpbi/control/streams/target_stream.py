@@ -36,7 +36,7 @@ class TargetStream:
     Args:
         held: Where the joints are held now by index [rad or m].
         smooth: Whether lines are averaged.
-        limited: Returns a position of a joint by index within its limits.
+        limited: Returns a position of a joint by index within its limits; None without limits.
     """
 
     def __init__(
@@ -44,10 +44,10 @@ class TargetStream:
         buffer: JitterBuffer,
         held: Mapping[int, float],
         smooth: bool,
-        limited: Callable[[int, float], float] = lambda index, value: value,
+        limited: Callable[[int, float], float] | None = None,
     ) -> None:
         self.joints = frozenset(held)
-        self._buffer, self._smooth, self._limited = buffer, smooth, limited
+        self._buffer, self._smooth, self._limits = buffer, smooth, limited
         self._segments: deque[StreamSegment] = deque()
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
@@ -127,6 +127,9 @@ class TargetStream:
             positions = {index: self._limited(index, value) for index, value in positions.items()}
         self.set_points = positions
         return positions
+
+    def _limited(self, index: int, value: float) -> float:
+        return value if self._limits is None else self._limits(index, value)
 
     def _adapt_window(self) -> None:
         """Changes the window slowly, since its changes move the set points: a low-pass of second order."""

@@ -30,6 +30,8 @@ class TrajectoryMotion(Motion):
     """
 
     can_wait = True
+    not_in_keyframes = ("on_advance",)
+    on_advance: Callable[[float, JointMotion], None] | None = None
 
     def __init__(
         self,
@@ -46,7 +48,6 @@ class TrajectoryMotion(Motion):
         self.code = ErrorCode.INVALID_GOAL  # unless it ends in a way that has a number of its own
         self.preempted = False
         self.desired: dict[int, DesiredState] = {}
-        self.on_advance: Callable[[float, JointMotion], None] | None = None
         self._joints = joints
         self._tolerances = tolerances
         self._stop_s = stop_s

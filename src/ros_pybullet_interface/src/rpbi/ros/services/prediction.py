@@ -71,17 +71,19 @@ class Predictor:
         world = self._simulation.world
         if self._shadow is None or self._resets != world.resets:
             self._end()
-            state, self._resets = self._ask(lambda: (world.save(), world.resets))
-            self._shadow = Shadow.started(state, NICENESS)
+            state, commands, self._resets = self._ask(lambda: (world.save(), world.commands.count, world.resets))
+            self._shadow = Shadow.started(state, commands, NICENESS)
         shadow = self._shadow
 
-        def news() -> tuple[int, list[RecordedCommand], int, str, int]:
+        def news() -> tuple[bool, list[RecordedCommand], int, str, int]:
             world.apply_inputs()  # those that have arrived act before the next step
-            new = list(world.commands.records(shadow.commands)) if world.resets == self._resets else []
-            return world.resets, new, world.clock.tick, world.state_hash(), world.clock.stamp_ns
+            follows = world.resets == self._resets and world.commands.first <= shadow.commands
+            new = list(world.commands.records(shadow.commands)) if follows else []
+            return follows, new, world.clock.tick, world.state_hash(), world.clock.stamp_ns
 
-        resets, new, tick, state_hash, stamp_ns = self._ask(news)
-        if resets != self._resets:
+        follows, new, tick, state_hash, stamp_ns = self._ask(news)
+        if not follows:  # the world was reset, or has made a keyframe: another process begins there
+            self._end()
             return self._follow()
         shadow.follow(new, tick, state_hash)
         return shadow, tick, stamp_ns

@@ -164,10 +164,10 @@ class Shadow:
     @classmethod
     def of(cls, world: Any, state: WorldState) -> Shadow:
         """Returns one of a `World` of this process, at its present state: a copy of this process if that can be."""
-        return cls.copied(world, state) or cls.started(state)
+        return cls.copied(world) or cls.started(state, world.commands.count)
 
     @classmethod
-    def copied(cls, world: Any, state: WorldState) -> Shadow | None:
+    def copied(cls, world: Any) -> Shadow | None:
         """Returns one that is a copy of this process, or None if this is large, has other threads or a window.
 
         A copy has none of the threads, and would wait for ever for what they had locked.
@@ -182,14 +182,15 @@ class Shadow:
             process.wait()
             ours.close()
             return None
-        return cls(ours, process, len(state.commands))
+        return cls(ours, process, world.commands.count)
 
     @classmethod
-    def started(cls, state: WorldState, niceness: int = 0) -> Shadow:
+    def started(cls, state: WorldState, commands: int, niceness: int = 0) -> Shadow:
         """Returns one that is a new program, which simulates again until it comes to the state.
 
         Args:
             state: Present state of the world.
+            commands: Number of commands of the world so far.
             niceness: How much less of the processors it gets than this process, from 0 to 19.
         """
         ours, theirs = Pipe()
@@ -204,7 +205,7 @@ class Shadow:
         theirs.close()
         with suppress(OSError):  # the first call reports that it has ended
             ours.send(state)
-        return cls(ours, process, len(state.commands))
+        return cls(ours, process, commands)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
         """Brings it to the present tick of the world, before it forks or predicts.

@@ -27,7 +27,7 @@ class WorldCommand(NamedTuple):
         name: The body or camera that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's
             name for those, empty for the whole world.
         what: Its kind: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`, `attach`,
-            `detach`, `halt`, `pause`, or a key of ACTIONS.
+            `detach`, `halt`, `pause`, `keyframe`, or a key of ACTIONS.
         value: Its value.
     """
 
@@ -60,6 +60,7 @@ class CommandLog:
 
     Attributes:
         count: Number of commands so far.
+        first: Index of the first one that `records` returns, 0 unless earlier ones were forgotten.
     """
 
     def __init__(self) -> None:
@@ -79,17 +80,18 @@ class CommandLog:
         return first, tuple(self._kept[each - self.count] for each in range(first, end))
 
     def records(self, first: int = 0) -> Iterator[RecordedCommand]:
-        """Yields the records of all commands from an index on.
+        """Yields the records of all commands from an index on, without those that `forget` dropped.
 
         Raises:
             InterfaceError: If one cannot be recorded, or the oldest had to be forgotten.
         """
         if self._fault:
             raise InterfaceError(self._fault)
-        packed = self.count - len(self._kept)
+        first, packed = max(first, self.first), self.count - len(self._kept)
         if first < packed:
             text = zlib.decompress(bytes(self._packed) + self._packing.copy().flush()).decode()
-            yield from (RecordedCommand(*json.loads(line)) for line in islice(text.splitlines(), first, None))
+            lines = islice(text.splitlines(), first - self._packed_from, None)
+            yield from (RecordedCommand(*json.loads(line)) for line in lines)
         try:
             yield from map(RecordedCommand.of, islice(self._kept, max(first - packed, 0), None))
         except TypeError as error:
@@ -98,9 +100,14 @@ class CommandLog:
     def clear(self) -> None:
         """Begins afresh."""
         self._kept: deque[WorldCommand] = deque()
+        self.count = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Drops the records of all commands so far, which a keyframe replaces; `since` still returns the newest."""
         self._packing, self._packed = zlib.compressobj(), bytearray()
         self._fault = ""
-        self.count = 0
+        self.first, self._packed_from = self.count, self.count - len(self._kept)
 
     def _pack(self, command: WorldCommand) -> None:
         if self._fault:

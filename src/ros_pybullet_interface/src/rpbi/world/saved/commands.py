@@ -22,6 +22,7 @@ _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
+    "keyframe": lambda world, _, recorded: world.keyframe(recorded),
 }
 """Commands to a world other than actions on its bodies."""
 

@@ -37,15 +37,19 @@ class WorldState(NamedTuple):
 
     Attributes:
         description: Text of `describe`.
-        commands: All commands since the world was built or reset, in their order.
+        commands: All commands since the world was built or reset, or since the keyframe, in their order.
         tick: The tick.
         state_hash: The hash at that tick, see `World.state_hash`.
+        keyframe: Keyframe that the commands begin at; empty for the start.
+        start: Its tick, 0 for the start.
     """
 
     description: str
     commands: tuple[RecordedCommand, ...]
     tick: int
     state_hash: str
+    keyframe: str = ""
+    start: int = 0
 
     def write(self, path: str | Path) -> None:
         """Writes it to a file, `NAME.world` by custom.
@@ -107,17 +111,18 @@ class WorldState(NamedTuple):
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             given = header.get("format") if isinstance(header, dict) else None
             raise ValueError(f"it has format {shortened(repr(given))}, this version reads {FORMAT}")
-        kinds = {"description": str, "tick": int, "state_hash": str, "commands": int}
-        description, tick, state_hash, count = _typed([header[key] for key in kinds], *kinds.values())
+        kinds = {"description": str, "tick": int, "state_hash": str, "keyframe": str, "start": int, "commands": int}
+        *values, count = _typed([header[key] for key in kinds], *kinds.values())
+        description, tick, state_hash, keyframe, start = values
         if not 0 <= count <= MAX_COMMANDS:
             raise ValueError(f"expected 0 to {MAX_COMMANDS} commands, got {shortened(str(count))}")
         commands = tuple(RecordedCommand(*_typed(next_line(), int, str, str, str)) for _ in range(count))
-        ticks = [command.tick for command in commands]
-        if ticks != sorted(ticks) or (ticks and not 0 <= ticks[0] <= ticks[-1] <= tick) or tick < 0:
+        ticks = [0, start, *(command.tick for command in commands), tick]
+        if ticks != sorted(ticks):
             raise ValueError("the ticks of its commands are not in order, or beyond its own")
         if file.read(65) != seal.hexdigest().encode():
             raise ValueError("its content is not as it was written")
-        return cls(description, commands, tick, state_hash)
+        return cls(description, commands, tick, state_hash, keyframe, start)
 
     @classmethod
     def is_file(cls, path: str | Path) -> bool:
@@ -132,10 +137,11 @@ class WorldState(NamedTuple):
         Raises:
             InterfaceError: If it is.
         """
-        if self.tick > max_ticks:
+        ticks = self.tick - self.start
+        if ticks > max_ticks:
             raise InterfaceError(
-                f"expected a state at most {max_ticks} ticks from the start, got one of {self.tick} ticks; "
-                f"max_ticks={self.tick}, if you know who made it"
+                f"expected a state at most {max_ticks} ticks from the start, got one of {ticks} ticks; "
+                f"max_ticks={ticks}, if you know who made it"
             )
 
     def run(self, world: Any, trust: Collection[str] | None = ()) -> Iterator[int]:
@@ -148,6 +154,10 @@ class WorldState(NamedTuple):
         Raises:
             InterfaceError: If its state then has another hash, or a command is refused or makes no sense.
         """
+        if self.keyframe:
+            world.enter_keyframe(self.keyframe, trust)
+        if world.clock.tick != self.start:
+            raise InterfaceError(f"expected a keyframe of tick {self.start}, got one of tick {world.clock.tick}")
         todo = iter(self.commands)
         command = next(todo, None)
         while True:

@@ -1,0 +1,105 @@
+"""The state of motion of bodies, read from one client and put into another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import chain
+from typing import Any, NamedTuple
+
+import pybullet
+
+from robot_model.geometry import Quaternion, Vector
+from rpbi.bodies import Body
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
+
+_UNUSUAL_GRAVITY = (1.0, 2.0, 30.0)
+"""Gravity that moves all that does not sleep [m/s^2]."""
+
+
+class BodyMotion(NamedTuple):
+    """Where a body is and how it moves.
+
+    Attributes:
+        position: Position of its centre of mass [m].
+        quat_xyzw: Orientation of its principal axes.
+        linear: Velocity [m/s].
+        angular: Angular velocity [rad/s].
+        joints: PyBullet's indices of the joints that move.
+        positions: Their positions [rad or m], of a joint about three axes its quaternion.
+        velocities: Their velocities [rad/s or m/s].
+    """
+
+    position: Vector
+    quat_xyzw: Quaternion
+    linear: Vector
+    angular: Vector
+    joints: tuple[int, ...]
+    positions: tuple[tuple[float, ...], ...]
+    velocities: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, body: Body) -> BodyMotion:
+        """Returns the motion of a body."""
+        pb, body_id = body.pb, body.body_id
+        joints = tuple(i for i in body.joint_indices if pb.getJointInfo(body_id, i)[2] != pybullet.JOINT_FIXED)
+        states = pb.getJointStatesMultiDof(body_id, joints) if joints else ()
+        position, quat_xyzw = pb.getBasePositionAndOrientation(body_id)
+        linear, angular = pb.getBaseVelocity(body_id)
+        positions, velocities = (tuple(state[kind] for state in states) for kind in (0, 1))
+        return cls(position, quat_xyzw, linear, angular, joints, positions, velocities)
+
+    def check(self, body: Body) -> None:
+        """Checks that it is one of a body; PyBullet ends the process for some that are not.
+
+        Raises:
+            ValueError: If it is not, or a number is not finite.
+        """
+        own = BodyMotion.of(body)
+        numbers = [*chain(*self[:4], *self.positions, *self.velocities)]
+        if [_shape(each) for each in self] != [_shape(each) for each in own] or self.joints != own.joints:
+            raise ValueError(f"'{body.name}': expected a motion of {len(own.joints)} joints, got {str(self):.200}")
+        if not all(type(number) is float and math.isfinite(number) for number in numbers):
+            raise ValueError(f"'{body.name}': expected a motion of finite numbers, got {str(self):.200}")
+
+    def put(self, body: Body) -> None:
+        """Puts a body where it was, as fast as it was."""
+        pb, body_id = body.pb, body.body_id
+        pb.resetBasePositionAndOrientation(body_id, self.position, self.quat_xyzw)
+        pb.resetBaseVelocity(body_id, self.linear, self.angular)
+        if self.joints:
+            positions, velocities = (list(map(list, each)) for each in (self.positions, self.velocities))
+            pb.resetJointStatesMultiDof(body_id, list(self.joints), positions, velocities)  # tuples end the process
+
+
+def _shape(values: Any) -> Any:
+    return [_shape(each) for each in values] if isinstance(values, tuple) else None
+
+
+def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
+    """Returns the bodies that sleep: they do not notice another gravity. It ends the world of a client."""
+    movable = {name: body for name, body in bodies.items() if _can_move(body)}
+    before = {name: body.motion_state() for name, body in movable.items()}
+    pb.setGravity(*_UNUSUAL_GRAVITY)
+    pb.stepSimulation()
+    return tuple(name for name, body in movable.items() if body.motion_state() == before[name])
+
+
+def put_to_sleep(bodies: Mapping[str, Body], names: tuple[str, ...]) -> None:
+    """Has some bodies sleep, and wakes those that were loaded asleep."""
+    for name, body in bodies.items():
+        if name in names:
+            body.pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_SLEEP)
+        elif _starts_asleep(body):
+            body.pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
+
+
+def _can_move(body: Body) -> bool:
+    info = body.pb.getDynamicsInfo(body.body_id, -1)
+    return body.has_physics and (info[0] > 0.0 or (info[10] != MAXIMAL_COORDINATES and bool(body.joint_indices)))
+
+
+def _starts_asleep(body: Body) -> bool:
+    change = getattr(getattr(body, "config", None), "changeDynamics", None)
+    state = getattr(change, "activationState", None) or 0
+    return bool(state & pybullet.ACTIVATION_STATE_SLEEP)

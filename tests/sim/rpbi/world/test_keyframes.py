@@ -1,0 +1,228 @@
+"""Worlds go on from keyframes to the last bit, in any process, and what was before them is dropped."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pybullet
+import pytest
+import scripted_session
+import sleeping_session
+import streaming_session
+from soft_meshes import DEFORMABLE, GROUND, block
+from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.replay.session import Checkpoint, Recording, Replay
+from rpbi.world import World
+from rpbi.world.keyframes import keyframe as keyframes
+from rpbi.world.loading import load_object
+from rpbi.world.saved.command_log import RecordedCommand
+from rpbi.world.saved.description import WorldDescription
+
+AHEAD = 200
+"""Ticks for which worlds go on."""
+ELSEWHERE = """
+import sys
+from rpbi.world import World
+world = World.from_state(sys.argv[1])
+for _ in range(int(sys.argv[2])):
+    world.step()
+print("hash:", world.state_hash())
+"""
+
+
+def hash_later(world: World, ticks: int = AHEAD) -> str:
+    """Returns the hash of a world after some ticks."""
+    for _ in range(ticks):
+        world.step()
+    return world.state_hash()
+
+
+@pytest.fixture
+def heap(tmp_path):
+    """Boxes that fall upon each other beside an arm that goes to a target."""
+    boxes = tuple(box(f"box{turn}", basePosition=[0.6, 0.02 * turn, 0.1 + 0.21 * turn]) for turn in range(4))
+    world = World.from_file(write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=boxes, robots=(iiwa(),)))
+    world.put("iiwa/target", {"lbr_iiwa_joint_2": 0.8})
+    hash_later(world, 50)
+    yield world
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("session", "seed"), [(sleeping_session, 7006), (sleeping_session, 7041), (streaming_session, 101)]
+)
+def test_all_ways_from_a_keyframe_are_the_same(tmp_path, session, seed):
+    world = session.build(tmp_path, seed)
+    session.run(world, seed, 500)
+    file = tmp_path / "here.world"
+    state = world.save(file, keyframe=True)
+    assert state.commands == () and state.keyframe
+    with world.fork()[0] as fork:
+        fork.step(AHEAD)
+        forked = fork.state_hash()
+    (prediction,) = world.predict([[]], AHEAD)
+    samples = [world.step() for _ in range(AHEAD)]
+    expected = world.state_hash()
+    assert forked == prediction.state_hash == expected
+    other = World.from_state(file)
+    assert [other.step() for _ in range(AHEAD)] == samples, "noise, filters and averages go on too"
+    assert other.state_hash() == expected
+    other.close()
+    world.restore(state)
+    assert world.clock.tick == state.tick and hash_later(world) == expected
+    world.close()
+
+
+def test_another_process_goes_on_from_a_keyframe(heap, tmp_path):
+    heap.save(tmp_path / "here.world", keyframe=True)
+    command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "here.world"), str(AHEAD)]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "2"})
+    assert f"hash: {hash_later(heap)}" in done.stdout.splitlines(), done.stderr
+
+
+def test_commands_before_a_keyframe_are_dropped(heap):
+    heap.keyframe()
+    count = heap.commands.count
+    heap.put("iiwa/target", {"lbr_iiwa_joint_2": 0.2})
+    hash_later(heap, 20)
+    state = heap.save()
+    assert [each.what for each in state.commands] == ["input"] and heap.commands.count == count + 1
+    again = World.from_state(state)
+    assert again.state_hash() == state.state_hash and hash_later(again) == hash_later(heap)
+    again.close()
+    heap.reset()
+    assert heap.save().keyframe == "", "a reset world begins at its start"
+
+
+def test_a_keyframe_hardly_disturbs_the_world(tmp_path):
+    ends = []
+    for keyframe in (False, True):
+        stack = tuple(box(f"box{turn}", basePosition=[0.0, 0.0, 0.1 + 0.2 * turn]) for turn in range(3))
+        world = World.from_file(write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=stack))
+        hash_later(world, 500)
+        if keyframe:
+            world.keyframe()
+        hash_later(world, 500)
+        ends.append([world.bodies[each["name"]].base_pose().position for each in stack])
+        world.close()
+    for undisturbed, moved in zip(*ends):
+        assert moved == pytest.approx(undisturbed, abs=1e-4)
+
+
+def test_bodies_keep_their_ids_after_others_were_removed(heap):
+    heap.remove("box0")
+    heap.remove("box2")
+    heap.add("dynamic", load_object("dynamic", ball("new", basePosition=[1.0, 1.0, 0.2]), "new.yaml"))
+    ids = {name: body.body_id for name, body in heap.bodies.items()}
+    state = heap.save(keyframe=True)
+    other = World.from_state(state)
+    assert {name: body.body_id for name, body in other.bodies.items()} == ids
+    assert other.changed_names() == heap.changed_names() == {"box0", "box2", "new"}
+    for world in (heap, other):
+        world.add("dynamic", load_object("dynamic", ball("late", basePosition=[0.6, 0.0, 1.5]), "late.yaml"))
+    assert other.bodies["late"].body_id == heap.bodies["late"].body_id and hash_later(other) == hash_later(heap)
+    other.close()
+
+
+def test_sleeping_bodies_sleep_on(tmp_path):
+    asleep = {"activationState": "ACTIVATION_STATE_ENABLE_SLEEPING|ACTIVATION_STATE_SLEEP"}
+    things = (
+        ball("hung", basePosition=[0.0, 0.0, 1.0], changeDynamics=asleep),
+        ball("woken", basePosition=[1.0, 0.0, 1.0], changeDynamics=asleep),
+    )
+    world = World.from_file(write_world(tmp_path, collision=(FLOOR,), dynamic=things))
+    world.change_dynamics("woken", ChangeDynamics(activationState=pybullet.ACTIVATION_STATE_WAKE_UP))
+    hash_later(world, 100)
+    height = world.bodies["hung"].base_pose().position[2]
+    world.keyframe()
+    hash_later(world, 100)
+    assert world.bodies["hung"].base_pose().position[2] == pytest.approx(height, abs=2e-5), "PyBullet's fall of a tick"
+    assert world.bodies["woken"].base_pose().position[2] < 0.9
+    world.close()
+
+
+def test_masses_and_inertias_are_those_at_the_keyframe(heap):
+    for change in (
+        {"mass": 2.0},
+        {"localInertiaDiagonal": (0.02, 0.03, 0.04)},
+        {"mass": 3.0},
+        {"lateralFriction": 0.2},
+    ):
+        heap.change_dynamics("box1", ChangeDynamics(**change))
+    expected = heap.dynamics("box1")
+    heap.keyframe()
+    assert heap.dynamics("box1") == expected
+    assert [entry.what for entry in heap.log].count("dynamics") == 4, "the renderer's copy goes on"
+
+
+def test_a_replay_moves_at_the_same_tick(tmp_path):
+    world = scripted_session.build(tmp_path)
+    description = WorldDescription(world.describe())
+    scripted_session.run(world, 301, 200)
+    world.keyframe()
+    hash_later(world, 100)
+    commands = {index: RecordedCommand.of(each) for index, each in enumerate(world.commands.since(0)[1])}
+    assert "keyframe" in [each.what for each in commands.values()]
+    end = Checkpoint(0, world.clock.tick, world.commands.count, world.state_hash())
+    result = Replay(Recording(description, {0: commands}, {end})).run()
+    assert (result.agreed, result.difference) == (2, None)
+    world.close()
+
+
+def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):
+    soft = World.from_file(write_world(tmp_path, collision=(GROUND,), soft=(block(tmp_path),), **DEFORMABLE))
+    with pytest.raises(InterfaceError, match="is soft"):
+        soft.keyframe()
+    soft.close()
+    heap.add("faulty_lab:Thing", {"name": "thing"}, "thing.yaml")
+    with pytest.raises(InterfaceError, match="'thing' is a Thing of another package"):
+        heap.save(keyframe=True)
+    heap.remove("thing")
+    before = heap.state_hash()
+    heap.bodies["iiwa"].motors.unknown = open(os.devnull)  # noqa: SIM115
+    with heap.bodies["iiwa"].motors.unknown, pytest.raises(InterfaceError, match=r"iiwa\.motors\.unknown: a keyframe"):
+        heap.keyframe()
+    assert heap.state_hash() == before, "it goes on as it was"
+
+
+@pytest.mark.parametrize(
+    ("written", "forged", "reason"),
+    [
+        ('"format":1', '"format":9', "format 9, this version reads 1"),
+        ("{", "{", "keyframe: "),
+        ("rpbi.world.keyframes.motion:BodyMotion", "subprocess:Popen", "makes no sense"),
+        ("rpbi.control.motors:Motors", "rpbi.engine.client:Client", "does not come while a world runs"),
+        ('"_told"', '"__class__"', "is no attribute of a state"),
+        ('"targets"', '"unheard"', "does not take the state"),
+    ],
+)
+def test_forged_keyframes_are_refused(heap, written, forged, reason):
+    state = heap.save(keyframe=True)
+    text = keyframes._unpacked(state.keyframe)
+    text = "{" if written == forged else text.replace(written, forged)
+    with pytest.raises(InterfaceError, match=reason):
+        World.from_state(state._replace(keyframe=keyframes._packed(text)))
+    with pytest.raises(InterfaceError, match="expected a keyframe"):
+        World.from_state(state._replace(keyframe="no base64"))
+
+
+def test_motions_that_would_end_the_process_are_refused(heap):
+    state = heap.save(keyframe=True)
+    text = keyframes._unpacked(state.keyframe)
+    for forged in ("NaN", "1", '"x"', "[]"):
+        end = text.index("BodyMotion")
+        number = text.index("[", text.index("tuple", end)) + 1
+        cut = text[:number] + forged + text[text.index(",", number) :]
+        with pytest.raises(InterfaceError, match="makes no sense"):
+            World.from_state(state._replace(keyframe=keyframes._packed(cut)))
+
+
+def test_files_with_keyframes_read_back(heap, tmp_path: Path):
+    state = heap.save(tmp_path / "here.world", keyframe=True)
+    assert type(state).read(tmp_path / "here.world") == state
