@@ -158,7 +158,7 @@ def run_trial(
     path = PushPath(config.path)
     world = pushing_world(variation, path)
     try:
-        world.pb.changeDynamics(world.bodies["pusher"].body_id, 1, lateralFriction=PUSHER_FRICTION * variation.pusher)
+        world.change_dynamics("pusher/tip", {"lateralFriction": PUSHER_FRICTION * variation.pusher})
         plant = PushingWorld(world, middle=(-variation.centre[0], -variation.centre[1]))
         plant.advance(max(variation.latency_s, 0.0) + 0.04)
         controller = PushingController(config) if make_controller is None else make_controller(plant)
