@@ -189,6 +189,9 @@ def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):
     with heap.bodies["iiwa"].motors.unknown, pytest.raises(InterfaceError, match=r"iiwa\.motors\.unknown: a keyframe"):
         heap.keyframe()
     assert heap.state_hash() == before, "it goes on as it was"
+    heap.pb.changeDynamics(heap.bodies["box1"].body_id, -1, lateralFriction=0.1)
+    with pytest.raises(InterfaceError, match="not recorded acts: PyBullet's changeDynamics"):
+        heap.keyframe()
 
 
 @pytest.mark.parametrize(

@@ -181,8 +181,10 @@ class Client:
     def become(self, other: Client) -> None:
         """Becomes another connection, which only this object uses from then on; its own ends."""
         self.disconnect()
+        values = {name: value for name, value in vars(other).items() if not callable(value)}
+        kept = {"changes": self.changes, "advance": other.advance}
         vars(self).clear()
-        vars(self).update(vars(other))
+        vars(self).update(values | kept)
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(pybullet, name)

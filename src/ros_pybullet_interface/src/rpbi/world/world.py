@@ -545,8 +545,8 @@ class World:
             recorded: A keyframe of the same world at the same tick, which this one is compared with.
 
         Raises:
-            InterfaceError: If the world has a window, a soft body, a body of another package, or an object with a state
-                that cannot be written; or if it differs from the recorded keyframe.
+            InterfaceError: If the world has a window, a soft body, a body of another package, an object with a state
+                that cannot be written, or a change that was not recorded; or if it differs from the recorded keyframe.
             ConfigError: If a body cannot be loaded any more, for instance because its file has gone.
         """
         for _ in self.keyframe_in_parts():
@@ -562,6 +562,7 @@ class World:
         """
         while True:
             refuse(self)
+            self._require_recorded()
             recipe = Recipe.of(self._contents)
             entries = len(self.log)
             fresh = FreshClient(recipe, self.loaded.config)
@@ -579,6 +580,7 @@ class World:
                 raise
             fresh.close()
 
+    @_recorded
     def _move(self, fresh: FreshClient) -> None:
         self._keyframe = move(self, self._contents, self._pushed, fresh)
         self._keyframe_tick = self.clock.tick
@@ -587,6 +589,7 @@ class World:
         self._note("", "keyframe", self._keyframe)
         self.commands.forget()
 
+    @_recorded
     def enter_keyframe(self, keyframe: str, trust: Collection[str] | None = ()) -> None:
         """Brings the world, which was just built or reset, to a keyframe.
 
