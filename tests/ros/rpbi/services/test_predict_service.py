@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -96,18 +97,22 @@ def test_a_world_that_was_reset_is_followed_anew(standing):
 def test_a_bad_candidate_costs_itself_alone(standing):
     good = turn(0.1)
     unknown, outside = (Candidate([PlannedInput(0, *each)]) for each in (("iwa/target", [], []), (INPUT, ["x"], [1.0])))
-    answer = predict(standing, unknown, good, outside, turn(math.nan), ticks=5)
+    answer = predict(standing, unknown, good, outside, turn(math.nan), turn(0.1, tick=5), ticks=5)
     faults = [each.fault for each in answer.predictions]
-    assert answer.success and answer.message.startswith("1 of 4 predicted")
+    assert answer.success and answer.message.startswith("1 of 5 predicted")
+    assert faults[4] == "iiwa/target: expected a tick from 0 to 4, got 5"
     assert "did you mean 'iiwa/target'" in faults[0] and not faults[1] and "'x'" in faults[2] and "finite" in faults[3]
-    assert [each.cost for each in answer.predictions] == [math.inf, 0.0, math.inf, math.inf]
+    assert [each.cost for each in answer.predictions] == [math.inf, 0.0, *[math.inf] * 3]
 
 
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"ticks": 0}, "ticks and candidates: expected at least 1 of each, got 0 and 1"),
-        ({"ticks": 2_000_000}, "ticks: expected at most 1000000 of all candidates, got 2000000"),
+        (
+            {"ticks": 2_000_000},
+            "expected at most 1000000 of all candidates, got 2000000, those of 1 candidates (~max_predicted_ticks)",
+        ),
         ({"ticks": 200_001, "watch": ["box"], "every": 1}, "expected at most 100000 rows of motion, got 200001"),
         ({"watch": ["bx"]}, "did you mean 'box'?"),
         ({"cost": "os:abort"}, "'os:abort' is not trusted"),
@@ -116,3 +121,13 @@ def test_a_bad_candidate_costs_itself_alone(standing):
 def test_bad_requests_are_refused_by_field(standing, fields, message):
     answer = predict(standing, turn(0.1), **fields)
     assert not answer.success and message in answer.message and not answer.predictions
+
+
+def test_a_cancelled_prediction_ends_and_the_next_one_is_made(standing):
+    assert standing.call("/rpbi/cancel_prediction", Trigger).message == "no prediction is under way"
+    with ThreadPoolExecutor() as pool:
+        long = pool.submit(predict, standing, turn(0.1), ticks=1_000_000)
+        wait_until(lambda: standing.call("/rpbi/cancel_prediction", Trigger).success, "it is under way")
+        answer = long.result()
+    assert not answer.success and answer.message == "the prediction was cancelled"
+    assert predict(standing, turn(0.1), ticks=5).success

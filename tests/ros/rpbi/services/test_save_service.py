@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+import rospy
 from node_world import add, main_config, objects, publishing, remove
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -20,6 +23,7 @@ JOINT = "lbr_iiwa_joint_1"
 @pytest.fixture
 def standing(ros, tmp_path):
     """A world that is stepped by a service; it has an arm, and a ball that came later."""
+    rospy.set_param("/ros_pybullet_interface/state_folder", str(tmp_path))
     arm = iiwa(joint_state_publisher_hz=100)
     config = main_config(
         tmp_path,
@@ -66,10 +70,18 @@ def test_a_world_is_what_it_was_and_goes_on_the_same(standing, tmp_path):
 
 def test_files_that_cannot_be_are_named_and_the_world_stays(standing, tmp_path):
     before = step(standing, 10)
-    with pytest.raises(InterfaceError, match=r"expected the full path of a \.world file, got '.*"):
+    with pytest.raises(InterfaceError, match=r"expected the path of a \.world file, got '.*"):
         save(tmp_path / "here.yaml")
     with pytest.raises(InterfaceError, match="cannot be written: no such file"):
         save(tmp_path / "nowhere/here.world")
+    (tmp_path / "gazebo.world").write_text("<sdf/>")
+    with pytest.raises(InterfaceError, match=r"gazebo\.world: exists, and is no saved state"):
+        save(tmp_path / "gazebo.world")
+    for command in (save, restore):
+        with pytest.raises(
+            InterfaceError, match=r"expected a file below .* \(~state_folder of the node\), got '/etc/x\.w"
+        ):
+            command(Path("/etc/x.world"))
     with pytest.raises(InterfaceError, match=r"gone\.world: .*no such file"):
         restore(tmp_path / "gone.world")
     (tmp_path / "cut.world").write_bytes(b"\x1f\x8b")

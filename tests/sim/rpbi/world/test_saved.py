@@ -210,9 +210,13 @@ def test_a_cost_that_only_this_process_has_is_named(arm, monkeypatch):
 
 
 def test_inputs_that_are_refused_are_named(arm):
-    predictions = arm.predict([[(0, "iiwa/aim", {})], [(0, TARGET, {"elbow": 1.0})], []], 5)
+    late, early = ([(tick, TARGET, {"lbr_iiwa_joint_1": 1.0})] for tick in (5, -1))
+    predictions = arm.predict([[(0, "iiwa/aim", {})], [(0, TARGET, {"elbow": 1.0})], [], late, early], 5)
     assert "unknown input 'iiwa/aim'" in predictions[0].fault and "elbow" in predictions[1].fault
     assert predictions[2].fault == ""
+    assert [each.fault for each in predictions[3:]] == [
+        f"{TARGET}: expected a tick from 0 to 4, got {n}" for n in (5, -1)
+    ]
     with pytest.raises(UnknownNameError):
         arm.predict([[]], 5, watch=["cup"])
     with pytest.raises(ValueError, match="at least 1"):

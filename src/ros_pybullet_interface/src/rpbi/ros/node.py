@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import pybullet
@@ -34,7 +35,7 @@ from .headers import use_own_frames, use_prefix
 from .initial_state import start_where_robots_are
 from .requests import Requests
 from .services.object_lifecycle import ObjectLifecycle
-from .services.prediction import Predictor
+from .services.prediction import MAX_TICKS, Predictor
 from .simulation import Simulation
 
 
@@ -62,6 +63,28 @@ def configured_world(robot_description: str | None) -> LoadedWorld:
     if not file.startswith(("{", "package://")):
         file = os.path.join(folder, file)
     return load_world(file, robot_description, config or {})
+
+
+def _state_folder() -> Path:
+    """Returns the folder of `~state_folder`, the user's home by default.
+
+    Raises:
+        ConfigError: If it is no folder.
+    """
+    given = rospy.get_param("~state_folder", "~")
+    folder = Path(given).expanduser() if isinstance(given, str) and given else None
+    if folder is None or not folder.is_absolute() or not folder.is_dir():
+        raise ConfigError([Problem("~state_folder", "", f"expected the full path of a folder, got {given!r}")])
+    return folder
+
+
+def _max_predicted_ticks() -> int:
+    given = rospy.get_param("~max_predicted_ticks", MAX_TICKS)
+    if not isinstance(given, int) or given < 1:
+        raise ConfigError(
+            [Problem("~max_predicted_ticks", "", f"expected a whole number of at least 1, got {given!r}")]
+        )
+    return given
 
 
 def parameter_above(name: str) -> Any:
@@ -131,7 +154,8 @@ class SimulatorNode:
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
-        context = NodeContext(self._simulation, ask, self._objects, Predictor(self._simulation, ask), loading)
+        predictor = Predictor(self._simulation, ask, _max_predicted_ticks())
+        context = NodeContext(self._simulation, ask, self._objects, predictor, loading, _state_folder())
         window.serve(ask)
         for service in NODE_SERVICES:
             serve(service, context)

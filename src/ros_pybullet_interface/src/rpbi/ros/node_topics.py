@@ -28,6 +28,10 @@ class NodeParameter(NamedTuple):
 PARAMETERS = (
     NodeParameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
     NodeParameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
+    NodeParameter("~state_folder", False, "Folder of `rpbi/save` and `rpbi/restore`; the user's home by default."),
+    NodeParameter(
+        "~max_predicted_ticks", False, "Most ticks of all candidates of a `rpbi/predict`; 1,000,000 by default."
+    ),
     NodeParameter(
         "~config",
         False,

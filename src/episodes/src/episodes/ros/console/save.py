@@ -13,7 +13,7 @@ def save(file: Annotated[Path, Argument("FILE.world", parse=Path, files="*")], *
     """Saves the state of the running world in a file, from which `restore` makes the same world, to the last bit.
 
     Args:
-        file: file that the simulator writes, on its computer
+        file: file that the simulator writes, on its computer, in your home or its ~state_folder
         ns: of the simulator, if it was started in one
     """
     return str(RunningSimulator(ns).call("rpbi/save", SetString, str(file.absolute())).message)

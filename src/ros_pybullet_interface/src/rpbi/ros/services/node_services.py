@@ -13,7 +13,7 @@ from cob_srvs.srv import SetString, SetStringRequest
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
-from custom_ros_tools.errors import InterfaceError, UnknownNameError, shortened
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.schema.type_names import shown
 from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
@@ -61,18 +61,17 @@ from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
 from rpbi.world.loading import load_object, type_of
-from rpbi.world.saved.state import WorldState
 
 from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
-from .prediction import Predictor, planned_input, predict
+from .prediction import Predictor, cancel_prediction, planned_input, predict
+from .states import restore, save
 
 log = logging.getLogger(__name__)
 
 MAX_STEPS = 1_000_000
 """Ticks of one request, which is answered when they are done."""
 YAML_SUFFIXES = (".yaml", ".yml")
-STATE_SUFFIX = ".world"
 NO_FOLDER = "~config"
 """Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
@@ -95,6 +94,7 @@ class NodeContext(NamedTuple):
         objects: Objects that are added and removed.
         predictor: Predicts from the present state.
         loading: Context for the files of objects, see `load_object`.
+        state_folder: Folder that states are saved in and restored from.
     """
 
     simulation: Simulation
@@ -102,6 +102,7 @@ class NodeContext(NamedTuple):
     objects: ObjectLifecycle
     predictor: Predictor
     loading: Mapping[str, Any]
+    state_folder: Path
 
 
 def _start(node: NodeContext, _: Any) -> Answer:
@@ -156,31 +157,6 @@ def _reset(node: NodeContext, _: Any) -> Answer:
     """Makes the world what it was at its start, to the last bit; stamps go on."""
     node.objects.reset()
     return Answer(True, "the world is as configured")
-
-
-def _save(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Saves the state of the world in a file, from which it can be restored."""
-    path = _state_file(request.data)
-    state = node.ask(node.simulation.world.save)
-    try:
-        state.write(path)
-    except OSError as error:
-        raise InterfaceError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
-    return Answer(True, f"saved tick {state.tick} in {path}")
-
-
-def _restore(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Restores the state of a file of this world, by simulating again from its start; stamps go on."""
-    state = WorldState.read(_state_file(request.data))
-    node.objects.reset(state)
-    return Answer(True, f"restored tick {state.tick}")
-
-
-def _state_file(name: str) -> Path:
-    path = Path(name)
-    if path.suffix != STATE_SUFFIX or not path.is_absolute():
-        raise InterfaceError(f"data: expected the full path of a {STATE_SUFFIX} file, got {shortened(repr(name))}")
-    return path
 
 
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
@@ -356,9 +332,10 @@ NODE_SERVICES = (
     Service("rpbi/step_n", StepN, _step_n),
     Service("rpbi/step_with_inputs", StepWithInputs, _step_with_inputs),
     Service("rpbi/reset", Trigger, _reset),
-    Service("rpbi/save", SetString, _save),
-    Service("rpbi/restore", SetString, _restore),
+    Service("rpbi/save", SetString, save),
+    Service("rpbi/restore", SetString, restore),
     Service("rpbi/predict", Predict, predict),
+    Service("rpbi/cancel_prediction", Trigger, cancel_prediction),
     Service("rpbi/add_pybullet_object", AddPybulletObject, _add_object),
     Service("rpbi/add_rgbd_sensor", SetString, _add_camera),
     Service("rpbi/remove_pybullet_object", SetString, _remove_object),

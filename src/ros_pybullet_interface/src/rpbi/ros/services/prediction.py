@@ -17,6 +17,7 @@ from ros_pybullet_interface.msg import PredictedBody
 from ros_pybullet_interface.msg import Prediction as PredictionMessage
 from ros_pybullet_interface.srv import PredictRequest
 from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.ros.endpoints import Answer
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
@@ -25,7 +26,7 @@ from rpbi.world.forks.shadow import Shadow
 from rpbi.world.saved.command_log import RecordedCommand
 
 MAX_TICKS = 1_000_000
-"""Largest number of ticks of all candidates of a request; more are rejected."""
+"""Largest number of ticks of all candidates of a request by default; more are rejected."""
 MAX_ROWS = 100_000
 """Largest number of rows of motion in an answer, of all bodies and candidates; more are rejected."""
 EVERY = 10
@@ -44,35 +45,63 @@ class Predictor:
     Args:
         simulation: The loop that runs the world.
         ask: Calls a function in the simulation thread.
+        max_ticks: Largest number of ticks of all candidates of a request.
     """
 
-    def __init__(self, simulation: Simulation, ask: Requests) -> None:
+    def __init__(self, simulation: Simulation, ask: Requests, max_ticks: int = MAX_TICKS) -> None:
         self._simulation, self._ask = simulation, ask
+        self.max_ticks = max_ticks
+        """Largest number of ticks of all candidates of a request."""
         self._lock = threading.Lock()
         self._shadow: Shadow | None = None
         self._resets = 0
+        self._cancels = 0
+        """Number of calls of `cancel`."""
 
     def predict(self, candidates: list[Candidate], job: PredictionJob) -> tuple[int, int, list[Prediction]]:
         """Returns the tick and stamp [ns] from which on is predicted, and what happens with each candidate.
 
         Raises:
-            InterfaceError: If the world cannot be saved, or does not come to the same state in another process.
+            InterfaceError: If it is cancelled, the world cannot be saved, or does not come to the same state in another
+                process.
         """
+        cancels = self._cancels
         with self._lock:
             try:
-                shadow, tick, stamp_ns = self._follow()
+                shadow, tick, stamp_ns = self._follow(cancels)
                 return tick, stamp_ns, shadow.predict(candidates, job, os.cpu_count() or 1)
             except InterfaceError:
                 self._end()
+                self._refuse_cancelled(cancels)
                 raise
 
-    def _follow(self) -> tuple[Shadow, int, int]:
+    def cancel(self) -> bool:
+        """Ends the prediction that is under way and those that wait; any thread may call it.
+
+        The next prediction starts another process, as the first one does.
+
+        Returns:
+            False if there is none.
+        """
+        if not self._lock.locked():
+            return False
+        self._cancels += 1
+        if (shadow := self._shadow) is not None:
+            shadow.kill()
+        return True
+
+    def _refuse_cancelled(self, cancels: int) -> None:
+        if self._cancels != cancels:
+            raise InterfaceError("the prediction was cancelled")
+
+    def _follow(self, cancels: int) -> tuple[Shadow, int, int]:
         """Brings the process that follows to the present state; returns it with the tick and its stamp [ns]."""
         world = self._simulation.world
         if self._shadow is None or self._resets != world.resets:
             self._end()
             state, commands, self._resets = self._ask(lambda: (world.save(), world.commands.count, world.resets))
             self._shadow = Shadow.started(state, commands, NICENESS)
+        self._refuse_cancelled(cancels)
         shadow = self._shadow
 
         def news() -> tuple[bool, list[RecordedCommand], int, str, int]:
@@ -84,7 +113,7 @@ class Predictor:
         follows, new, tick, state_hash, stamp_ns = self._ask(news)
         if not follows:  # the world was reset, or has made a keyframe: another process begins there
             self._end()
-            return self._follow()
+            return self._follow(cancels)
         shadow.follow(new, tick, state_hash)
         return shadow, tick, stamp_ns
 
@@ -105,12 +134,20 @@ def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.T
     return True, f"{good} of {len(messages)} predicted from tick {tick} on", tick, to_ros_time(stamp_ns), messages
 
 
+def cancel_prediction(node: Any, _: Any) -> Answer:
+    """Ends the predictions that are under way or wait; `success` is false if there are none."""
+    has_cancelled = node.predictor.cancel()
+    return Answer(has_cancelled, "cancelled" if has_cancelled else "no prediction is under way")
+
+
 def _job(node: Any, request: PredictRequest) -> PredictionJob:
     count, every = len(request.candidates), request.every or EVERY
     if not request.ticks or not count:
         raise InterfaceError(f"ticks and candidates: expected at least 1 of each, got {request.ticks} and {count}")
-    if request.ticks * count > MAX_TICKS:
-        raise InterfaceError(f"ticks: expected at most {MAX_TICKS} of all candidates, got {request.ticks * count}")
+    most = node.predictor.max_ticks
+    if request.ticks * count > most:
+        asked = f"{request.ticks * count}, those of {count} candidates"
+        raise InterfaceError(f"ticks: expected at most {most} of all candidates, got {asked} (~max_predicted_ticks)")
     rows = request.ticks // every * count * len(request.watch)
     if rows > MAX_ROWS:
         raise InterfaceError(f"every: expected at most {MAX_ROWS} rows of motion, got {rows}; name a larger number")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
 import select
@@ -18,6 +19,15 @@ from rpbi.world.saved.commands import apply_command
 from .prediction import Candidate, Prediction, PredictionJob, predict
 
 PIPE_BYTES = 1 << 20
+_PR_SET_PDEATHSIG = 1
+"""prctl(2): the signal when the thread that has forked ends, which is the only one here."""
+
+
+def end_with(parent: int) -> None:
+    """Has this process, a fork, end as soon as its parent does."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before
+        os._exit(0)
 
 
 def serve(connection: Connection, build: Callable[[], Any]) -> None:
@@ -135,6 +145,7 @@ def _start(world: Any, candidate: Candidate, job: PredictionJob) -> int:
         OSError: If there is no memory, or no process, for the fork.
     """
     reading, writing = os.pipe()
+    parent = os.getpid()
     try:
         is_here = os.fork() > 0
     except OSError:
@@ -145,6 +156,7 @@ def _start(world: Any, candidate: Candidate, job: PredictionJob) -> int:
         os.close(writing)
         return reading
     try:  # whatever fails here ends the fork, which must not serve in place of this process
+        end_with(parent)
         os.close(reading)
         prediction = _predicted(world, candidate, job)
         with open(writing, "wb") as pipe:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.plugins import find
 from custom_ros_tools.transforms import Array
 
@@ -74,13 +75,16 @@ def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
     """Steps a `World` with the inputs of a candidate, and returns what happens.
 
     Raises:
-        InterfaceError: If an input is refused.
+        InterfaceError: If an input is refused, or its tick is not one of the job's.
         ValueError: If the cost is not finite.
     """
     cost: Cost | None = find(job.cost) if isinstance(job.cost, str) else job.cost
     if isinstance(cost, type):
         cost = cost()
     waiting = sorted((PlannedInput(*each) for each in candidate), key=lambda each: each.tick)
+    for planned in waiting:
+        if not 0 <= planned.tick < job.ticks:
+            raise InterfaceError(f"{planned.slot}: expected a tick from 0 to {job.ticks - 1}, got {planned.tick}")
     notes = _Notes(world, job.watch)
     total, start = 0.0, world.clock.tick
     for tick in range(job.ticks):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 import signal
@@ -21,11 +20,9 @@ from custom_ros_tools.processes.child import start_child
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.state import WorldState
 
-from .following import serve
+from .following import end_with, serve
 from .prediction import Candidate, Prediction, PredictionJob
 
-_PR_SET_PDEATHSIG = 1
-"""prctl(2): the signal when the thread that has forked ends, which is the only one here."""
 _STDERR = 2
 MAX_COPIED_MB = 200.0
 """Largest memory of a process that is copied [MB]: a fork of a copy takes 0.04 ms for each, a new program has 60."""
@@ -122,9 +119,7 @@ class _Copy:
             return
         try:
             gc.freeze()  # garbage of this process is not the copy's to finish, such as folders that would be removed
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-            if os.getppid() != parent:
-                return  # it ended before
+            end_with(parent)
             nowhere = os.open(os.devnull, os.O_RDWR)
             for file in map(int, os.listdir("/proc/self/fd")):
                 if file not in (keep, _STDERR):
@@ -230,6 +225,10 @@ class Shadow:
     def predict(self, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
         """Returns what happens with each candidate."""
         return list(self._remote.ask("predict", [list(each) for each in candidates], job, jobs))
+
+    def kill(self) -> None:
+        """Ends it and its predictions; a call that waits in another thread raises an InterfaceError."""
+        self._process.kill()
 
     def close(self) -> None:
         """Ends it; forks go on until they are closed."""

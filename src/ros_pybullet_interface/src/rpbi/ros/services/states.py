@@ -1,0 +1,57 @@
+"""The services `rpbi/save` and `rpbi/restore`: states of the world as files in one folder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from cob_srvs.srv import SetStringRequest
+
+from custom_ros_tools.errors import InterfaceError, shortened
+from custom_ros_tools.foreign import path_below
+from rpbi.ros.endpoints import Answer
+from rpbi.world.saved.state import WorldState
+
+STATE_SUFFIX = ".world"
+
+
+def save(node: Any, request: SetStringRequest) -> Answer:
+    """Saves the state of the world in a file, from which it can be restored."""
+    path = state_file(node.state_folder, request.data)
+    if os.path.lexists(path) and not (path.is_file() and WorldState.is_file(path)):
+        raise InterfaceError(f"{path}: exists, and is no saved state: it is not overwritten")
+    state = node.ask(node.simulation.world.save)
+    try:
+        state.write(path)
+    except OSError as error:
+        raise InterfaceError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+    return Answer(True, f"saved tick {state.tick} in {path}")
+
+
+def restore(node: Any, request: SetStringRequest) -> Answer:
+    """Restores the state of a file of this world, by simulating again from its start; stamps go on."""
+    state = WorldState.read(state_file(node.state_folder, request.data))
+    node.objects.reset(state)
+    return Answer(True, f"restored tick {state.tick}")
+
+
+def state_file(folder: Path, name: str) -> Path:
+    """Returns the path of a state that a caller names.
+
+    Args:
+        folder: Folder that it has to be in, or below.
+        name: A full path, or one from the folder on.
+
+    Raises:
+        InterfaceError: If it is outside, passes a symbolic link, or is no `.world` file.
+    """
+    if not name.endswith(STATE_SUFFIX):
+        raise InterfaceError(f"data: expected the path of a {STATE_SUFFIX} file, got {shortened(repr(name))}")
+    if name.startswith("/"):
+        roots = [root for root in (folder, folder.resolve()) if Path(name).is_relative_to(root)]
+        if not roots:
+            given = shortened(repr(name))
+            raise InterfaceError(f"data: expected a file below {folder} (~state_folder of the node), got {given}")
+        name = str(Path(name).relative_to(roots[0]))
+    return path_below(folder, name)
