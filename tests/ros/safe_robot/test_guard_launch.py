@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from pathlib import Path
+from xml.etree import ElementTree
+from xmlrpc.client import ServerProxy
+
 import pytest
+import rosgraph
 import rospy
 from guarded_arm import HOME, KUKA
 from nextage_like import nextage_like
@@ -68,3 +75,19 @@ def test_kuka_lwr_launch_guards_the_arm_of_a_file(ros):
     names = [f"lwr_arm_{i}_joint" for i in range(7)]
     commands, violations = drive(ros, names, list(HOME), [*HOME[:6], 0.01], 2e-5)
     assert not violations and commands[-1].position == pytest.approx([*HOME[:6], 0.01])
+
+
+def test_a_killed_guard_ends_its_launch(ros):
+    """The robot stays at the last command: a guard that started again would take targets that nobody has seen."""
+    roslaunch = ros.start(["roslaunch", "safe_robot", "kuka_lwr.launch", f"robot_description:={KUKA}"])
+    guard = wait_until(lambda: rosgraph.Master("/test").lookupNode("/robot_safety_node"), "the guard is there")
+    os.kill(ServerProxy(guard).getPid("/test")[2], signal.SIGKILL)
+    wait_until(lambda: roslaunch.poll() is not None, "the launch has ended")
+    assert "REQUIRED process [robot_safety_node-1] has died" in ros.output(roslaunch)
+
+
+def test_all_launch_files_require_their_guards():
+    files = (Path(__file__).resolve().parents[3] / "src").rglob("*.launch")
+    nodes = [node for file in files for node in ElementTree.parse(file).iter("node")]
+    required = [node.get("required") for node in nodes if node.get("type") == "safe_robot_node.py"]
+    assert required == ["true"] * 4

@@ -19,6 +19,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -170,8 +171,11 @@ def _serve(channel: socket.socket) -> list[str]:
         ready, report = os.pipe()
         between = os.fork()
         if not between:
+            between = os.getpid()
             if os.fork():
                 os._exit(0)
+            while os.getppid() == between:  # a node that roslaunch starts watches its parent
+                time.sleep(0.001)
             os.setsid()
             os.dup2(outputs[0], 1)
             os.dup2(outputs[1], 2)

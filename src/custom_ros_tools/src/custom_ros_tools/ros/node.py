@@ -10,6 +10,8 @@ from typing import Any
 
 from custom_ros_tools.console.output import is_output_closed
 
+from .lifecycle.roslaunch_watch import end_with_roslaunch
+
 MIN_MEMORY_BYTES = 500_000_000
 """Bytes of address space that NumPy and PyBullet need; with less, they end the process."""
 
@@ -18,9 +20,10 @@ def run(main: str) -> None:
     """Runs a node's `module:function` with SIGINT blocked for `custom_ros_tools.ros.lifecycle.run_node`.
 
     A signal can be blocked for all threads only before the process has its first one, and libraries start theirs when
-    they are imported; therefore the function is imported here.
+    they are imported; therefore the function is imported here. The node ends with the roslaunch that started it.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    end_with_roslaunch()
     _prepare_for_numpy()
     pkgutil.resolve_name(main)()
 
