@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from node_world import add, main_config, objects, publishing, remove
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from worlds import BOX_FLOOR, ball, box, iiwa
 
 from custom_ros_tools.errors import InterfaceError
@@ -16,6 +20,7 @@ from episodes.ros.console.restore import restore
 from episodes.ros.console.save import save
 from ros_pybullet_interface.srv import GetStateHash, StepN
 from rpbi.world import World
+from rpbi.world.saved.state import WorldState
 
 JOINT = "lbr_iiwa_joint_1"
 
@@ -93,3 +98,24 @@ def test_files_that_cannot_be_are_named_and_the_world_stays(standing, tmp_path):
     with pytest.raises(InterfaceError, match="of another world"):
         restore(tmp_path / "other.world")
     assert standing.call("/rpbi/get_state_hash", GetStateHash).state_hash == before
+
+
+def test_the_node_answers_while_it_restores_and_a_stop_ends_that(standing, tmp_path):
+    step(standing, 10)
+    save(tmp_path / "here.world")
+    state = WorldState.read(tmp_path / "here.world")
+    state._replace(tick=10_000_000).write(tmp_path / "old.world")
+    load = standing.listen("/diagnostics", DiagnosticArray)
+    with ThreadPoolExecutor() as pool:
+        restored = pool.submit(restore, tmp_path / "old.world")
+        wait_until(lambda: standing.call("/rpbi/get_state_hash", GetStateHash).tick > 20, "it is simulated again")
+        refused = remove(standing, "box")
+        assert not refused.success
+        assert re.search(r"being restored, at tick \d+ of 10000000; rpbi/stop ends that", refused.message)
+        wait_until(lambda: any("restoring, at tick" in each.status[0].message for each in load.messages), "it is said")
+        assert standing.call("/rpbi/stop", Trigger).success
+        with pytest.raises(InterfaceError, match=r"stopped at tick \d+ of 10000000: the world was reset"):
+            restored.result()
+    assert set(objects(standing)) == {"floor", "iiwa", "box"}
+    assert standing.call("/rpbi/get_state_hash", GetStateHash).tick == 0
+    assert restore(tmp_path / "here.world") == "restored tick 10"

@@ -5,6 +5,7 @@ import threading
 import pytest
 from tries import tries
 
+from custom_ros_tools.errors import InterfaceError
 from rpbi.engine.mailbox import ClosedError, Mailbox
 
 
@@ -40,6 +41,22 @@ def test_a_request_is_made_by_whoever_runs_requests():
     runner.start()
     runner.join(60.0)
     assert future.result(0) == runner.ident
+
+
+def test_a_busy_world_drops_values_and_refuses_requests():
+    mailbox = Mailbox()
+    mailbox.put("a", 1)
+    mailbox.hold(lambda: "busy")
+    mailbox.put("a", 2)
+    refused, made = mailbox.request(lambda: 1), mailbox.request(lambda: 2, even_if_busy=True)
+    mailbox.run_requests()
+    with pytest.raises(InterfaceError, match="busy"):
+        refused.result(0)
+    assert made.result(0) == 2
+    mailbox.hold(None)
+    assert dict(mailbox.drain()) == {}
+    mailbox.put("a", 3)
+    assert dict(mailbox.drain()) == {"a": 3}
 
 
 def test_a_request_that_raises_hands_its_error_on_and_the_next_is_made():

@@ -7,6 +7,8 @@ from concurrent.futures import Future
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+from custom_ros_tools.errors import InterfaceError
+
 T = TypeVar("T")
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -25,8 +27,9 @@ class Mailbox:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._slots: dict[str, Any] = {}
-        self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._requests: deque[tuple[Callable[[], Any], Future[Any], bool]] = deque()
         self._closed = False
+        self._busy: Callable[[], str] | None = None
         self.generation = 0
         """Grows whenever all values that wait are dropped."""
 
@@ -35,10 +38,10 @@ class Mailbox:
     ) -> None:
         """Puts a value into a slot; one that still waits is replaced, or merged with it.
 
-        A value of another `generation` than the present one is dropped.
+        A value of another `generation` than the present one is dropped, and any value of a world that is busy.
         """
         with self._lock:
-            if generation not in (None, self.generation):
+            if self._busy is not None or generation not in (None, self.generation):
                 return
             if merge is not None and slot in self._slots:
                 value = merge(self._slots[slot], value)
@@ -58,8 +61,21 @@ class Mailbox:
             self._slots = {}
             self.generation += 1
 
-    def request(self, call: Callable[[], T]) -> Future[T]:
+    def hold(self, busy: Callable[[], str] | None) -> None:
+        """Has the world busy with something that nothing may disturb; None ends that.
+
+        Args:
+            busy: Returns the answer to requests meanwhile.
+        """
+        with self._lock:
+            self._busy, self._slots = busy, {}
+
+    def request(self, call: Callable[[], T], even_if_busy: bool = False) -> Future[T]:
         """Asks the simulation thread to make a call.
+
+        Args:
+            call: The call.
+            even_if_busy: Whether it is made even while the world is busy, see `hold`.
 
         Returns:
             A future that gets the call's result, or the exception it raised.
@@ -67,7 +83,7 @@ class Mailbox:
         future: Future[T] = Future()
         with self._lock:
             if not self._closed:
-                self._requests.append((call, future))
+                self._requests.append((call, future, even_if_busy))
                 return future
         future.set_exception(ClosedError("the simulation has ended"))
         return future
@@ -75,10 +91,12 @@ class Mailbox:
     def run_requests(self) -> None:
         """Makes the calls that wait now; those that come meanwhile wait for the next time."""
         for _ in range(len(self._requests)):
-            call, future = self._requests.popleft()
+            call, future, even_if_busy = self._requests.popleft()
             if not future.set_running_or_notify_cancel():
                 continue  # whoever asked has given up waiting
             try:
+                if self._busy is not None and not even_if_busy:
+                    raise InterfaceError(self._busy())
                 future.set_result(call())
             except Exception as error:
                 future.set_exception(error)
@@ -88,6 +106,6 @@ class Mailbox:
         with self._lock:
             self._closed = True
             waiting, self._requests = self._requests, deque()
-        for _, future in waiting:
+        for _, future, _ in waiting:
             if future.set_running_or_notify_cancel():
                 future.set_exception(ClosedError("the simulation has ended"))

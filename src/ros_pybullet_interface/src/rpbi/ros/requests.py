@@ -24,15 +24,20 @@ class Requests:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
 
-    def __call__(self, call: Callable[[], T]) -> T:
+    def __call__(self, call: Callable[[], T], even_if_busy: bool = False) -> T:
         """Returns what the call returns, or raises what it raises; on the simulation thread it is made at once.
 
+        Args:
+            call: The call.
+            even_if_busy: Whether it is made even while the world is restored.
+
         Raises:
-            InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
+            InterfaceError: If the world is being restored, the simulation has ended, the node shuts down or the loop
+                makes no progress.
         """
         if self._simulation.is_own_thread:
             return call()
-        return self.wait_for(self._simulation.world.mailbox.request(call))
+        return self.wait_for(self._simulation.world.mailbox.request(call, even_if_busy))
 
     def wait_for(self, future: Future[T]) -> T:
         """Waits for something that the simulation thread does sooner or later; returns or raises its outcome.

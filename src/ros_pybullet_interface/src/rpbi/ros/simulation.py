@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
@@ -46,6 +46,36 @@ class StepRequest:
         return f"after {self._steps - self.left} of {self._steps} ticks"
 
 
+class RestoreRequest:
+    """A request to restore a state, and the way to it; the caller waits for `done`.
+
+    Args:
+        ticks: The ticks on the way, see `World.restoring`.
+        end: The last of them.
+    """
+
+    def __init__(self, ticks: Generator[int, None, None], end: int) -> None:
+        self.done: Future[None] = Future()
+        self._ticks, self._end, self._tick = ticks, end, 0
+
+    def advance(self, end_s: float) -> bool:
+        """Goes on until a time of the monotonic clock [s]; returns whether it is done."""
+        for tick in self._ticks:
+            self._tick = tick
+            if time.monotonic() > end_s:
+                return False
+        return True
+
+    def end(self, error: Exception | None = None) -> None:
+        """Ends it, and the wait; before its time, the world is reset."""
+        self._ticks.close()
+        if self.done.set_running_or_notify_cancel():
+            self.done.set_result(None) if error is None else self.done.set_exception(error)
+
+    def __str__(self) -> str:
+        return f"at tick {self._tick} of {self._end}"
+
+
 class Simulation:
     """Runs, stops and steps a world on the one thread that owns PyBullet.
 
@@ -59,6 +89,7 @@ class Simulation:
         self._failure: str | None = None
         """Error that stopped it, until the next start or step."""
         self._request: StepRequest | None = None
+        self._restore: RestoreRequest | None = None
         self._thread: int | None = None
         self.passes = 0
         """Number of passes of the loop; grows as long as it is alive."""
@@ -103,6 +134,12 @@ class Simulation:
         if self._request is not None:
             self._abort_request(InterfaceError(f"stopped {self._request}"))
             return True
+        if (restore := self._restore) is not None:
+            self._end_restore(InterfaceError(f"stopped {restore}: the world was reset"))
+            self.running = False
+            self._start_again()
+            self._status.publish(False)
+            return True
         if not self.running:
             return False
         self._halt()
@@ -144,29 +181,63 @@ class Simulation:
         self._status.publish(True)
         return request.done
 
-    def reset(self, refill: Callable[[], None] = lambda: None, to: WorldState | None = None) -> None:
+    def reset(self, refill: Callable[[], None] = lambda: None) -> None:
         """Resets the world to its state when built; it keeps running or standing still, and its time continues.
 
         Args:
             refill: Puts the inputs of the new start.
-            to: A saved state, to which it is restored instead.
 
         Raises:
-            InterfaceError: If something cannot be loaded any more, or the state is not reached; then it stands still.
+            InterfaceError: If something cannot be loaded any more; then it stands still.
         """
-        if self._request is not None:
-            request = self._end_request()
-            request.fail(InterfaceError(f"the world was reset {request}"))
+        self._interrupt_request()
         try:
-            if to is None:
-                self.world.reset()
-            else:
-                self.world.restore(to)
+            self.world.reset()
         except InterfaceError as error:
             self._break_off(error)
             raise
-        self._failure = None
         refill()
+        self._start_again()
+
+    def restore(self, to: WorldState) -> Future[None]:
+        """Restores a saved state of this world, a few milliseconds in each pass of the loop.
+
+        Meanwhile nothing is published of the world, inputs are dropped, and requests that would change or save it are
+        refused. A stop ends it and resets the world.
+
+        Returns:
+            What is done when the world keeps running or standing still from that state on. It fails with an
+            InterfaceError if the state is not reached; then the world was reset and stands still.
+        """
+        self._interrupt_request()
+        restore = self._restore = RestoreRequest(self.world.restoring(to), to.tick)
+        self.world.mailbox.hold(lambda: f"the world is being restored, {restore}; rpbi/stop ends that")
+        self._advance_restore(restore)
+        return restore.done
+
+    def _interrupt_request(self) -> None:
+        if self._request is not None:
+            request = self._end_request()
+            request.fail(InterfaceError(f"the world was reset {request}"))
+
+    def _advance_restore(self, restore: RestoreRequest) -> None:
+        try:
+            if restore.advance(time.monotonic() + BURST_S):
+                self._end_restore()
+                self._start_again()
+        except Exception as error:
+            self._end_restore(error)
+            self._break_off(error)
+
+    def _end_restore(self, error: Exception | None = None) -> None:
+        restore, self._restore = self._restore, None
+        self.world.mailbox.hold(None)
+        if restore is not None:
+            restore.end(error)
+
+    def _start_again(self) -> None:
+        """Publishes a world that is another one by now, with its inputs."""
+        self._failure = None
         self.world.apply_inputs()
         self._pacer.restart()
         self._publishers.restart()
@@ -203,11 +274,13 @@ class Simulation:
                     if not self.world.is_connected:  # the loop is over, and that is why
                         break
                     self._break_off(error)
-            if self._request is None:
+            if self._request is None and self._restore is None:
                 (self._pacer if self.running else self._idle_pacer).wait()
 
     def _move(self) -> None:
-        if self._request is not None:
+        if self._restore is not None:
+            self._advance_restore(self._restore)
+        elif self._request is not None:
             self._advance_request(self._request)
         elif not self.running:
             self._idle()
@@ -215,9 +288,10 @@ class Simulation:
             self._run_due_ticks()
 
     def _publish(self) -> None:
-        self._status.spin(self.running, self._request is not None)
+        busy = "" if self._restore is None else f"restoring, {self._restore}"
+        self._status.spin(self.running and not busy, self._request is not None, busy)
         self._commands.spin()
-        self._state.spin(self.running or self._request is not None)
+        self._state.spin(self.running and not busy or self._request is not None)
         flush_buffered_sockets()
 
     def _run_due_ticks(self) -> None:

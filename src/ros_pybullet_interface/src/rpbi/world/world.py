@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -658,10 +658,10 @@ class World:
         for _ in self.restoring(state, trust):
             pass
 
-    def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Iterator[int]:
+    def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Generator[int, None, None]:
         """Does the same in steps, of a state that was checked; yields each tick on the way.
 
-        If the iterator is closed before its end, the world is reset.
+        If the generator is closed before its end, the world is reset.
         """
         self._contents.move_cameras_back()
         self.reset()

@@ -144,28 +144,29 @@ class StatusPublisher:
         self._diagnostics = rospy.Publisher(DIAGNOSTICS.name, DiagnosticArray, queue_size=10)
         self._overruns = 0
 
-    def spin(self, running: bool, stepping: bool = False) -> None:
+    def spin(self, running: bool, stepping: bool = False, busy: str = "") -> None:
         """Publishes what is due by the wall clock.
 
         Args:
             running: Whether the world runs.
             stepping: Whether it is about the ticks of a request.
+            busy: Message of the diagnostics while it does something else.
         """
         if self._rate.is_due():
             self.publish(running or stepping)
         if self._diagnostics_rate.is_due():
-            self._publish_diagnostics(running, stepping)
+            self._publish_diagnostics(running, stepping, busy)
 
     def publish(self, running: bool) -> None:
         """Publishes 1 for running, 0 for stopped."""
         self._status.publish(Int64(int(running)))
 
-    def _publish_diagnostics(self, running: bool, stepping: bool) -> None:
+    def _publish_diagnostics(self, running: bool, stepping: bool, busy: str) -> None:
         factor = self._pacer.measure()
         overruns = self._pacer.overruns - self._overruns
         self._overruns = self._pacer.overruns
         status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
-        status.message = "running" if running else "stepping" if stepping else "stopped"
+        status.message = busy or ("running" if running else "stepping" if stepping else "stopped")
         asked = self._pacer.real_time_factor
         if running and factor < FALLING_BEHIND * asked:
             status.level = DiagnosticStatus.WARN

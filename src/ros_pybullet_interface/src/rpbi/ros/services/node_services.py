@@ -113,7 +113,7 @@ def _start(node: NodeContext, _: Any) -> Answer:
 
 def _stop(node: NodeContext, _: Any) -> Answer:
     """Lets the world stand still; `success` is false if it does so already."""
-    has_stopped = node.ask(node.simulation.stop)
+    has_stopped = node.ask(node.simulation.stop, even_if_busy=True)
     return Answer(has_stopped, "stopped" if has_stopped else "already stopped")
 
 
@@ -162,7 +162,9 @@ def _reset(node: NodeContext, _: Any) -> Answer:
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
     """Returns a text that is the same for worlds in the same state."""
     world, clock = node.simulation.world, node.simulation.world.clock
-    return node.ask(lambda: (True, "", clock.tick, to_ros_time(clock.stamp_ns), world.resets, world.state_hash()))
+    return node.ask(
+        lambda: (True, "", clock.tick, to_ros_time(clock.stamp_ns), world.resets, world.state_hash()), even_if_busy=True
+    )
 
 
 def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
@@ -239,7 +241,7 @@ def _remove_object(node: NodeContext, request: SetStringRequest) -> Answer:
 def _list_objects(node: NodeContext, _: Any) -> tuple[list[str], list[str]]:
     """Returns names and types of all objects and cameras."""
     world = node.simulation.world
-    bodies, cameras = node.ask(lambda: (dict(world.bodies), list(world.cameras)))
+    bodies, cameras = node.ask(lambda: (dict(world.bodies), list(world.cameras)), even_if_busy=True)
     types = [BODY_TYPES.name_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
     return [*bodies, *cameras], types
 

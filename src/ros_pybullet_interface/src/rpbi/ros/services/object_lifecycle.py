@@ -1,8 +1,9 @@
 """Objects that come and go while the node runs, in the world and in ROS."""
 
 import threading
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
@@ -18,7 +19,7 @@ from rpbi.ros.requests import Requests
 from rpbi.ros.services.body_endpoints import BodyEndpoints
 from rpbi.ros.simulation import Simulation
 from rpbi.sensors.rgbd import RgbdSensor
-from rpbi.world.saved.state import WorldState
+from rpbi.world.saved.state import MAX_TICKS, WorldState
 
 
 class ObjectLifecycle:
@@ -45,7 +46,7 @@ class ObjectLifecycle:
         Raises:
             InterfaceError: If it does not fit, or its topics cannot be opened; then there is nothing of it.
         """
-        with self._lock:
+        with self._alone():
             config = with_initial_state(config, file)
             self._prepare(kind, config, file)  # in this thread, since the simulation's has no time for large files
             self._ask(lambda: self._add_body(kind, config, file))
@@ -61,7 +62,7 @@ class ObjectLifecycle:
         Raises:
             ConfigError: If its name is taken.
         """
-        with self._lock:
+        with self._alone():
             self._ask(lambda: self._world.add_camera(config, file))
             self._place_cameras()
 
@@ -71,7 +72,7 @@ class ObjectLifecycle:
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        with self._lock:
+        with self._alone():
             if name in self._world.cameras:
                 self._ask(lambda: self._world.remove(name))
                 self._place_cameras()
@@ -89,13 +90,20 @@ class ObjectLifecycle:
         Raises:
             InterfaceError: If something cannot be loaded any more, or the state is of another world or not reached.
         """
-        with self._lock:
+        with self._alone():
             for name in self._ask(self._world.changed_names):
                 self._inputs.close(name)
-            closed, topics, error = self._ask(lambda: self._start_again(to))
+            changed, topics, error, restored = self._ask(lambda: self._start_again(to))
+            if restored is not None:
+                try:
+                    self._ask.wait_for(restored)
+                except InterfaceError as problem:
+                    error = problem
+            lost = self._open_bodies - changed - self._world.bodies.keys()
+            topics += self._ask(lambda: self._forget(lost))
             for topic in topics:
                 topic.close()
-            for name in closed:
+            for name in changed | lost:
                 self._close(name)
             for name in self._world.bodies:
                 if name not in self._open_bodies:
@@ -126,29 +134,39 @@ class ObjectLifecycle:
             self._world.remove(config.name)
             raise
 
-    def _start_again(self, to: WorldState | None) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
-        """Does the simulation thread's part of a reset.
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Waits until nobody else adds, removes or resets; refuses at once while a state is restored."""
+        self._ask(lambda: None)
+        with self._lock:
+            yield
+
+    def _forget(self, names: Iterable[str]) -> list[FastTopic]:
+        return [topic for name in names for topic in self._publishers.forget(name)]
+
+    def _start_again(
+        self, to: WorldState | None
+    ) -> tuple[set[str], list[FastTopic], InterfaceError | None, Future[None] | None]:
+        """Does the simulation thread's part of a reset, or the first part of restoring a state.
 
         Returns:
-            The bodies that have gone or may be others now, their topics to close, and what went wrong.
+            The bodies that have gone or may be others now, their topics to close, what went wrong, and what is done
+            when the state is restored.
         """
         if to is not None:
             self._world.require_own(to)
+            to.require_short(MAX_TICKS)
         changed = self._world.changed_names()
         for name in changed & self._world.bodies.keys():
             self._world.remove(name)
-        topics = [topic for name in changed for topic in self._publishers.forget(name)]
-        error = None
+        topics = self._forget(changed)
+        if to is not None:
+            return changed, topics, None, self._simulation.restore(to)
         try:
-            if to is None:
-                self._simulation.reset(self._inputs.repeat_poses)
-            else:
-                self._simulation.reset(to=to)
-        except InterfaceError as problem:
-            error = problem
-        lost = self._open_bodies - changed - self._world.bodies.keys()
-        topics += [topic for name in lost for topic in self._publishers.forget(name)]
-        return changed | lost, topics, error
+            self._simulation.reset(self._inputs.repeat_poses)
+        except InterfaceError as error:
+            return changed, topics, error, None
+        return changed, topics, None, None
 
     def _place_cameras(self) -> None:
         """Follows the TF frames of the cameras that there are now, and no others."""

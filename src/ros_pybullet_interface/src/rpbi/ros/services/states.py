@@ -30,7 +30,10 @@ def save(node: Any, request: SetStringRequest) -> Answer:
 
 
 def restore(node: Any, request: SetStringRequest) -> Answer:
-    """Restores the state of a file of this world, by simulating again from its start; stamps go on."""
+    """Restores the state of a file of this world, by simulating again from its start or keyframe; stamps go on.
+
+    The node answers meanwhile; `rpbi/stop` ends it, and the world is reset.
+    """
     state = WorldState.read(state_file(node.state_folder, request.data))
     node.objects.reset(state)
     return Answer(True, f"restored tick {state.tick}")
