@@ -6,7 +6,6 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import pybullet
@@ -36,6 +35,7 @@ from .initial_state import start_where_robots_are
 from .requests import Requests
 from .services.object_lifecycle import ObjectLifecycle
 from .services.prediction import MAX_TICKS, Predictor
+from .services.states import state_folder
 from .simulation import Simulation
 
 
@@ -63,19 +63,6 @@ def configured_world(robot_description: str | None) -> LoadedWorld:
     if not file.startswith(("{", "package://")):
         file = os.path.join(folder, file)
     return load_world(file, robot_description, config or {})
-
-
-def _state_folder() -> Path:
-    """Returns the folder of `~state_folder`, the user's home by default.
-
-    Raises:
-        ConfigError: If it is no folder.
-    """
-    given = rospy.get_param("~state_folder", "~")
-    folder = Path(given).expanduser() if isinstance(given, str) and given else None
-    if folder is None or not folder.is_absolute() or not folder.is_dir():
-        raise ConfigError([Problem("~state_folder", "", f"expected the full path of a folder, got {given!r}")])
-    return folder
 
 
 def _max_predicted_ticks() -> int:
@@ -155,7 +142,7 @@ class SimulatorNode:
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
         predictor = Predictor(self._simulation, ask, _max_predicted_ticks())
-        context = NodeContext(self._simulation, ask, self._objects, predictor, loading, _state_folder())
+        context = NodeContext(self._simulation, ask, self._objects, predictor, loading, state_folder())
         window.serve(ask)
         for service in NODE_SERVICES:
             serve(service, context)

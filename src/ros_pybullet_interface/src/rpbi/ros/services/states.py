@@ -6,14 +6,28 @@ import os
 from pathlib import Path
 from typing import Any
 
+import rospy
 from cob_srvs.srv import SetStringRequest
 
-from custom_ros_tools.errors import InterfaceError, shortened
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, shortened
 from custom_ros_tools.foreign import path_below
 from rpbi.ros.endpoints import Answer
 from rpbi.world.saved.state import WorldState
 
 STATE_SUFFIX = ".world"
+
+
+def state_folder() -> Path:
+    """Returns the folder of `~state_folder`, the user's home by default.
+
+    Raises:
+        ConfigError: If it is no folder.
+    """
+    given = rospy.get_param("~state_folder", "~")
+    folder = Path(given).expanduser() if isinstance(given, str) and given else None
+    if folder is None or not folder.is_absolute() or not folder.is_dir():
+        raise ConfigError([Problem("~state_folder", "", f"expected the full path of a folder, got {given!r}")])
+    return folder
 
 
 def save(node: Any, request: SetStringRequest) -> Answer:
