@@ -134,7 +134,7 @@ PLANTED: dict[str, tuple[Callable[[Path], object], str]] = {
     "video of another rate": (refilm(list, fps=25), rf"{VIDEO}: 25 frames a second, but meta/info.json has 30"),
     "unknown path": (
         edit_json("meta/info.json", lambda info: put(info, "data_path", "data/{number}.parquet")),
-        r"data: has another content than expected \(KeyError: 'number'\)",
+        r"meta/info.json: data_path: expected the placeholders chunk_index, file_index, found 'number'",
     ),
     "wrong fps": (
         edit_json("meta/info.json", lambda info: put(info, "fps", 25)),
@@ -246,7 +246,7 @@ PLANTED: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "facts lost": (
         lambda folder: (folder / "rpbi/episode_000001.json").unlink(),
-        r"rpbi/episode_000001.json cannot be read: No such file",
+        r"rpbi/episode_000001.json cannot be read: no such file",
     ),
 }  # fmt: skip
 

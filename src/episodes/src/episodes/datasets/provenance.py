@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from custom_ros_tools.files import atomic_file
+
+from .foreign_files import read_json
 
 Array = NDArray[Any]
 
@@ -267,16 +268,17 @@ def read_images(folder: Path, index: int) -> dict[str, Array]:
     try:
         with np.load(path) as data:
             return dict(data)
-    except (OSError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # zipfile and numpy have errors of all kinds for a broken file
         raise ValueError(f"{FOLDER}/{path.name} cannot be read: {' '.join(str(error).split())}") from error
 
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        words = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise ValueError(f"{FOLDER}/{path.name} cannot be read: {words}") from error
+        data = read_json(path.parent.parent, f"{FOLDER}/{path.name}")
+    except ValueError as error:
+        raise ValueError(f"{FOLDER}/{path.name} cannot be read: {error}") from error
     if not isinstance(data, dict):
         raise ValueError(f"{FOLDER}/{path.name}: expected a mapping")
     return data

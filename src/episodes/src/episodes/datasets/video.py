@@ -21,6 +21,8 @@ Array = NDArray[Any]
 ENCODER = "libx264"
 """Encoder of H.264. That of AV1, SVT-AV1, gives the calling thread of root the highest real-time priority."""
 PIXEL_FORMAT = "yuv420p"
+MAX_PIXELS = 7680 * 4320
+"""Largest number of pixels of a frame that is read."""
 KEY_FRAME_EVERY = 2
 """Frames from one key frame to the next; a reader that jumps to a frame decodes at most so many."""
 
@@ -101,12 +103,16 @@ def read_video(path: Path) -> Iterator[tuple[float, Array]]:
 
 def _opened(path: Path) -> Any:
     try:
-        container = av.open(str(path))
+        container = av.open(str(path), format="mp4")  # others may be lists of files and addresses
     except (av.FFmpegError, OSError) as error:
         raise ValueError(f"cannot be read: {_words(error)}") from error
     if not container.streams.video:
         container.close()
         raise ValueError("has no video in it")
+    stream = container.streams.video[0]
+    if stream.width * stream.height > MAX_PIXELS:
+        container.close()
+        raise ValueError(f"has frames of {stream.width} x {stream.height} pixels, expected at most {MAX_PIXELS:,}")
     return container
 
 

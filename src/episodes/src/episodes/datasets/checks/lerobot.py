@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import parquet
 
+from episodes.datasets.foreign_files import file_name, read_json, read_parquet
 from episodes.datasets.layouts import lerobot as layout
 from episodes.datasets.provenance import coarse, image_faults, read_images
 from episodes.datasets.statistics import statistics
@@ -72,9 +71,9 @@ class _Check:
         """Checks the description of the data set."""
         path = "meta/info.json"
         try:
-            info = json.loads((self._folder / path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            yield f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"
+            info = read_json(self._folder, path)
+        except ValueError as error:
+            yield f"{path}: {_unreadable(error)}"
             return
         missing = [key for key in REQUIRED if key not in info] if isinstance(info, dict) else REQUIRED
         if missing:
@@ -124,9 +123,10 @@ class _Check:
         """Checks `meta/tasks.parquet`."""
         path = "meta/tasks.parquet"
         try:
-            table = parquet.read_table(self._folder / path).to_pandas()
-            self._tasks = {int(row.task_index): str(row.Index) for row in table.itertuples()}
-        except (OSError, pa.ArrowException, AttributeError, ValueError) as error:
+            columns = read_parquet(self._folder / path).to_pydict()
+            texts = next(each for key, each in columns.items() if key != "task_index")
+            self._tasks = {int(number): str(text) for number, text in zip(columns["task_index"], texts)}
+        except (ValueError, KeyError, StopIteration, TypeError) as error:
             yield f"{path}: {_unreadable(error)}"
             return
         if len(self._tasks) != self._info["total_tasks"]:
@@ -142,8 +142,8 @@ class _Check:
         rows: list[dict[str, Any]] = []
         for path in paths:
             try:
-                rows += parquet.read_table(path).to_pylist()
-            except (OSError, pa.ArrowException) as error:
+                rows += read_parquet(path).to_pylist()
+            except ValueError as error:
                 yield f"{path.relative_to(self._folder)}: {_unreadable(error)}"
         needed = {"episode_index", "length", "tasks", "dataset_from_index", "dataset_to_index"}
         needed |= {"data/chunk_index", "data/file_index"}
@@ -187,7 +187,12 @@ class _Check:
         by_file: dict[str, list[dict[str, Any]]] = {}
         for row in self.episodes:
             place = {"chunk_index": row["data/chunk_index"], "file_index": row["data/file_index"]}
-            by_file.setdefault(self._info["data_path"].format(**place), []).append(row)
+            try:
+                name = file_name(self._info["data_path"], place)
+            except ValueError as error:
+                yield f"meta/info.json: data_path: {error}"
+                return
+            by_file.setdefault(name, []).append(row)
         on_disk = {str(path.relative_to(self._folder)) for path in (self._folder / "data").glob("*/*")}
         for name in sorted(on_disk - by_file.keys()):
             yield f"{name}: no episode is in it, says meta/episodes"
@@ -196,8 +201,8 @@ class _Check:
                 yield f"{name}: is missing"
                 continue
             try:
-                table = parquet.read_table(self._folder / name)
-            except (OSError, pa.ArrowException) as error:
+                table = read_parquet(self._folder / name)
+            except ValueError as error:
                 yield f"{name}: {_unreadable(error)}"
                 continue
             for fault in self._table_faults(table, rows):
@@ -274,8 +279,8 @@ class _Check:
         """Compares the statistics with the values."""
         path = "meta/stats.json"
         try:
-            stats = json.loads((self._folder / path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            stats = read_json(self._folder, path)
+        except ValueError as error:
             yield f"{path}: {_unreadable(error)}"
             return
         for key in sorted(self._info["features"].keys() - stats.keys() - layout.ROW_COLUMNS.keys()):
@@ -303,9 +308,12 @@ class _Check:
                     yield f"meta/episodes: episode {row['episode_index']}: expected {', '.join(missing)}, found none"
                     continue
                 place = {"video_key": key, "chunk_index": row[columns[0]], "file_index": row[columns[1]]}
-                by_file.setdefault(str(self._info.get("video_path") or layout.VIDEO_PATH).format(**place), []).append(
-                    row
-                )
+                try:
+                    name = file_name(self._info.get("video_path") or layout.VIDEO_PATH, place)
+                except ValueError as error:
+                    yield f"meta/info.json: video_path: {error}"
+                    return
+                by_file.setdefault(name, []).append(row)
             for name, rows in by_file.items():
                 for fault in self._file_faults(self._folder / name, key, feature, rows):
                     yield f"{name}: {fault}"
@@ -375,7 +383,7 @@ def _is_feature(feature: Any) -> bool:
 
 
 def _unreadable(error: Exception) -> str:
-    return f"cannot be read: {getattr(error, 'strerror', None) or ' '.join(str(error).split())}"
+    return f"cannot be read: {' '.join(str(error).removeprefix('cannot be read: ').split())}"
 
 
 def _type_faults(key: str, feature: Mapping[str, Any], values: Array) -> Iterator[str]:

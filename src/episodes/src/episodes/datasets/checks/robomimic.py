@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from episodes.datasets.foreign_files import hdf5_faults
 from episodes.datasets.format import ACTION
 from episodes.datasets.layouts.robomimic import ACTIONS, observation_key
 from episodes.datasets.provenance import frame_changes, frame_checksums
@@ -26,8 +27,9 @@ def robomimic_faults(folder: Path) -> Iterator[str]:
     episodes = 0
     for path in sorted(folder.glob("*.hdf5")):
         try:
-            with h5py.File(path) as file:
-                for fault in guarded("data", _file_faults(file, facts)):
+            with h5py.File(path, "r") as file:
+                foreign = list(hdf5_faults(file, path.stat().st_size))
+                for fault in foreign or guarded("data", _file_faults(file, facts)):
                     yield f"{path.name}: {fault}"
                 episodes += len(file.get("data", ()))
         except (OSError, RuntimeError, KeyError) as error:  # h5py has errors of all kinds for a broken file
@@ -120,7 +122,11 @@ def _demo_faults(
         yield from (f"obs/{name}: {fault}" for fault in faults)
         following = demo.get(f"next_obs/{name}")
         if following is not None and len(following) == len(values) == count > 1:
-            if not np.array_equal(following[:-1], values[1:], equal_nan=values.ndim == 2):
+            if values.ndim == 2:
+                is_same = np.array_equal(following[:-1], values[1:], equal_nan=True)
+            else:  # one image at a time
+                is_same = all(np.array_equal(following[row], values[row + 1]) for row in range(count - 1))
+            if not is_same:
                 yield f"next_obs/{name}: is not obs/{name} one frame later"
     if "dones" in demo and np.flatnonzero(demo["dones"][:]).tolist() != [count - 1]:
         yield "dones: expected 1 in the last frame alone"

@@ -1,0 +1,148 @@
+"""Foreign data sets: their folder is looked at before it is read, and they are read in a process with limits.
+
+The libraries that read Parquet, HDF5, videos and SQLite were not made for hostile files. If one of them ends the
+process, that is reported.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.foreign import MAX_ENTRIES, printable
+
+BASE_TIME_S = 30
+"""Processor time for any data set [s]."""
+TIME_PER_MB_S = 10
+"""Processor time for each MB of its files, most of it for videos [s]."""
+BASE_MEMORY = 1_200_000_000
+"""Memory for any data set, beside that of the program [bytes]."""
+MEMORY_PER_BYTE = 10
+"""Memory for each byte of its files."""
+MAX_DEPTH = 16
+"""Levels of folders."""
+ANY_SIZE = "--any-size, if you know who made it"
+
+
+class Tree(NamedTuple):
+    """Content of a folder.
+
+    Attributes:
+        faults: Sentences on entries that are not read: links, pipes, devices, too many files.
+        size: Bytes of all files.
+    """
+
+    faults: tuple[str, ...]
+    size: int
+
+
+class CheckLine(NamedTuple):
+    """A line from the process that reads: its kind, a word, and its text."""
+
+    kind: str
+    text: str
+
+
+FAULT, SUMMARY, ERROR = "fault", "summary", "error"
+"""Kinds of lines; an error ends the check."""
+
+
+def look_at(folder: Path) -> Tree:
+    """Looks at all entries of a data set, without opening a file."""
+    faults: list[str] = []
+    size = count = 0
+    waiting = [(folder, 0)]
+    while waiting:
+        place, depth = waiting.pop()
+        with os.scandir(place) as entries:
+            for entry in entries:
+                name = printable(str(Path(entry.path).relative_to(folder)))
+                count += 1
+                if count > MAX_ENTRIES:
+                    return Tree((f"expected at most {MAX_ENTRIES:,} files and folders, found more",), size)
+                if entry.is_symlink():
+                    faults.append(f"{name}: expected a file or folder, found a symbolic link")
+                elif entry.is_dir():
+                    waiting.append((Path(entry.path), depth + 1))
+                    if depth == MAX_DEPTH:
+                        return Tree((f"{name}: expected at most {MAX_DEPTH} levels of folders, found more",), size)
+                elif entry.is_file():
+                    size += entry.stat().st_size
+                else:
+                    faults.append(f"{name}: expected a file or folder, found a pipe, a socket or a device")
+    return Tree(tuple(sorted(faults)), size)
+
+
+def confined(task: Callable[[], Iterable[CheckLine]], size: int, any_size: bool = False) -> Iterator[CheckLine]:
+    """Yields the lines of a task that runs in a child process, which cannot write to files.
+
+    Args:
+        task: Reads foreign files.
+        size: Their size, by which limits grow [bytes].
+        any_size: Whether to leave time and memory unlimited.
+
+    Yields:
+        Its lines; at last one more of the kind `ERROR` if it exceeded a limit or was ended by a signal.
+    """
+    time_s = BASE_TIME_S + TIME_PER_MB_S * size // 1_000_000
+    memory = BASE_MEMORY + MEMORY_PER_BYTE * size
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        os.close(reading)
+        _run(task, writing, None if any_size else (time_s, memory))
+    os.close(writing)
+    try:
+        with open(reading, encoding="utf-8") as lines:
+            for line in lines:
+                yield CheckLine(*json.loads(line))
+        _, status = os.waitpid(child, 0)
+        child = 0
+    finally:
+        if child:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        over_time = f"expected at most {time_s:,} s of processor time, needs more; {ANY_SIZE}"
+        ended = f"a library that reads it was ended by {signal.Signals(number).name}"
+        yield CheckLine(ERROR, over_time if number in (signal.SIGXCPU, signal.SIGKILL) else ended)
+    elif os.WEXITSTATUS(status) == errno.ENOMEM:
+        yield CheckLine(ERROR, f"expected at most {memory / 1e9:.1f} GB of memory, needs more; {ANY_SIZE}")
+
+
+def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[int, int] | None) -> None:
+    """Runs the task in this process, which ends."""
+    code = 0
+    try:
+        silence = os.open(os.devnull, os.O_RDWR)
+        for number in (0, 1, 2):  # libraries print to them what is in files
+            os.dup2(silence, number)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+        if limits is not None:
+            resource.setrlimit(resource.RLIMIT_CPU, (limits[0], limits[0] + 5))
+            resource.setrlimit(resource.RLIMIT_DATA, (_own_memory() + limits[1],) * 2)
+        with open(writing, "w", encoding="utf-8") as lines:
+            for line in task():
+                print(json.dumps(line), file=lines, flush=True)
+    except MemoryError:
+        code = errno.ENOMEM
+    except BrokenPipeError:
+        code = errno.EPIPE
+    finally:
+        os._exit(code)
+
+
+def _own_memory() -> int:
+    """Returns the memory that this process has for data [bytes]."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmData:"):
+            return int(line.split()[1]) * 1024
+    return 0

@@ -1,0 +1,140 @@
+"""Files of data sets of other people: Parquet, HDF5 and JSON, read within limits; names of files that are templates."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.foreign import load_foreign_json, path_below, read_below
+
+MAX_JSON_BYTES = 256_000_000
+"""Largest JSON file, such as the state hashes of hours [bytes]."""
+MAX_JSON_VALUES = 20_000_000
+MAX_VALUES = 20_000_000
+"""Values of a table, or of numbers in an HDF5 file, that any file may have; larger ones have one for each byte."""
+MAX_ROW_BYTES = 100_000_000
+"""Bytes of one image of an HDF5 file."""
+MAX_OBJECTS = 100_000
+"""Groups and data sets of an HDF5 file, each counted as often as it is reached."""
+MAX_PLACE = 1_000_000_000
+"""Largest number of a file or folder."""
+_PLACEHOLDER = re.compile(r"\{(\w+)(?::0?(\d)d)?\}")
+
+
+def read_json(folder: Path, name: str) -> Any:
+    """Returns the value in a JSON file of a data set.
+
+    Raises:
+        ValueError: If it cannot be read, or is too large.
+    """
+    try:
+        return load_foreign_json(read_below(folder, name, MAX_JSON_BYTES), name, MAX_JSON_BYTES, MAX_JSON_VALUES)
+    except ConfigError as error:
+        raise ValueError("; ".join(each.message for each in error.problems)) from None
+
+
+def file_name(template: Any, place: Mapping[str, Any]) -> str:
+    """Returns the name of a file by a template such as `data/file-{file_index:03d}.parquet`.
+
+    Args:
+        template: The template; of the syntax of Python, only plain placeholders count.
+        place: Values of the placeholders: names, and numbers of at least 0.
+
+    Raises:
+        ValueError: If the template has another placeholder, a value is of another kind, or the file would not be in the
+            data set.
+    """
+    for key, value in place.items():
+        is_number = isinstance(value, int) and 0 <= value <= MAX_PLACE
+        if not is_number and not isinstance(value, str):
+            raise ValueError(f"{key}: expected a number from 0 on, found {value!r:.60}")
+
+    def filled(match: re.Match[str]) -> str:
+        key, width = match.groups()
+        if key not in place:
+            raise ValueError(f"expected the placeholders {', '.join(place)}, found '{key}'")
+        return str(place[key]).zfill(int(width or 0))
+
+    if not isinstance(template, str) or re.search("[{}]", _PLACEHOLDER.sub("", template)):
+        raise ValueError(f"expected a name with placeholders such as {{file_index:03d}}, found {template!r:.100}")
+    name = _PLACEHOLDER.sub(filled, template)
+    try:
+        path_below(Path("/"), name)
+    except ConfigError as error:
+        raise ValueError("; ".join(each.message for each in error.problems)) from None
+    return "/".join(part for part in name.split("/") if part not in ("", "."))
+
+
+def read_parquet(path: Path) -> Any:
+    """Returns the table of a Parquet file, whose size is read from its metadata first.
+
+    Raises:
+        ValueError: If it cannot be read, or has too many values.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        with parquet.ParquetFile(path, memory_map=False, pre_buffer=False) as file:
+            facts = file.metadata
+            groups = [facts.row_group(number) for number in range(facts.num_row_groups)]
+            values = sum(group.column(i).num_values for group in groups for i in range(facts.num_columns))
+            most = max(MAX_VALUES, path.stat().st_size)
+            if max(values, facts.num_rows) > most:
+                raise ValueError(f"expected at most {most:,} values, found {max(values, facts.num_rows):,}")
+            return file.read(use_threads=False)
+    except (OSError, pa.ArrowException) as error:
+        raise ValueError(f"cannot be read: {getattr(error, 'strerror', None) or _words(error)}") from error
+
+
+def hdf5_faults(file: Any, size: int) -> Iterator[str]:
+    """Yields a sentence for each object of an HDF5 file that is not read.
+
+    These are links, but for those by which groups have their members; data that lie in other files, that are no numbers
+    or texts, or that unfold to too much.
+
+    Args:
+        file: The open file.
+        size: Its length [bytes].
+    """
+    import h5py
+
+    waiting = [(file, "")]
+    objects = values = 0
+    most = max(MAX_VALUES, size)
+    while waiting:
+        group, path = waiting.pop()
+        for name in group:
+            objects += 1
+            if objects > MAX_OBJECTS:
+                yield f"expected at most {MAX_OBJECTS:,} groups and data sets, found more"
+                return
+            place = f"{path}/{name}".lstrip("/")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                yield f"{place}: expected no link, found {type(group.get(name, getlink=True)).__name__}"
+                continue
+            each = group[name]
+            if isinstance(each, h5py.Group):
+                waiting.append((each, place))
+                continue
+            if not isinstance(each, h5py.Dataset):
+                yield f"{place}: expected a group or numbers, found a type"
+                continue
+            if each.is_virtual or each.external:
+                yield f"{place}: expected values in this file, found some in others"
+            elif each.dtype.kind not in "iufbS" and h5py.check_string_dtype(each.dtype) is None:
+                yield f"{place}: expected numbers or texts, found {str(each.dtype):.60}"
+            elif each.ndim > 2 and each.size * each.dtype.itemsize > MAX_ROW_BYTES * max(1, each.shape[0]):
+                yield f"{place}: expected images of at most {MAX_ROW_BYTES:,} bytes, found larger ones"
+            elif each.ndim <= 2:
+                values += each.size * max(1, each.dtype.itemsize // 8)
+                if values > most:
+                    yield f"{place}: expected at most {most:,} values in all, found more"
+                    return
+
+
+def _words(error: Exception) -> str:
+    return " ".join(str(error).split())
