@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from episodes.folder import EpisodeFolder
-    from episodes.ros.tables import episodes_to_dataframes
+    from episodes.ros.bags import episodes_to_dataframes
 
 __all__ = ["EpisodeFolder", "episodes_to_dataframes"]
 
-_HOMES = {"EpisodeFolder": "episodes.folder", "episodes_to_dataframes": "episodes.ros.tables"}
+_HOMES = {"EpisodeFolder": "episodes.folder", "episodes_to_dataframes": "episodes.ros.bags"}
 
 
 def __getattr__(name: str) -> Any:
