@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import logging
 import subprocess
 import sys
+
+import pybullet
+import pytest
+
+from rpbi.engine.client import Client
 
 SCRIPT = """
 import ctypes, logging, os, sys, threading
@@ -41,3 +48,12 @@ def test_they_are_logged_and_nothing_of_others_is(tmp_path):
     assert set(printed) == {"Python", "descriptor", "C"} and printed.count("Python") == printed.count("descriptor")
     assert logged.count("No inertial data for link") == 200
     assert not set(logged.splitlines()) & {"Python", "descriptor", "C"}
+
+
+def test_a_constraint_that_fails_is_logged_not_printed(capfd, caplog):
+    client = Client()
+    with caplog.at_level(logging.INFO), pytest.raises(pybullet.error, match="createConstraint failed"):
+        client.createConstraint(1, -1, 2, -1, pybullet.JOINT_FIXED, (0, 0, 0), (0, 0, 0), (0, 0, 0))
+    client.disconnect()
+    ctypes.CDLL(None).fflush(None)
+    assert capfd.readouterr() == ("", "") and "createConstraint failed" in caplog.text

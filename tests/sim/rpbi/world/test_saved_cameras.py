@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import costs
+import numpy as np
 import pytest
 import yaml
 from costs import cameras
 from worlds import FLOOR, box, write_world
 
 from rpbi.geometry import Pose
+from rpbi.images import CameraImages
 from rpbi.samples import AprilTagsSample
 from rpbi.world import World
 from rpbi.world.forks import shadow
@@ -28,7 +30,8 @@ TAG = {"id": 7, "size": 0.1, "position": [0.0, 0.0, 0.1]}
 
 def camera(name: str) -> dict[str, Any]:
     """Returns the configuration of a camera whose frame has its name."""
-    return {"name": name, "hz": 10, "intrinsics": {"fov": 60.0}, "object_tf": {"tf_id": name}}
+    view = {"fov": 60.0, "width": 320, "height": 240}
+    return {"name": name, "hz": 10, "intrinsics": view, "object_tf": {"tf_id": name}}
 
 
 @pytest.fixture
@@ -76,8 +79,9 @@ def run(world: World, ticks: int) -> list[Any]:
     return [one for _ in range(ticks) for one in world.step() if isinstance(one, AprilTagsSample)]
 
 
-def test_a_saved_world_has_its_cameras(world: World, tmp_path: Path) -> None:
-    state, known = world.save(tmp_path / "seen.world"), cameras(world)
+@pytest.mark.parametrize("keyframe", [False, True])
+def test_a_saved_world_has_its_cameras(world: World, tmp_path: Path, keyframe: bool) -> None:
+    state, known = world.save(tmp_path / "seen.world", keyframe=keyframe), cameras(world)
     assert set(known) == {"eye", "placed", "late"} and all(pose for _, pose, *_ in known.values())
     expected = run(world, AHEAD)
     assert {one.name for one in expected if one.tags} == {"box/eye", "box/placed", "box/late"}
@@ -90,6 +94,16 @@ def test_a_saved_world_has_its_cameras(world: World, tmp_path: Path) -> None:
     world.restore(state)
     assert cameras(world) == known
     assert run(world, AHEAD) == expected
+
+
+def test_a_restored_world_has_the_same_images(world: World) -> None:
+    elsewhere = World.from_state(world.save())
+    with CameraImages(world) as here, CameraImages(elsewhere) as there:
+        for name in ("eye", "late"):
+            one, other = here.frame(name), there.frame(name)
+            assert np.array_equal(one.segmentation, other.segmentation) and np.array_equal(one.colour, other.colour)
+            assert len(np.unique(one.segmentation)) > 1
+    elsewhere.close()
 
 
 @pytest.mark.parametrize("largest_mb", [0.0, 1e6], ids=["a program", "a copy, if it can be"])
