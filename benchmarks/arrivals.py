@@ -15,10 +15,13 @@ class Arrivals(NamedTuple):
     Attributes:
         arrival_s: Wall times [s] at which its callback began, shape (n,).
         stamp_ns: Stamps of the messages [ns], shape (n,).
+        processor_s: Processor time of the main thread of the process that was named [s], shape (n,); zeros without
+            one.
     """
 
     arrival_s: npt.NDArray[np.float64]
     stamp_ns: npt.NDArray[np.int64]
+    processor_s: npt.NDArray[np.float64]
 
     @property
     def rate_hz(self) -> float:
@@ -29,6 +32,11 @@ class Arrivals(NamedTuple):
     def real_time_factor(self) -> float:
         """Stamped seconds a second of wall time."""
         return float((self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9 / self._wall_s)
+
+    @property
+    def processor_share(self) -> float:
+        """Processor time a stamped second [s]."""
+        return float((self.processor_s[-1] - self.processor_s[0]) / ((self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9))
 
     @property
     def _wall_s(self) -> float:
@@ -50,4 +58,7 @@ def load(path: Path) -> dict[str, Arrivals]:
     """Reads what `programs/watch.py` wrote, by topic."""
     with np.load(path) as data:
         topics = {name.split(" ")[0] for name in data.files}
-        return {topic: Arrivals(data[f"{topic} arrival_s"], data[f"{topic} stamp_ns"]) for topic in topics}
+        return {
+            topic: Arrivals(data[f"{topic} arrival_s"], data[f"{topic} stamp_ns"], data[f"{topic} processor_s"])
+            for topic in topics
+        }

@@ -1,4 +1,7 @@
-"""Time a step takes through the node, as fast as it goes, beside the same PyBullet calls in a bare loop."""
+"""Processor time of a step through the node, as fast as it goes, beside the same PyBullet calls in a bare loop.
+
+It is that of the thread that steps. On a quiet machine it is the time that a step takes.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +29,16 @@ def run(quick: bool) -> list[Result]:
             unseen.append(_step_s(ros, world, "/diagnostics", seconds))
     value_us, unseen_us, floor_us = (min(times) * 1e6 for times in (subscribed, unseen, alone))
     return [
-        Result("free_run", "a step, joint states subscribed", value_us, "us", floor_us, Target(1.3, of_floor=True)),
-        Result("free_run", "a step, joint states not subscribed", unseen_us, "us", floor_us),
+        Result("free_run", "a step, joint states subscribed", value_us, "us", floor_us, Target(1.1, of_floor=True)),
+        Result(
+            "free_run", "a step, joint states not subscribed", unseen_us, "us", floor_us, Target(1.05, of_floor=True)
+        ),
     ]
 
 
 def _step_s(ros: Session, world: dict[str, Any], topic: str, seconds: float) -> float:
-    """Returns the mean time of a step [s], by the stamps of the only topic that is subscribed to."""
+    """Returns the mean processor time of a step [s], by the stamps of the only topic that is subscribed to."""
     simulator = ros.simulator(world)
-    found = ros.watch(topic, seconds=seconds, stock=False).arrivals()[topic]
+    found = ros.watch(topic, seconds=seconds, stock=False, spent_by=simulator).arrivals()[topic]
     ros.stop(simulator)
-    return 1.0 / (HZ * found.real_time_factor)
+    return found.processor_share / HZ

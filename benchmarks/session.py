@@ -118,17 +118,25 @@ class Session:
         """Puts the camera where it sees arm and floor."""
         self.start(["rosrun", "tf2_ros", "static_transform_publisher", *CAMERA_POSE, "rpbi/world", "rpbi/camera"])
 
-    def watch(self, *topics: str, seconds: float = 3600.0, stock: bool = True) -> Watcher:
+    def watch(
+        self,
+        *topics: str,
+        seconds: float = 3600.0,
+        stock: bool = True,
+        spent_by: subprocess.Popen[bytes] | None = None,
+    ) -> Watcher:
         """Starts a subscriber in a process of its own and waits until it has received from every topic.
 
         Args:
             topics: What it subscribes to.
             seconds: For how long it then goes on [s].
             stock: Whether it is an ordinary node, which takes /clock too where that is the time.
+            spent_by: A process; the processor time of its main thread is noted with each message.
         """
         path = self.folder / f"{len(self._processes)}.npz"
         typed = [f"{topic}:{TYPES[topic.rsplit('/', 1)[-1]]}" for topic in topics]
-        process = self.program("watch", path, seconds, *([] if stock else ["--wall"]), *typed)
+        options = [*([] if stock else ["--wall"]), *([] if spent_by is None else ["--process", spent_by.pid])]
+        process = self.program("watch", path, seconds, *options, *typed)
         self._until(lambda: "ready" in self.output(process), f"messages come on {', '.join(topics)}", process)
         return Watcher(self, process, path)
 

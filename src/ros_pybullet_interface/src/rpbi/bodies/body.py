@@ -172,6 +172,11 @@ class Body:
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether `before_step` does nothing at the coming ticks unless an input or a request comes."""
+        return False
+
     def halt(self, reason: str) -> None:
         """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing."""
 

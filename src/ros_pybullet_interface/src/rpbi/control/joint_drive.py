@@ -91,6 +91,11 @@ class JointDrive:
                 self.motors.track(index, measured[index][0], 0.0)
             self._end(self.motion)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether neither a target nor a motion moves the set points."""
+        return self.motion is None and self._streams.rest
+
     def advance(self, tick: int) -> None:
         """Sets the motors to where targets and motion are to be after this tick."""
         motion = self.motion

@@ -276,6 +276,12 @@ class Motors:
         )
         self.applied_efforts.update(limited)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether no target expires, and no effort has to be applied at each tick."""
+        keeps = self.mode in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL)
+        return keeps and not self._renewed and not self._expiry
+
     def before_step(self, tick: int, feed_forward: Mapping[int, float], driven_by_others: Collection[int] = ()) -> None:
         """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only.
 

@@ -137,6 +137,11 @@ class PoseFollower:
         self._waiting = None
         self._begin(pose @ self._centre)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether no pose has come that the base is to reach or follow."""
+        return self._path is None and self._waiting is None
+
     def before_step(self, tick: int) -> None:
         """Sets the velocity of the base for the coming tick."""
         path = self._path

@@ -47,6 +47,11 @@ class Mailbox:
                 value = merge(self._slots[slot], value)
             self._slots[slot] = value
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no value waits."""
+        return not self._slots
+
     def drain(self) -> Mapping[str, Any]:
         """Empties all slots and returns what was in them, by slot name."""
         if not self._slots:  # the usual case, and the one that must cost nothing

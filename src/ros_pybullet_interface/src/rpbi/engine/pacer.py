@@ -66,6 +66,15 @@ class Pacer:
         self._window_ticks += 1
         return True
 
+    @property
+    def is_free(self) -> bool:
+        """Whether ticks are made as fast as possible."""
+        return not self._period_s
+
+    def count(self, ticks: int) -> None:
+        """Counts ticks that were made without asking whether they are due."""
+        self._window_ticks += ticks
+
     def wait(self) -> None:
         """Sleeps until the next tick is due, or until it is time to look at requests."""
         if self._period_s:

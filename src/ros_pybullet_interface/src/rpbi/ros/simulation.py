@@ -1,6 +1,7 @@
 """The simulation loop: requests, ticks, samples out, in step with the wall clock."""
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -298,9 +299,15 @@ class Simulation:
         end_s = time.monotonic() + BURST_S
         while self._pacer.is_due():
             self._run_tick()
+            if self._pacer.is_free:
+                self._pacer.count(self._run_idle(math.inf, end_s))
             if time.monotonic() > end_s:
                 break
         self._publishers.publish_time()
+
+    def _run_idle(self, ticks: float, end_s: float) -> int:
+        """Advances by ticks of which nothing is published, until a time [s]; returns their number."""
+        return self.world.run_idle(min(ticks, self._state.ticks_to_hash - 1), end_s)
 
     def _run_tick(self, is_last: bool = False) -> None:
         """Advances by a tick; of the last one before standing still everything is published, due or not."""
@@ -319,6 +326,7 @@ class Simulation:
         while request.left > 1 and time.monotonic() < end_s:
             self._run_tick()
             request.left -= 1
+            request.left -= self._run_idle(request.left - 1, end_s)
         self._publishers.publish_time()
         if request.left == 1:
             self._run_tick(is_last=True)

@@ -127,6 +127,13 @@ class SensorSchedule:
                 raise_plugin_error(sensor, f"{method} of '{sensor.name}' at tick {self._clock.tick}", error)
                 raise
 
+    @property
+    def idle_ticks(self) -> float:
+        """Number of coming ticks at which no sensor acts or is due; inf without sensors."""
+        if self.watching:
+            return 0.0
+        return self._queue[0][0] - self._clock.tick - 1 if self._queue else math.inf
+
     def read_due(self) -> list[Any]:
         """Returns samples of the sensors that are due at this tick."""
         tick = self._clock.tick

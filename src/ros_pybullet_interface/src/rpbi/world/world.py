@@ -452,6 +452,32 @@ class World:
             self.attachments.break_overloaded(self.clock.tick)
         return self._sensors.read_due()
 
+    def run_idle(self, ticks: float, end_s: float) -> int:
+        """Advances by ticks at which physics alone acts: no input, body, wrench, attachment or sensor.
+
+        It is what as many calls of `step` do, at less expense.
+
+        Args:
+            ticks: Largest number of ticks.
+            end_s: Time by the monotonic clock at which it returns [s].
+
+        Returns:
+            The number of ticks.
+        """
+        if self._pushed or self.attachments.limited or not all(each.is_idle for each in self._stepping):
+            return 0
+        clock, mailbox, step, now = self.clock, self.mailbox, self.pb.stepSimulation, time.monotonic
+        first, last = clock.tick, clock.tick + min(ticks, self._sensors.idle_ticks)
+        begin_s = now_s = now()
+        while clock.tick < last and now_s < end_s and mailbox.is_empty:
+            step()
+            clock.advance()
+            now_s = now()
+        self.physics_s += now_s - begin_s
+        if clock.tick != first:
+            self.contacts.invalidate()
+        return clock.tick - first
+
     def read_rest(self) -> list[Any]:
         """Returns samples of the sensors that were not read at this tick yet."""
         return self._sensors.read_rest()

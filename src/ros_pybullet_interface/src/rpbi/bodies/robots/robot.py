@@ -144,6 +144,12 @@ class Robot(JointedBody):
         self.motors.before_step(tick, holding, self.controllers.driven)
 
     @property
+    def is_idle(self) -> bool:
+        """Whether it holds its position, or moves at a velocity, with nothing to compute."""
+        is_plain = type(self).before_step is Robot.before_step and not self.controllers.driven
+        return is_plain and self.drive.is_idle and self.motors.is_idle
+
+    @property
     def robot_model(self) -> RobotDynamics:
         """Its dynamics and kinematics."""
         if self._robot_model is None:

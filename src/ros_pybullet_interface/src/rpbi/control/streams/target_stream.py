@@ -199,6 +199,11 @@ class TargetStreams:
         self._waiting: tuple[ResolvedCommand, ...] = ()
         self._streams: dict[frozenset[int], TargetStream] = {}
 
+    @property
+    def rest(self) -> bool:
+        """Whether there is nothing to do until the next target."""
+        return not self._waiting and all(stream.rests for stream in self._streams.values())
+
     def follow(self, commands: Iterable[ResolvedCommand]) -> None:
         """Follows targets from the coming tick on."""
         for command in commands:

@@ -1,6 +1,7 @@
 """State of the simulation: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -119,7 +120,8 @@ class ClockPublisher:
 
     def _send(self) -> None:
         self._sent_ns = self._clock.stamp_ns
-        self._publisher.publish(clock_message(self._sent_ns))
+        if self._publisher.has_subscribers:
+            self._publisher.publish(clock_message(self._sent_ns))
 
 
 class StatusPublisher:
@@ -230,6 +232,11 @@ class StatePublisher:
     def is_hash_due(self) -> bool:
         """Whether the hash of the present tick is due."""
         return self._hash_tick is not None and self._world.clock.tick >= self._hash_tick
+
+    @property
+    def ticks_to_hash(self) -> float:
+        """Number of ticks to the next one whose hash is due; inf if none is."""
+        return math.inf if self._hash_tick is None else self._hash_tick - self._world.clock.tick
 
     def publish_hash(self) -> None:
         """Publishes the state of the present tick with its hash."""

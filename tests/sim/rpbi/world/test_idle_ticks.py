@@ -1,0 +1,96 @@
+"""Ticks at which physics alone acts are cheap, and the same as all others."""
+
+import math
+import sys
+from collections import Counter
+
+import pytest
+from worlds import FLOOR, ball, iiwa, write_world
+
+from rpbi.bodies.robots.robot import Robot
+from rpbi.world import World
+
+TICKS = 1000
+PUSH_TICK = 333
+PUSH = {"lbr_iiwa_joint_2": 0.4}
+
+
+@pytest.fixture
+def build(tmp_path):
+    worlds = []
+
+    def build_world(**keys):
+        parts = {"collision": (FLOOR,), "dynamic": (ball(basePosition=[0.6, 0.0, 1.0]),), "robots": (iiwa(**keys),)}
+        worlds.append(World.from_file(write_world(tmp_path, **parts)))
+        return worlds[-1]
+
+    yield build_world
+    for world in worlds:
+        world.close()
+
+
+def _by_steps(world, is_idle_skipped):
+    """Returns the samples of a run with a target that another thread puts, with their ticks."""
+    step, samples = world.pb.stepSimulation, []
+
+    def physics():
+        step()
+        if world.clock.tick == PUSH_TICK - 1:
+            world.put("iiwa/target", PUSH)
+
+    world.pb.stepSimulation = physics
+    while world.clock.tick < TICKS:
+        due = world.step()
+        samples += [(world.clock.tick, world.clock.stamp_ns, repr(sample)) for sample in due]
+        if is_idle_skipped:
+            world.run_idle(TICKS - world.clock.tick, math.inf)
+    return samples
+
+
+def test_idle_ticks_leave_the_world_as_steps_do(build):
+    stepped, skipped = build(), build()
+    assert _by_steps(skipped, True) == _by_steps(stepped, False)
+    assert skipped.state_hash() == stepped.state_hash() and skipped.clock.tick == TICKS
+
+
+def test_an_idle_tick_calls_nothing_but_physics_and_clocks(build):
+    world, calls = build(), Counter()
+    world.step()
+
+    def note(frame, event, function):
+        calls[getattr(function, "__name__", "") if event == "c_call" else frame.f_code.co_name] += "call" in event
+
+    sys.setprofile(note)
+    try:
+        ticks = world.run_idle(TICKS, math.inf)
+    finally:
+        sys.setprofile(None)
+    assert ticks >= 10
+    often = {name for name, count in calls.items() if count >= ticks}
+    assert often <= {"advance", "monotonic", "stepSimulation", "is_empty"}
+
+
+class Trembling(Robot):
+    """Does something at every tick."""
+
+    def before_step(self, tick):
+        """Does what every robot does."""
+        super().before_step(tick)
+
+
+@pytest.mark.parametrize("busy", ["motion", "wrench", "velocity", "torque", "own class"])
+def test_no_tick_is_idle_while_something_acts(build, busy):
+    modes = {"velocity": "VELOCITY_CONTROL", "torque": "TORQUE_CONTROL"}
+    mode = modes.get(busy, "POSITION_CONTROL")
+    world = build(setJointMotorControlArray={"controlMode": mode})
+    robot = world.bodies["iiwa"]
+    if busy == "own class":
+        robot.__class__ = Trembling
+    elif busy == "wrench":
+        world.act("ball", "push", {"force": (1.0, 0.0, 0.0)})
+    elif busy == "motion":
+        world.act("iiwa", "move", {"positions": PUSH, "duration_s": 1.0})
+    else:
+        world.put("iiwa/target", PUSH)
+    world.step()
+    assert world.run_idle(TICKS, math.inf) == 0
