@@ -26,8 +26,13 @@ def recorded_session() -> bytes:
 
 
 def _session_with(path: Path, change: Callable[[str, bytes], list[bytes]]) -> None:
-    """Writes the session with other messages; `change` gets the topic and a message, and returns what it is to be."""
+    """Writes the session with other messages, see `rewrite`."""
     path.write_bytes(recorded_session())
+    rewrite(path, change)
+
+
+def rewrite(path: Path, change: Callable[[str, bytes], list[bytes]]) -> None:
+    """Gives a bag other messages; `change` gets the topic and a message, and returns what it is to be."""
     with path.open("rb") as file:
         bag = BagFile(file)
         found = [(number, time_ns, raw) for number, raw, time_ns in bag.messages(bag.connections)]
@@ -96,19 +101,20 @@ def commands_and_states(rng: random.Random, path: Path) -> None:
                 WorldCommand(rng.choice((0, 3, 2**32)), rng.choice(("ball", "", "x" * 300)), rng.choice(COMMANDS), data)
                 for data in [*rng.choices(DATA, k=rng.randint(1, 5)), physics]
             ]
-            return [_serialised(WorldCommands(commands=rows, first=rng.choice((0, 0, 0, 2**31))))]
+            return [serialised(WorldCommands(commands=rows, first=rng.choice((0, 0, 0, 2**31))))]
         if topic == "/rpbi/state" and rng.randrange(3) == 0:
             state = SimulationState().deserialize(raw)
             state.tick = rng.choice((state.tick, 2**63, 2**64 - 1))
             state.commands = rng.choice((0, 1, 2**31))
             state.state_hash = rng.choice((state.state_hash, "x", "x" * 10_000))
-            return [_serialised(state)] * rng.choice((1, 50))
+            return [serialised(state)] * rng.choice((1, 50))
         return [raw]
 
     _session_with(path, change)
 
 
-def _serialised(message: WorldCommands | SimulationState) -> bytes:
+def serialised(message: WorldCommands | SimulationState) -> bytes:
+    """Returns the bytes of a message."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -12,7 +13,9 @@ from typing import Any, NamedTuple
 import yaml
 
 from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.files import atomic_file
+from custom_ros_tools.foreign import load_foreign_yaml, printable
 from episodes.errors import EpisodeError
 
 from .policy import Policy
@@ -55,7 +58,7 @@ class FarmJob:
             EpisodeError: If the folder has episodes of another job; it names what differs.
         """
         path, own = folder / FARM, self._identity()
-        if path.exists():
+        if os.path.lexists(path):
             if changes := list(self._changes(_read(path))):
                 raise EpisodeError(path, f"{'; '.join(changes)}: name another folder by --out")
             return
@@ -74,7 +77,11 @@ class FarmJob:
         """Returns sentences on the differences; of files whose names differ, the contents are not compared."""
         own = self._identity()
         changed = [key for key in own if there.get(key) != own[key]]
-        values = [f"{key}: {there.get(key)} there, {own[key]} asked for" for key in changed if key not in _CHANGED]
+        values = [
+            f"{key}: {printable(str(there.get(key)), 200)} there, {own[key]} asked for"
+            for key in changed
+            if key not in _CHANGED
+        ]
         contents = [f"{text} has changed" for key, text in _CHANGED.items() if key in changed]
         return values or contents
 
@@ -110,9 +117,6 @@ def policy_digest(policy: type[Policy]) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise EpisodeError(path, f"cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict):
-        raise EpisodeError(path, f"expected a mapping, got {type(data).__name__}")
-    return data
+        return load_foreign_yaml(path.parent, path.name)
+    except ConfigError as error:
+        raise EpisodeError(path, f"cannot be read: {printable(error.problems[0].message)}") from error

@@ -14,6 +14,7 @@ from multiprocessing.connection import Pipe, wait
 from pathlib import Path
 from typing import Any
 
+from custom_ros_tools.foreign import path_below
 from custom_ros_tools.processes.child import start_child
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
@@ -45,7 +46,10 @@ class Child:
         """Episodes that it is asked for."""
         self.connection, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
-        with theirs, open(folder.path / LOG, "ab") as log:
+        path = path_below(folder.path, LOG)
+        if path.exists() and not path.is_file():
+            raise EpisodeError(path, "expected an ordinary file")
+        with theirs, open(path, "ab") as log:
             self._process = start_child(
                 [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
                 signal.SIGKILL,

@@ -6,23 +6,28 @@ import hashlib
 import logging
 import math
 import os
+import subprocess
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import rosbag
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.foreign import printable
 from episodes.errors import DISK_FULL, EpisodeError
 from episodes.farm.job import FARM
 from episodes.folder import BAG, FACTS, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, file_in, hold, read_part
 from rpbi_utils.bags.clock import MAX_BACK_S
 from rpbi_utils.bags.errors import BagError
+from rpbi_utils.bags.limits import BASE_TIME_S, TIME_PER_MB_S
 from rpbi_utils.ros.bags.bag_reader import BagReader
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
 from rpbi_utils.ros.bags.topic_report import topic_report
 
+REINDEX_BYTES = 2**31
+"""Address space of the process that indexes a bag [bytes]."""
 MAX_CLOSE_S = 2.0
 """Longest time to wait for a process that closes the bag of a recorder that was killed [s]."""
 
@@ -199,7 +204,35 @@ def _is_complete(bag: Path) -> bool:
         return False
 
 
-def _reindex(bag: Path) -> None:
-    with rosbag.Bag(str(bag), "a", allow_unindexed=True) as opened:
-        for _ in opened.reindex():
+_REINDEX = """
+import errno, resource, sys
+import rosbag
+path, memory, seconds = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+try:
+    with rosbag.Bag(path, "a", allow_unindexed=True) as bag:
+        for _ in bag.reindex():
             pass
+except OSError as error:
+    sys.exit(error.errno or 1)
+except Exception as error:
+    sys.exit(f"{type(error).__name__}: {error}")
+"""
+
+
+def _reindex(bag: Path) -> None:
+    """Writes the index of a bag, in a process of its own with limits: rosbag reads whatever a broken bag says.
+
+    Raises:
+        BagError: If it cannot be indexed, or needs too much memory or time.
+        OSError: If it cannot be written.
+    """
+    seconds = BASE_TIME_S + TIME_PER_MB_S * bag.stat().st_size / 1e6
+    words = [str(bag), str(REINDEX_BYTES), str(math.ceil(seconds))]
+    done = subprocess.run([sys.executable, "-c", _REINDEX, *words], capture_output=True, text=True)
+    if done.returncode in DISK_FULL:
+        raise OSError(done.returncode, os.strerror(done.returncode), str(bag))
+    if done.returncode:
+        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        raise BagError(bag, f"cannot be indexed: {printable(said[0], 300)}")

@@ -9,6 +9,7 @@ from typing import Annotated
 from tqdm import tqdm
 
 from custom_ros_tools.console.argument import Argument, UsageError, number
+from custom_ros_tools.foreign import printable
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
 from episodes.ros.farm.farm import Farm
@@ -67,7 +68,7 @@ def farm(
                 for outcome in made.run(folder, numbers, jobs or os.cpu_count() or 1, address, disk_reserve_mb):
                     if outcome.fault:
                         faults += 1
-                        bar.write(f"episode {outcome.number}: {outcome.fault}")
+                        bar.write(f"episode {outcome.number}: {printable(outcome.fault)}")
                     else:
                         labels[outcome.label] += 1
                         bar.update()

@@ -8,6 +8,7 @@ import tempfile
 from functools import lru_cache
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import path_below
 from episodes.farm.job import EpisodeOutcome, FarmJob
 from episodes.folder import BAG, FACTS, EpisodeFolder
 
@@ -45,7 +46,7 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir()
     for name, content in files.items():
-        (part / name).write_bytes(content)
+        path_below(part, name).write_bytes(content)
     part.rename(folder.folder_of(number))
 
 

@@ -1,0 +1,1 @@
+"""Folders of episodes that mean harm, and trials of their readers."""
