@@ -178,7 +178,7 @@ def _types(place: Place) -> None:
             key = place.rng.choice([*holder, "odd"])
             holder[key] = place.rng.choice(ODD)
 
-    place.facts(change, place.rng.choice((FIRST, FIRST, PART)))
+    place.facts(change, place.rng.choice((FIRST, FIRST, FIRST, PART)))
 
 
 def _numbers(place: Place) -> None:
@@ -452,6 +452,10 @@ MAKERS: dict[str, Callable[[Place], None]] = {
 """Changes of a good folder by name."""
 
 
+WITH_PART = ("links", "special files", "hard links", "types", "YAML", "bytes of bags", "parts")
+"""Kinds that change the episode of a killed recorder, too; repairs take most of the time, so others have none."""
+
+
 class Hostile(NamedTuple):
     """A hostile folder.
 
@@ -480,5 +484,7 @@ def hostile_folders(seeds: range, good: Path, folder: Path) -> Iterator[Hostile]
         (outside / "episode.bag").write_bytes((demos / FIRST / BAG).read_bytes())
         (outside / "broken.bag").write_bytes((demos / PART / f"{BAG}.active").read_bytes())
         how = list(MAKERS)[seed % len(MAKERS)]
+        if how not in WITH_PART:
+            shutil.rmtree(demos / PART)
         MAKERS[how](Place(random.Random(f"folder {seed}"), demos, outside))
         yield Hostile(seed, how, demos, outside)
