@@ -205,7 +205,7 @@ def _is_complete(bag: Path) -> bool:
 
 
 _REINDEX = """
-import errno, resource, sys
+import resource, sys
 import rosbag
 path, memory, seconds = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
