@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import math
 import os
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from camera_world import COLOUR, DEPTH, HEIGHT_M, SEGMENTATION, arm_world, pixels, place, renderers
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from PIL import Image as Picture
 from ros_system import wait_until
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
@@ -73,17 +73,25 @@ def test_the_viewer_of_the_page_on_networks_shows_them(ros, node):
     assert re.search(r"\(120, 160, 3\) \d+ bytes", ros.output(viewer))
 
 
-def test_idle_renderer_that_is_killed_comes_back_and_no_joint_state_is_missing(ros, node):
+def test_stopped_renderer_is_a_warning_of_the_diagnostics(ros, node):
+    diagnostics = ros.listen("/diagnostics", DiagnosticArray)
+    wait_until(lambda: diagnostics.messages and renderers(node), "there are diagnostics")
+    (stopped,) = renderers(node)
+    os.kill(stopped, signal.SIGSTOP)
+    try:
+        fault = f"the renderer (process {stopped}) is stopped by a signal"
+        wait_until(lambda: fault in diagnostics.messages[-1].status[0].message, "the diagnostics warn")
+        assert diagnostics.messages[-1].status[0].level == DiagnosticStatus.WARN
+    finally:
+        os.kill(stopped, signal.SIGCONT)
+    wait_until(lambda: fault not in diagnostics.messages[-1].status[0].message, "it answers again")
+
+
+def test_killed_renderer_comes_back_and_no_joint_state_is_missing(ros, node):
     colour = ros.listen(COLOUR, Image)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     colour.wait_for(3)
     (killed,) = renderers(node)
-    policies = set()
-    for thread in os.listdir(f"/proc/{killed}/task"):
-        with contextlib.suppress(ProcessLookupError):  # one that has just ended
-            policies.add(os.sched_getscheduler(int(thread)))
-    if policies != {os.SCHED_IDLE}:  # physics goes first, unless others leave an idle process nothing
-        wait_until(lambda: "runs at nice 19 instead of idle priority" in ros.output(node), "it was starved", 20.0)
     os.kill(killed, signal.SIGKILL)
     wait_until(lambda: renderers(node) not in ([], [killed]), "there is another renderer")
     before = len(colour.messages)

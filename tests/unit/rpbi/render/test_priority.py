@@ -32,11 +32,10 @@ over.set()
 @pytest.mark.parametrize(
     ("before", "change", "policy"),
     [
-        (os.SCHED_OTHER, "run_when_idle()", os.SCHED_IDLE),
-        (os.SCHED_IDLE, "run_normally(os.getpid())", os.SCHED_OTHER),
-        (os.SCHED_IDLE, "raise_from_idle(os.getpid())", os.SCHED_OTHER),
+        (os.SCHED_OTHER, "yield_to_simulator()", os.SCHED_BATCH),
+        (os.SCHED_BATCH, "run_normally(os.getpid(), 0)", os.SCHED_OTHER),
     ],
-    ids=["idle", "normal", "raised"],
+    ids=["yields", "normal"],
 )
 def test_all_threads_are_changed(before, change, policy):
     command = [sys.executable, "-c", PROGRAM.format(before=before, change=change)]

@@ -49,6 +49,13 @@ def kill_with_children(process: subprocess.Popen) -> None:
     process.wait()
 
 
+def is_stopped(process_id: int) -> bool:
+    """Returns whether a process is stopped by a signal, such as SIGSTOP; see proc_pid_stat(5)."""
+    with contextlib.suppress(OSError):  # it has just ended
+        return Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    return False
+
+
 def _children(parent: int) -> list[int]:
     """Returns the ids of a process's children; see proc_pid_stat(5)."""
     children = []

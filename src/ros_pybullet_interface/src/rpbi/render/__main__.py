@@ -19,7 +19,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="rpbi.render")
     parser.add_argument("--socket", type=int, required=True, help="file descriptor of the connection")
     parser.add_argument("--sink", required=True, help="module:factory of the receiver of frames")
-    parser.add_argument("--keep-priority", action="store_true", help="do not run at idle priority")
+    parser.add_argument("--keep-priority", action="store_true", help="do not yield to the simulator")
     arguments, _ = parser.parse_known_args()
     # Ctrl-C goes to the whole process group; the simulator decides when we end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

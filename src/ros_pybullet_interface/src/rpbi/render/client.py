@@ -10,12 +10,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from custom_ros_tools.processes.child import is_stopped
 from rpbi.samples import SceneSample
 from rpbi.world.load_log import LoadLogReader, LogEntry
 
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
 from .messages import (
+    Alive,
     CameraAdded,
     CameraRemoved,
     Demanded,
@@ -26,17 +28,15 @@ from .messages import (
     SetUp,
     Shown,
     WorldChanged,
-    Yielded,
 )
-from .priority import raise_from_idle
 
 log = logging.getLogger(__name__)
 
 LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
 STOP_TIMEOUT_S = 5.0
-STARVED_AFTER_S = 3.0
-"""Longest wait for an answer of the renderer at idle priority [s]; beyond it, its priority is raised."""
+SILENT_AFTER_S = 5.0
+"""Longest time without a message of a renderer that is up [s]; beyond it, it is reported."""
 
 
 class RenderClient:
@@ -74,7 +74,8 @@ class RenderClient:
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._use_egl = use_egl
-        self._may_starve = False
+        self.fault = ""
+        """Why the renderer does not answer, empty if it does."""
         self._heard_s = 0.0
         self._started_s = 0.0
         self._start_at_s = 0.0
@@ -83,7 +84,7 @@ class RenderClient:
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
             Ready: self._on_ready,
-            Yielded: self._on_yielded,
+            Alive: lambda _: None,
             SceneAccepted: self._on_scene_accepted,
             Shown: self._on_shown,
             Demanded: self._on_demanded,
@@ -107,10 +108,7 @@ class RenderClient:
         messages = self._channel.receive()
         for message in messages:
             self._do[type(message)](message)
-        if messages or not self._is_awaited():
-            self._heard_s = time.monotonic()
-        elif self._may_starve and time.monotonic() - self._heard_s > STARVED_AFTER_S:
-            self._end_starvation()
+        self._watch(is_heard=bool(messages) or not self.renderer)
         if self._channel.closed:
             self._channel.close()
             self._channel = None
@@ -208,22 +206,23 @@ class RenderClient:
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
         self._started_s = self._heard_s = time.monotonic()
-        self._may_starve = False
         self._channel = Channel(ours)
         self._channel.send(SetUp(tuple(self._cameras.values()), self._use_egl))
         self._send_log()
 
-    def _is_awaited(self) -> bool:
-        """Returns whether the process is up and owes an answer: an accepted scene, or the demand for a camera."""
-        return bool(self._under_way) or (bool(self.renderer) and self._demands.keys() != self._cameras.keys())
-
-    def _end_starvation(self) -> None:
-        """Raises the priority of the process: at idle priority on a busy machine it hardly runs."""
-        assert self._process is not None
-        self._may_starve = False
-        raise_from_idle(self._process.pid)
-        waited = f"the renderer has had no processor time for {STARVED_AFTER_S:g} s, others take all of it"
-        log.warning("camera: %s; from now on it runs at nice 19 instead of idle priority", waited)
+    def _watch(self, is_heard: bool) -> None:
+        """Reports a process that is up and sends nothing any more, and that it sends again."""
+        now_s = time.monotonic()
+        if is_heard:
+            self._heard_s = now_s
+            if self.fault:
+                self.fault = ""
+                log.warning("camera: the renderer answers again")
+        elif not self.fault and now_s - self._heard_s > SILENT_AFTER_S:
+            assert self._process is not None
+            state = "is stopped by a signal" if is_stopped(self._process.pid) else "hangs, or gets no processor time"
+            self.fault = f"the renderer (process {self._process.pid}) {state}"
+            log.warning("camera: %s: no images for %g s", self.fault, SILENT_AFTER_S)
 
     def _bury(self) -> None:
         """Reports the end of the process and decides when to start the next, and which kind."""
@@ -243,7 +242,7 @@ class RenderClient:
         kind = "" if self._use_egl else ", without EGL"
         log.warning("camera: the renderer ended with %s; it is started again %s%s", how, next_time, kind)
         self._process = None
-        self.renderer = ""
+        self.renderer = self.fault = ""
 
     def _forget(self) -> None:
         """Forgets what the process knew."""
@@ -272,9 +271,6 @@ class RenderClient:
     def _on_ready(self, message: Ready) -> None:
         self.renderer = message.renderer
         log.info("camera: images are drawn by %s", message.renderer)
-
-    def _on_yielded(self, message: Yielded) -> None:
-        self._may_starve = True
 
     def _on_scene_accepted(self, message: SceneAccepted) -> None:
         self._under_way.discard(message.camera)

@@ -52,8 +52,8 @@ class Ready(NamedTuple):
     renderer: str
 
 
-class Yielded(NamedTuple):
-    """To the simulator: from now on the renderer runs at idle priority."""
+class Alive(NamedTuple):
+    """To the simulator: the renderer works; twice a second, unless a frame takes longer."""
 
 
 class SceneAccepted(NamedTuple):

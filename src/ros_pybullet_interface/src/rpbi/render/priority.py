@@ -4,32 +4,34 @@ import contextlib
 import os
 from collections.abc import Callable
 
-
-def run_when_idle() -> None:
-    """Sets all threads of this process to idle priority, so that physics runs first."""
-
-    def set_idle(thread_id: int) -> None:
-        try:
-            os.sched_setscheduler(thread_id, os.SCHED_IDLE, os.sched_param(0))
-        except PermissionError:  # some containers do not allow it
-            os.setpriority(os.PRIO_PROCESS, thread_id, 19)
-
-    _for_all_threads(os.getpid(), set_idle)
+NICE = 10
+"""Difference of the nice values of a renderer that yields and the simulator, which gets nine times its share."""
 
 
-def run_normally(process_id: int) -> None:
-    """Sets an idle process, which may be this one, to normal priority."""
-    _for_all_threads(process_id, lambda each: os.sched_setscheduler(each, os.SCHED_OTHER, os.sched_param(0)))
+def yield_to_simulator() -> None:
+    """Gives all threads of this process a lower priority than the simulator has.
+
+    They are batch threads, which interrupt no other one when they wake up. Idle priority would be too low: any process
+    of nice 19 would take the processor from the renderer.
+    """
+
+    nice = os.getpriority(os.PRIO_PROCESS, 0) + NICE
+
+    def give_way(thread_id: int) -> None:
+        os.setpriority(os.PRIO_PROCESS, thread_id, nice)
+        os.sched_setscheduler(thread_id, os.SCHED_BATCH, os.sched_param(0))
+
+    _for_all_threads(os.getpid(), give_way)
 
 
-def raise_from_idle(process_id: int) -> None:
-    """Raises an idle process that does not run at all to normal scheduling at nice 19."""
+def run_normally(process_id: int, nice: int) -> None:
+    """Gives a process that yields, which may be this one, a nice value again, as far as its user may do that."""
 
-    def set_nice(thread_id: int) -> None:
-        os.setpriority(os.PRIO_PROCESS, thread_id, 19)
+    def set_normal(thread_id: int) -> None:
         os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
+        os.setpriority(os.PRIO_PROCESS, thread_id, nice)
 
-    _for_all_threads(process_id, set_nice)
+    _for_all_threads(process_id, set_normal)
 
 
 def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:

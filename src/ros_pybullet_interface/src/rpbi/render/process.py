@@ -11,6 +11,7 @@ from .channel import Channel
 from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Sink
 from .messages import (
+    Alive,
     CameraAdded,
     CameraRemoved,
     Demanded,
@@ -21,10 +22,9 @@ from .messages import (
     SetUp,
     Shown,
     WorldChanged,
-    Yielded,
 )
 from .mirror import Mirror
-from .priority import run_normally, run_when_idle
+from .priority import run_normally, yield_to_simulator
 from .renderers import Renderer, open_renderer
 
 log = logging.getLogger(__name__)
@@ -32,20 +32,24 @@ log = logging.getLogger(__name__)
 DEMAND_PERIOD_S = 0.05
 """Period of checks for viewers of the images [s]."""
 
+ALIVE_PERIOD_S = 0.5
+"""Period of messages that the renderer works [s]."""
+
 STUCK_AFTER_S = 300.0
 """Longest pass of the loop [s]; beyond it, a driver perhaps hangs, and the process ends itself."""
 
 
 class RenderProcess:
-    """Serves the simulator until that has gone; at idle priority once it is up, if requested."""
+    """Serves the simulator until that has gone; at a lower priority once it is up, if requested."""
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:
         self._channel = channel
         self._make_sink = make_sink
         self._gives_way = gives_way
+        self._nice = os.getpriority(os.PRIO_PROCESS, 0)
         self._cameras: dict[str, Camera] = {}
         self._demands: dict[str, Demand] = {}
-        self._looked_s = 0.0
+        self._looked_s = self._alive_s = 0.0
         self._parent = os.getppid()
         self._renderer: Renderer | None = None
         self._mirror: Mirror | None = None
@@ -65,12 +69,12 @@ class RenderProcess:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
                 messages = self._channel.receive()
                 if self._gives_way and self._sink is not None and not self._channel.closed:
-                    self._channel.send(Yielded())
-                    run_when_idle()  # not before it is up: on a busy machine that would take minutes
+                    yield_to_simulator()  # not before it is up: on a busy machine that would take long
                     self._gives_way = False
                 for message in messages:
                     self._do[type(message)](message)
                 self._send_demands()
+                self._send_alive()
                 self._channel.flush()
                 self._channel.wait(DEMAND_PERIOD_S)
         finally:
@@ -91,7 +95,7 @@ class RenderProcess:
         assert self._renderer is not None and self._sink is not None
         if camera.synchronous:  # physics waits for it, so it has nobody to give way to
             self._gives_way = False
-            run_normally(os.getpid())
+            run_normally(os.getpid(), self._nice)
         try:
             self._renderer.make_room(camera.intrinsics)
         except EglError as error:
@@ -123,6 +127,12 @@ class RenderProcess:
             self._sink.write(self._mirror.frame(self._renderer, scene, camera, streams))
         if camera.synchronous:
             self._channel.send(Shown(sample.name, sample.stamp_ns))
+
+    def _send_alive(self) -> None:
+        now_s = time.monotonic()
+        if self._sink is not None and now_s - self._alive_s >= ALIVE_PERIOD_S:
+            self._alive_s = now_s
+            self._channel.send(Alive())
 
     def _send_demands(self) -> None:
         now_s = time.monotonic()

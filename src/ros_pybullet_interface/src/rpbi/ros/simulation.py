@@ -100,7 +100,7 @@ class Simulation:
         self._before_tick = publishers.cameras.before_tick
         self._pacer = Pacer(world.clock.dt_s, world.config.real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._status = StatusPublisher(world, self._pacer, publishers.cameras.facts)
+        self._status = StatusPublisher(world, self._pacer, publishers.cameras.facts, publishers.cameras.fault)
         self._state = StatePublisher(world, self._pacer)
         self._commands = CommandPublisher(world)
 

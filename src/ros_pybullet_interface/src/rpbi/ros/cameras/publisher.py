@@ -1,6 +1,7 @@
 """Where scenes go: to the renderer process, which publishes the images."""
 
 import contextlib
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -34,7 +35,7 @@ class ScenePublisher:
         self._sensors: Mapping[str, RgbdSensor] = {}
         self._synchronous: tuple[RgbdSensor, ...] = ()
         self._awaited: list[SceneSample] = []
-        # A window without a graphics card takes all that there is, and would leave an idle process nothing
+        # A window without a graphics card takes all that there is, and would leave such a renderer hardly anything
         priority = ["--keep-priority"] if world.window else []
         self._renderer = RenderClient(
             (),
@@ -107,10 +108,15 @@ class ScenePublisher:
         """Returns its values for the diagnostics."""
         return {"camera_renderer": self._renderer.renderer or "starting"} if self._sensors else {}
 
+    def fault(self) -> str:
+        """Returns why the renderer does not answer, empty if it does."""
+        return self._renderer.fault
+
     def close(self) -> None:
         """Ends the process at normal priority, since it has to unregister from the ROS master first."""
         if self._renderer.process_id is not None:
-            run_normally(self._renderer.process_id)  # on a busy machine it might not get to its end otherwise
+            nice = os.getpriority(os.PRIO_PROCESS, 0)
+            run_normally(self._renderer.process_id, nice)  # on a busy machine its end might take long otherwise
         if not self._renderer.stop():
             _unregister(camera_node(rospy.get_name()))
 

@@ -131,10 +131,13 @@ class StatusPublisher:
         world: The world.
         pacer: Its pacer.
         facts: Returns further values for the diagnostics.
+        fault: Returns a fault beside the world, of which the diagnostics warn; an empty text if there is none.
     """
 
-    def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
-        self._world, self._clock, self._pacer, self._facts = world, world.clock, pacer, facts
+    def __init__(
+        self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]], fault: Callable[[], str]
+    ) -> None:
+        self._world, self._clock, self._pacer, self._facts, self._fault = world, world.clock, pacer, facts, fault
         self._load = Load.now(world.physics_s, world.clock.tick)
         """At the last message of the diagnostics."""
         self._slow_periods = 0
@@ -177,6 +180,8 @@ class StatusPublisher:
         else:
             self._slow_periods = 0
         self._warn_of_cause(status.message)
+        if fault := self._fault():
+            status.level, status.message = DiagnosticStatus.WARN, f"{status.message}; {fault}"
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
             "overruns_total": str(self._pacer.overruns),
