@@ -27,6 +27,7 @@ from ros_pybullet_interface.srv import RobotInfo
 
 from .messages import positions_in, problem_message
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
+from .solver_watch import SolverWatch
 from .tf import FreshTf
 
 QUEUE_SIZE = 10
@@ -41,7 +42,12 @@ NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
 
 
 def publish_problems(
-    topics: str, message_type: type, hz: float, start_on_init: bool, problem: Callable[[], rospy.Message | None]
+    topics: str,
+    message_type: type,
+    hz: float,
+    start_on_init: bool,
+    problem: Callable[[], rospy.Message | None],
+    has_solver_node: bool = True,
 ) -> None:
     """Publishes problems on the topic `ik`, from now on and while it is switched on.
 
@@ -52,9 +58,11 @@ def publish_problems(
         start_on_init: Whether it is on from the start.
         problem: Returns the next one; without one it returns None, or raises an `InterfaceError` or `ValueError` with
             the reason.
+        has_solver_node: Whether a node is to answer on `ik/solution`, which is watched then.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+    watch = SolverWatch(publisher) if has_solver_node else None
 
     def publish() -> None:
         if not is_on.is_set():
@@ -62,6 +70,8 @@ def publish_problems(
         try:
             if (message := problem()) is not None:
                 publisher.publish(message)
+                if watch is not None:
+                    watch.note_problem()
         except (InterfaceError, ValueError) as error:
             warn("no problem is published", str(error))
 
@@ -193,7 +203,7 @@ class RobotIKSetup:
         topics = topics_of("setup", "pybullet")
         self._topic = f"{topics}/currentPosition"
         rospy.Subscriber(self._topic, JointState, self._on_current, queue_size=1)
-        publish_problems(topics, CalculateInverseKinematicsProblem, timing.hz, start_on_init, self._problem)
+        publish_problems(topics, CalculateInverseKinematicsProblem, timing.hz, start_on_init, self._problem, False)
 
     def _on_current(self, message: JointState) -> None:
         try:
