@@ -48,7 +48,7 @@ def make_launch(seed: int, folder: Path) -> str:
     lines = [f'  <arg name="{name}" default="{text(random)}"/>' for name in names]
     kind = random.randrange(12)
     if kind == 0:
-        lines *= 20_000 // len(lines)
+        lines *= max(20_000_000 // sum(map(len, lines)), 1)
     elif kind == 1:
         lines.insert(0, " " * 30_000_000)
     elif kind == 2:

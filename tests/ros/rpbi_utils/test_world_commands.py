@@ -220,6 +220,21 @@ def test_names_that_a_rogue_node_lists_run_nothing(ros, tmp_path):
         rogue.shutdown()
 
 
+def test_foreign_names_reach_no_terminal_as_they_are(ros, tmp_path, capsys):
+    names = ["\x1b]0;title\x07", "two\nlines"]
+    rogue = rospy.Service("/rogue/rpbi/list_objects", ListObjects, lambda _: ListObjectsResponse(names, ["\x9b1m"] * 2))
+    try:
+        assert command_of("rpbi_utils.ros.console.list").run(["--ns", "rogue"]) == 0
+    finally:
+        rogue.shutdown()
+    assert capsys.readouterr().out == "\\x1b]0;title\\x07  \\x9b1m\ntwo\\x0alines      \\x9b1m\n"
+    world = tmp_path / "world.yaml"
+    world.write_text('{"timeStep": 0.01, "\\e]0;title\\a": 1}')
+    assert command_of("rpbi.ros.console.check").run([str(world)]) == 1
+    said = capsys.readouterr().err
+    assert "title" in said and "\x1b" not in said
+
+
 def test_kinds_are_known_by_their_keys():
     for world in CONFIGS.glob("*/config.yaml"):
         for item in load_world(str(world)).objects:

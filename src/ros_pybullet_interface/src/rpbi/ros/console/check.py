@@ -3,12 +3,14 @@
 import logging
 import signal
 import sys
+from collections.abc import Iterator
 from typing import Annotated
 
 import pybullet
 
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable_lines
 from rpbi.bodies import BODY_TYPES
 from rpbi.ros.reference.interface_table import Endpoint, endpoints
 from rpbi.world import World
@@ -29,7 +31,7 @@ def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
         listed = endpoints(world)
     except InterfaceError as error:
         problems = str(error).splitlines()
-        print("\n".join(f"error: {problem}" for problem in problems), file=sys.stderr)
+        print("\n".join(f"error: {printable_lines(problem)}" for problem in problems), file=sys.stderr)
         print(f"{path}: {_counted(len(problems), 'error')}{warnings.counted()}", file=sys.stderr)
         return 1
     except MemoryError as error:
@@ -37,7 +39,7 @@ def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
         return 1
     for warning in world_warnings(world):
         warnings.report(str(warning))
-    _print(path, world, listed, warnings.counted())
+    print(printable_lines("\n".join(_lines(path, world, listed, warnings.counted()))))
     world.close()
     return 0
 
@@ -55,7 +57,7 @@ class _Warnings(logging.Handler):
     def report(self, message: str) -> None:
         """Prints a warning."""
         self._count += 1
-        print(f"warning: {message}", file=sys.stderr)
+        print(f"warning: {printable_lines(message)}", file=sys.stderr)
 
     def counted(self) -> str:
         """Returns their number, for the end of a line."""
@@ -66,13 +68,13 @@ def _counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def _print(path: str, world: World, listed: list[Endpoint], warnings: str) -> None:
-    print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second{warnings}")
+def _lines(path: str, world: World, listed: list[Endpoint], warnings: str) -> Iterator[str]:
+    yield f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second{warnings}"
     for name, body in world.bodies.items():
         joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
-        print(f"  {BODY_TYPES.name_of(body):<12} {name}{joints}")
+        yield f"  {BODY_TYPES.name_of(body):<12} {name}{joints}"
     for name in world.cameras:
-        print(f"  {'camera':<12} {name}")
+        yield f"  {'camera':<12} {name}"
     kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*listed))[:3])
     for kind, name, type_name, note, meaning in listed:
-        print(f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note or meaning}".rstrip())
+        yield f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note or meaning}".rstrip()

@@ -20,6 +20,7 @@ from custom_ros_tools.config import load_config
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.console.modules import workspace
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.foreign import printable_lines
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from robot_model.asset_files import find_file
 from rpbi_examples.ros.running_simulators import clocks, master_of, running_simulators
@@ -82,7 +83,7 @@ def launch(
         if not any(argument.partition("=")[0] in PRINTS for argument in rest):
             _make_way(file, options)
     except (InterfaceError, roslaunch.RLException) as error:
-        print(f"launch: {error}", file=sys.stderr)
+        print(f"launch: {printable_lines(str(error))}", file=sys.stderr)
         return 2
     parents: list[_Parent] = []
     roslaunch.parent.ROSLaunchParent = partial(_Parent, parents)  # roslaunch itself returns 0 whatever happened

@@ -10,6 +10,7 @@ import pandas as pd
 import rospy
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable_lines
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.tables import FORMATS, file_stems, write_table
 
@@ -29,10 +30,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         written = _convert(arguments)
     except (InterfaceError, OSError) as error:
-        print(f"{_NAME}: {error}", file=sys.stderr)
+        print(f"{_NAME}: {printable_lines(str(error))}", file=sys.stderr)
         return 1
     if not arguments.quiet:
-        print(_text(written) if len(written) else "no topic to write")
+        print(printable_lines(_text(written)) if len(written) else "no topic to write")
     return 0
 
 

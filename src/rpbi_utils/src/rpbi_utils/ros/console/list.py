@@ -1,5 +1,7 @@
 """The command `list`."""
 
+from custom_ros_tools.foreign import printable
+
 from .running_simulator import Namespace, RunningSimulator
 
 
@@ -9,6 +11,6 @@ def list(*, ns: Namespace = None) -> str:
     Args:
         ns: of the simulator, if it was started in one
     """
-    objects = RunningSimulator(ns).objects()
+    objects = {printable(name): printable(kind) for name, kind in RunningSimulator(ns).objects().items()}
     width = max(map(len, objects), default=0)
     return "\n".join(f"{name:<{width}}  {kind}" for name, kind in objects.items()) or "nothing"

@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable_lines
 from custom_ros_tools.plugins import trust_only
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_utils.bags.errors import BagError
@@ -42,7 +43,7 @@ def replay(
     try:
         recording = read_recording(bag, ns, any_size)
         for warning in recording.description.warnings:
-            print(f"replay: warning: {warning}", file=sys.stderr)
+            print(f"replay: warning: {printable_lines(str(warning))}", file=sys.stderr)
         ticks = require_few_ticks(bag, recording, max_ticks)
         with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=quiet) as bar:
             result = Replay(recording, bar.update).run()
@@ -55,7 +56,7 @@ def replay(
 
 def _report(result: ReplayResult) -> int:
     for text in result.left_out:
-        print(f"not replayed {text}")
+        print(f"not replayed {printable_lines(text)}")
     difference = result.difference
     if difference is not None:
         agreement = difference.last_agreement

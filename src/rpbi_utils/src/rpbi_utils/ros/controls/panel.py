@@ -6,6 +6,8 @@ from typing import Any
 from PyQt5.QtCore import QEvent, QObject, Qt
 from PyQt5.QtWidgets import QGroupBox, QScrollArea, QWidget
 
+from rpbi_utils.ros.plain_text import plain_tip
+
 from .link import SimulatorLink, SimulatorSnapshot
 from .requests import LIMIT_S, BackgroundRequests, RequestResult
 
@@ -66,5 +68,5 @@ class ScrolledDown(QScrollArea):
 def named(widget: QWidget, name: str, tip: str = "") -> Any:
     """Returns a widget, with a name by which programs find it, and a tip."""
     widget.setObjectName(name)
-    widget.setToolTip(tip)
+    widget.setToolTip(plain_tip(tip))
     return widget

@@ -1,7 +1,9 @@
 """The controls window."""
 
 from PyQt5.QtCore import QObject, Qt, QTimer, pyqtSignal
-from PyQt5.QtWidgets import QLabel, QMainWindow, QSplitter, QVBoxLayout, QWidget
+from PyQt5.QtWidgets import QMainWindow, QSplitter, QVBoxLayout, QWidget
+
+from rpbi_utils.ros.plain_text import plain_label, plain_tip
 
 from .link import SimulatorLink
 from .panel import Panel, ScrolledDown, named
@@ -59,7 +61,7 @@ class ControlsWindow(QMainWindow):
         else:
             splitter.setSizes([520, 400])
         self.setCentralWidget(splitter)
-        self._message = named(QLabel("Messages appear here."), "message")
+        self._message = named(plain_label("Messages appear here."), "message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._message.setWordWrap(True)
         self._message.setContentsMargins(8, 0, 8, 4)
@@ -92,7 +94,7 @@ class ControlsWindow(QMainWindow):
             seconds = outcome.duration_s
             duration = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
             self._message.setText(f"{outcome.name}: {text} ({duration})")
-            self._message.setToolTip(self._message.text())
+            self._message.setToolTip(plain_tip(self._message.text()))
             self._message.setStyleSheet("color: #a02020" if outcome.error else "")
         self.refresh()
 

@@ -12,10 +12,11 @@ import numpy as np
 import pandas as pd
 from PyQt5.QtCore import QPointF, QRectF, Qt, QTimer
 from PyQt5.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
-from PyQt5.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PyQt5.QtWidgets import QHBoxLayout, QMainWindow, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from custom_ros_tools.files import atomic_file
 from rpbi_utils.live_plot.plot import Line, LivePlot, thinned, ticks
+from rpbi_utils.ros.plain_text import plain_label, plain_tip
 
 TITLE = "Live plot"
 PERIOD_MS = 16
@@ -167,8 +168,8 @@ class LivePlotWindow(QMainWindow):
         self.setWindowTitle(TITLE)
         self.plot, self._folder = plot, folder
         self.canvas = Canvas(plot, seconds)
-        self._status = _named(QLabel(), "status")
-        self._message = _named(QLabel("keys: Space, C, P, D, + and -"), "message")
+        self._status = _named(plain_label(), "status")
+        self._message = _named(plain_label("keys: Space, C, P, D, + and -"), "message")
         self._message.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         buttons = QHBoxLayout()
         self._pause = self._button(buttons, "Pause", "Space", self._on_pause)
@@ -207,7 +208,7 @@ class LivePlotWindow(QMainWindow):
 
     def _button(self, layout: QHBoxLayout, title: str, key: str, action: Callable[[], None]) -> QPushButton:
         button: QPushButton = _named(QPushButton(title), title.lower())
-        button.setToolTip(key)
+        button.setToolTip(plain_tip(key))
         button.setShortcut(key)
         button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else Space would press the one that was used last
         button.clicked.connect(lambda: action())

@@ -5,7 +5,9 @@ from typing import Any
 import rospy
 from PyQt5.QtCore import Qt
 from PyQt5.QtGui import QPixmap
-from PyQt5.QtWidgets import QComboBox, QLabel, QSizePolicy, QVBoxLayout
+from PyQt5.QtWidgets import QComboBox, QSizePolicy, QVBoxLayout
+
+from rpbi_utils.ros.plain_text import plain_label
 
 from ..link import IMAGE, SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
@@ -21,7 +23,7 @@ class CamerasPanel(Panel):
         super().__init__("Cameras", link, requests)
         self._choice = named(QComboBox(), "camera", "Camera whose colour image is shown")
         self._choice.addItem(NONE)
-        self._image = named(QLabel(), "image")
+        self._image = named(plain_label(), "image")
         self._image.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._image.setSizePolicy(QSizePolicy.Ignored, QSizePolicy.Ignored)
         self._image.setMinimumHeight(150)

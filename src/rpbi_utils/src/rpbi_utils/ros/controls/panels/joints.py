@@ -10,7 +10,6 @@ from PyQt5.QtWidgets import (
     QDoubleSpinBox,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QSlider,
     QTabWidget,
@@ -23,6 +22,7 @@ from std_srvs.srv import Trigger
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ResetJointState, RobotInfo, SetJointState
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
+from rpbi_utils.ros.plain_text import plain_label
 
 from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, ScrolledDown, named
@@ -63,11 +63,11 @@ class JointRow:
         self.target.setDecimals(3 if info.is_revolute else 4)
         self.target.setSingleStep(self._span / 100)
         self.target.setSuffix(f" {unit}")
-        self.measured = named(QLabel(), f"measured {self.name}", "Present position")
+        self.measured = named(plain_label(), f"measured {self.name}", "Present position")
         self.measured.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.measured.setMinimumWidth(self.measured.fontMetrics().horizontalAdvance("-000.0000 m"))
         self._digits, self._unit = self.target.decimals(), unit
-        self.title = QLabel(self.name)
+        self.title = plain_label(self.name)
         self.title.setStyleSheet(MOVED)
         self.title.setMinimumWidth(self.title.sizeHint().width())  # else the slider would move under the mouse
         self.title.setStyleSheet("")
@@ -139,7 +139,7 @@ class RobotTab(QWidget):
         self._halt = _button("Halt", "Ends a motion; the joints hold where they are", self._on_halt)
         self._back = _button("Discard", "Has the sliders follow the joints again", self._on_discard)
         line = QHBoxLayout()
-        line.addWidget(QLabel("In"))
+        line.addWidget(plain_label("In"))
         for widget in (self._duration, self._send, self._home, self._halt, self._back):
             line.addWidget(widget)
         layout.addLayout(line)
@@ -239,7 +239,7 @@ class JointsPanel(Panel):
         super().__init__("Joints", link, requests)
         self._first = first
         self._tabs = named(QTabWidget(), "robots")
-        self._nothing = QLabel("no robot")
+        self._nothing = plain_label("no robot")
         self._nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
         layout = QVBoxLayout(self)
         layout.addWidget(self._nothing)

@@ -4,10 +4,11 @@ import time
 from pathlib import Path
 
 import rospy
-from PyQt5.QtWidgets import QCheckBox, QGridLayout, QLabel, QLineEdit, QPushButton
+from PyQt5.QtWidgets import QCheckBox, QGridLayout, QLineEdit, QPushButton
 from std_msgs.msg import String
 
 from rpbi_utils.ros.bags.recorder import Recorder
+from rpbi_utils.ros.plain_text import plain_label
 
 from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
@@ -40,12 +41,12 @@ class RecordingPanel(Panel):
         self._record.clicked.connect(self._on_record)
         self._mark = named(QPushButton("Label"), "mark", f"Publishes the label on {rospy.resolve_name(LABEL)}")
         self._mark.clicked.connect(lambda: self._labels.publish(self._label.text()))
-        self._told = named(QLabel("not recording"), "recording")
+        self._told = named(plain_label("not recording"), "recording")
         grid = QGridLayout(self)
-        grid.addWidget(QLabel("Folder"), 0, 0)
+        grid.addWidget(plain_label("Folder"), 0, 0)
         grid.addWidget(self._folder, 0, 1)
         grid.addWidget(self._images, 0, 2)
-        grid.addWidget(QLabel("Label"), 1, 0)
+        grid.addWidget(plain_label("Label"), 1, 0)
         grid.addWidget(self._label, 1, 1)
         grid.addWidget(self._mark, 1, 2)
         grid.addWidget(self._told, 2, 0, 1, 2)

@@ -3,11 +3,12 @@
 from functools import partial
 from typing import Any
 
-from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QLabel, QPushButton, QSpinBox
+from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QPushButton, QSpinBox
 from std_srvs.srv import Trigger
 
 from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
+from rpbi_utils.ros.plain_text import plain_label
 
 from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Condition, Panel, named
@@ -43,7 +44,7 @@ class RunPanel(Panel):
         self._steps.clicked.connect(lambda: self._go(self._count.value()))
         self.require("rpbi/step_n", self._count)
         self.require("rpbi/step_n", self._steps, when=_stands)
-        grid.addWidget(QLabel("Steps"), 1, 0)
+        grid.addWidget(plain_label("Steps"), 1, 0)
         grid.addWidget(self._count, 1, 1, 1, 2)
         grid.addWidget(self._steps, 1, 3)
 
@@ -56,20 +57,20 @@ class RunPanel(Panel):
         self._set = named(QPushButton("Set"), "set_factor", "Changes the pace")
         self._set.clicked.connect(lambda: self._pace(self._factor.value()))
         self.require("rpbi/set_real_time_factor", self._set, self._factor)
-        grid.addWidget(QLabel("Real-time factor"), 2, 0)
+        grid.addWidget(plain_label("Real-time factor"), 2, 0)
         grid.addWidget(self._factor, 2, 1, 1, 2)
         grid.addWidget(self._set, 2, 3)
 
-        self._status = named(QLabel(), "status")
+        self._status = named(plain_label(), "status")
         self._figures = {
-            name: named(QLabel(DASH), name) for name in ("time", "tick", "achieved", "overruns", "lost", "resets")
+            name: named(plain_label(DASH), name) for name in ("time", "tick", "achieved", "overruns", "lost", "resets")
         }
         titles = ("Time", "Tick", "Achieved", "Overruns", "Lost time", "Resets")
-        grid.addWidget(QLabel("Status"), 3, 0)
+        grid.addWidget(plain_label("Status"), 3, 0)
         grid.addWidget(self._status, 3, 1, 1, 3)
         for index, (title, label) in enumerate(zip(titles, self._figures.values())):
             row, column = divmod(index, 2)
-            grid.addWidget(QLabel(title), 4 + row, 2 * column)
+            grid.addWidget(plain_label(title), 4 + row, 2 * column)
             grid.addWidget(label, 4 + row, 2 * column + 1)
         for column in range(4):
             grid.setColumnStretch(column, 1)
