@@ -109,3 +109,13 @@ def _wait_until_quiet(*listeners):
     before = None
     while before != (before := [len(each.messages) for each in listeners]):
         time.sleep(0.1)
+
+
+def test_a_running_simulator_makes_keyframes(ros, tmp_path):
+    ros.simulator(main_config(tmp_path, robots=(iiwa(),), keyframe_every_s=0.2), use_sim_time=True)
+    commands = []
+    subscriber = rospy.Subscriber("/rpbi/commands", WorldCommands, lambda message: commands.extend(message.commands))
+    wait_until(lambda: [each.what for each in commands].count("keyframe") > 1, "two keyframes")
+    subscriber.unregister()
+    first, second, *_ = [each for each in commands if each.what == "keyframe"]
+    assert second.tick > first.tick >= 200 and len(second.data) > 1000

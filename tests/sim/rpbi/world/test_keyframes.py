@@ -20,6 +20,7 @@ from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.keyframes import keyframe as keyframes
+from rpbi.world.keyframes.building import KeyframeTimer
 from rpbi.world.loading import load_object
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.description import WorldDescription
@@ -173,6 +174,26 @@ def test_a_replay_moves_at_the_same_tick(tmp_path):
     result = Replay(Recording(description, {0: commands}, {end})).run()
     assert (result.agreed, result.difference) == (2, None)
     world.close()
+
+
+def test_a_timer_makes_keyframes_between_ticks(heap, caplog):
+    timer = KeyframeTimer(heap, 0.1)
+    for tick in range(350):
+        heap.step()
+        timer.poll()
+        if tick == 105:
+            heap.change_dynamics("box0", ChangeDynamics(lateralFriction=0.3))  # while it is built
+    moved = [each.tick for each in heap.commands.since(0)[1] if each.what == "keyframe"]
+    assert len(moved) == 3 and moved[0] > 150 + 6, "it was built again"
+    again = World.from_state(heap.save())
+    assert hash_later(again) == hash_later(heap)
+    again.close()
+    heap.add("faulty_lab:Thing", {"name": "thing"}, "thing.yaml")
+    for _ in range(250):
+        heap.step()
+        timer.poll()
+    assert caplog.text.count("keyframe_every_s: no keyframe at tick") == 1
+    assert [each.what for each in heap.commands.since(0)[1]].count("keyframe") == 3
 
 
 def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):

@@ -152,6 +152,11 @@ class WorldConfig(ConfigModel):
     state_hash_hz: HzOrOff = Field(
         1.0, description="Rate of the hashes in `rpbi/state`, in the world's time, by which recordings are replayed."
     )
+    keyframe_every_s: NonNegative = Field(
+        0.0,
+        description="Period of keyframes, in the world's time, at which saved states and replays begin; 0 is none.",
+        json_schema_extra={"unit": "s"},
+    )
     configureDebugVisualizer: ConfigureDebugVisualizer = Field(
         ConfigureDebugVisualizer(), description="Content of PyBullet's window."
     )

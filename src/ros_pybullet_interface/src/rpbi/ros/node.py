@@ -26,6 +26,7 @@ from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.world import World
+from rpbi.world.keyframes.building import KeyframeTimer
 from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
 from rpbi.world_warnings import world_warnings
 
@@ -135,6 +136,8 @@ class SimulatorNode:
         helpers: list[Callable[[], None]] = [AttachmentPublisher(self._world).poll]
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
+        if config.keyframe_every_s:
+            helpers.append(KeyframeTimer(self._world, config.keyframe_every_s).poll)
         window = WindowTopics(self._world)
         helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(self._world, publishers, helpers)

@@ -34,7 +34,8 @@ from .actions import ACTIONS, MOVES_AT_ONCE
 from .contents import WorldContents, state_hash
 from .forks.prediction import Candidate, Cost, Prediction, PredictionJob
 from .forks.shadow import Fork, Shadow
-from .keyframes.keyframe import FreshClient, Keyframe, difference, move, refuse
+from .keyframes.building import FreshClient
+from .keyframes.keyframe import Keyframe, difference, move, refuse
 from .loading import LoadedWorld, load_object, load_world
 from .saved.command_log import CommandLog, WorldCommand
 from .saved.description import WorldDescription, describe

@@ -6,13 +6,12 @@ import base64
 import binascii
 import json
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError, shortened
 from custom_ros_tools.foreign import load_foreign_json
 from rpbi.bodies import Body
-from rpbi.config.world import WorldConfig
 from rpbi.control.robot_dynamics import RobotDynamics
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
@@ -21,9 +20,8 @@ from rpbi.plugins import is_foreign
 from rpbi.sensors.contacts.contacts import ContactReader
 from rpbi.urdf.joints import Joint, JointModel
 from rpbi.world.contents import WorldContents
-from rpbi.world.load_log import apply
-from rpbi.world.saved.recipe import Recipe
 
+from .building import FreshClient
 from .graph import GraphReader, GraphWriter
 from .motion import BodyMotion, asleep, put_to_sleep
 
@@ -36,41 +34,6 @@ MAX_VALUES = 5_000_000
 _FIXED = (Client, Clock, ContactReader, Joint, JointModel, Kinematics, RobotDynamics)
 """Types of objects that a world has in the same way whenever it is built."""
 _SENSORS = "sensors"
-
-
-class FreshClient:
-    """The bodies of a world once more, in a client that has not stepped yet.
-
-    Args:
-        recipe: How they are built.
-        config: Configuration of the world.
-    """
-
-    def __init__(self, recipe: Recipe, config: WorldConfig) -> None:
-        self.recipe = recipe
-        self.pb = Client()
-        self._config = config
-        self._bodies: dict[str, Body] = {}
-
-    def build(self) -> Iterator[None]:
-        """Builds body by body, each when the next item is asked for.
-
-        Raises:
-            ConfigError: If one cannot be loaded any more.
-            InterfaceError: If PyBullet refuses.
-        """
-        for entry in self.recipe.entries(self.pb, self._config):
-            apply(self.pb, self._bodies, entry)
-            yield
-        self.recipe.check_ids(self._bodies)
-        for body in self._bodies.values():
-            body.close()
-
-    def close(self) -> None:
-        """Gives it up."""
-        for body in self._bodies.values():
-            body.close()
-        self.pb.disconnect()
 
 
 class Keyframe:
