@@ -17,6 +17,7 @@ from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.keyframes import keyframe as keyframes
@@ -162,18 +163,54 @@ def test_masses_and_inertias_are_those_at_the_keyframe(heap):
     assert [entry.what for entry in heap.log].count("dynamics") == 4, "the renderer's copy goes on"
 
 
-def test_a_replay_moves_at_the_same_tick(tmp_path):
+@pytest.fixture
+def session(tmp_path):
+    """A recording of a session with two keyframes, and with states in each of its three parts."""
     world = scripted_session.build(tmp_path)
-    description = WorldDescription(world.describe())
-    scripted_session.run(world, 301, 200)
-    world.keyframe()
-    hash_later(world, 100)
-    commands = {index: RecordedCommand.of(each) for index, each in enumerate(world.commands.since(0)[1])}
-    assert "keyframe" in [each.what for each in commands.values()]
-    end = Checkpoint(0, world.clock.tick, world.commands.count, world.state_hash())
-    result = Replay(Recording(description, {0: commands}, {end})).run()
-    assert (result.agreed, result.difference) == (2, None)
+    recording = Recording(WorldDescription(world.describe()))
+    script = scripted_session.Script(301)
+    for tick in range(300):
+        script.act(world)
+        world.step()
+        if tick % 50 == 0:
+            state = Checkpoint(0, world.clock.tick, world.commands.count, world.state_hash())
+            recording.checkpoints.add(state)
+        if tick in (99, 199):
+            world.keyframe()
+    recording.commands[0] = {k: RecordedCommand.of(each) for k, each in enumerate(world.commands.since(0)[1])}
     world.close()
+    return recording
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_parts_of_a_recording_agree_in_any_number_of_processes(session, jobs):
+    groups = groups_of(session.parts(), jobs)
+    assert len(groups) == jobs
+    result = merged(in_forks(lambda parts: Replay(session).run(parts), groups))
+    assert result == (7, 251, None, ())
+
+
+def test_a_late_recording_is_replayed_from_its_first_keyframe_on(session):
+    del session.commands[0][0]
+    result = Replay(session).run()
+    assert (
+        result.agreed == 6 and len(result.left_out) == 1 and "command 0 is not in the recording" in result.left_out[0]
+    )
+
+
+def test_a_changed_command_or_keyframe_is_found_in_its_part(session):
+    commands = session.commands[0]
+    second, third = session.parts()[1:]
+    end = commands[second.end]
+    commands[second.end] = end._replace(data=commands[second.first - 1].data)
+    with_wrong_end = Replay(session).run([second])
+    assert "the keyframe at tick 200 is not the recorded one" in with_wrong_end.left_out[0]
+    commands[second.end] = end
+    for index in range(second.first, second.end):
+        commands[index] = commands[index]._replace(what="halt", name="", data='"never"')
+    assert Replay(session).run([third]).left_out == ()
+    changed = Replay(session).run([second])
+    assert changed.difference is not None or "is not the recorded one" in changed.left_out[0]
 
 
 def test_a_timer_makes_keyframes_between_ticks(heap, caplog):

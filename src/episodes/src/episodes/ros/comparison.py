@@ -54,6 +54,28 @@ class TopicDifference(NamedTuple):
         return "{}: expected {}, recorded {}".format(at, *values)
 
 
+class Compared(NamedTuple):
+    """Result of a comparison.
+
+    Attributes:
+        differences: The first difference of each topic.
+        different: Number of messages or transforms that differ, by topic.
+        compared: Number of those that were compared, by topic.
+    """
+
+    differences: dict[str, TopicDifference]
+    different: Counter[str]
+    compared: Counter[str]
+
+    @classmethod
+    def merged(cls, parts: Iterable[Compared]) -> Compared:
+        """Returns the results of parts of an episode, in their order, as that of the whole."""
+        whole = cls({}, Counter(), Counter())
+        for each in parts:
+            whole = cls(each.differences | whole.differences, *(a + b for a, b in zip(whole[1:], each[1:])))
+        return whole
+
+
 class Comparison:
     """Compares the messages of an episode with the samples of a replay, as a context that closes the bag.
 
@@ -65,9 +87,7 @@ class Comparison:
         namespace: Namespace of the simulator.
 
     Attributes:
-        differences: The first difference of each topic.
-        different: Number of messages or transforms that differ, by topic.
-        compared: Number of those that were compared, by topic.
+        result: The result so far.
     """
 
     def __init__(self, bag: Path, namespace: str) -> None:
@@ -85,9 +105,7 @@ class Comparison:
         self._swept_ns = 0
         self._stamps: _Stamps | None = None
         self._samples: SampleMessages | None = None
-        self.differences: dict[str, TopicDifference] = {}
-        self.different: Counter[str] = Counter()
-        self.compared: Counter[str] = Counter()
+        self.result = Compared({}, Counter(), Counter())
 
     def __enter__(self) -> Comparison:
         return self
@@ -119,15 +137,15 @@ class Comparison:
     def _compare(self, topic: str, expected: Any, recorded: Any) -> None:
         assert self._samples is not None
         full = self._full(topic)
-        self.compared[full] += 1
+        self.result.compared[full] += 1
         other = "its type", expected._type, "another one"
         found = other if recorded is None else _difference(_as_sent(expected), recorded, "")
         if found is not None:
-            self.different[full] += 1
-            if full not in self.differences:
+            self.result.different[full] += 1
+            if full not in self.result.differences:
                 stamp_ns, is_certain = expected.header.stamp.to_nsec(), not self._samples.keeps_state(topic)
                 place, ours, theirs = found
-                self.differences[full] = TopicDifference(full, stamp_ns, place, ours, theirs, is_certain)
+                self.result.differences[full] = TopicDifference(full, stamp_ns, place, ours, theirs, is_certain)
 
     def _read_until(self, time_ns: int) -> None:
         """Reads the messages that were recorded until a time, and drops those that waited too long."""

@@ -18,11 +18,12 @@ from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
 from episodes.files import changed_files, newer_files, with_stored_files
 from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
-from rpbi.replay.session import Replay, ReplayResult
+from rpbi.replay.parallel import groups_of, in_forks, merged
+from rpbi.replay.session import RecordedPart, Recording, Replay, ReplayResult
 from rpbi_utils.ros.replay.recorded_session import MAX_TICKS, read_recording, require_few_ticks
 
 from .bags import seals_of
-from .comparison import Comparison
+from .comparison import Compared, Comparison
 
 _PROGRAM = "import sys; from episodes.ros.verification import main; main(sys.argv[1:])"
 
@@ -72,12 +73,16 @@ def verify_all(
         trust: Python packages that the episodes may import, for types of the user's own.
         limits: Limits on each episode.
     """
+    each = max(1, jobs // max(1, len(numbers)))  # for episodes with keyframes
     with ThreadPoolExecutor(jobs) as pool:
-        yield from pool.map(partial(_verify_in_process, folder, trust, limits), numbers)
+        yield from pool.map(partial(_verify_in_process, folder, trust, limits, each), numbers)
 
 
-def _verify_in_process(folder: EpisodeFolder, trust: Sequence[str], limits: ReplayLimits, number: int) -> Verdict:
-    command = [sys.executable, "-c", _PROGRAM, str(folder.path), str(number), json.dumps(limits), *trust]
+def _verify_in_process(
+    folder: EpisodeFolder, trust: Sequence[str], limits: ReplayLimits, jobs: int, number: int
+) -> Verdict:
+    arguments = [str(folder.path), str(number), json.dumps(limits), str(jobs), *trust]
+    command = [sys.executable, "-c", _PROGRAM, *arguments]
     done = subprocess.run(command, capture_output=True, text=True)
     try:
         return Verdict(*json.loads(done.stdout.splitlines()[-1]))
@@ -90,15 +95,23 @@ def main(words: Sequence[str]) -> None:
     """Verifies one episode and prints the result as JSON.
 
     Args:
-        words: Folder, number, limits as JSON, and packages to trust.
+        words: Folder, number, limits as JSON, number of processes, and packages to trust.
     """
-    path, number, limits, *trust = words
+    path, number, limits, jobs, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
-    print(f"\n{json.dumps(verify(EpisodeFolder(path), int(number), ReplayLimits(*json.loads(limits))))}", flush=True)
+    verdict = verify(EpisodeFolder(path), int(number), ReplayLimits(*json.loads(limits)), int(jobs))
+    print(f"\n{json.dumps(verdict)}", flush=True)
 
 
-def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS) -> Verdict:
-    """Simulates an episode again in this process, with the files that are stored with it."""
+def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS, jobs: int = 1) -> Verdict:
+    """Simulates an episode again, with the files that are stored with it.
+
+    Args:
+        folder: The folder.
+        number: The episode.
+        limits: Limits on it.
+        jobs: Number of processes at once if it has keyframes; with 1, it is this process.
+    """
     try:
         episode = folder.read(number)
     except EpisodeError as error:
@@ -106,7 +119,7 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
     notes = [f"note: {each}" for each in newer_files(episode.files)]
     try:
         changed = list(changed_files(episode.files, folder.files))
-        is_same, text, own_notes = _replay(folder, episode, limits)
+        is_same, text, own_notes = _replay(folder, episode, limits, jobs)
         notes += own_notes
     except (InterfaceError, OSError) as error:
         return Verdict(number, False, "; ".join(str(error).splitlines()), episode.label, notes)
@@ -116,7 +129,7 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
     return Verdict(number, is_same and not changed, "; ".join([*changed, text]), episode.label, notes)
 
 
-def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits) -> tuple[bool, str, list[str]]:
+def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
     """Returns whether an episode is the same, the comparison in words, and notes."""
     place = folder.folder_of(episode.number)
     bag = file_in(place, BAG)
@@ -131,14 +144,23 @@ def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits) -> tu
             relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
         )
         require_few_ticks(bag, recording, limits.max_ticks)
-        with Comparison(bag, episode.namespace) as comparison:
-            result = Replay(recording, observe=comparison.observe).run()
-    faults, notes = _message_faults(bag, episode, comparison, limits.any_size)
-    words = [*recording.description.warnings, *faults, _words(result, comparison, bool(faults))]
+        compare = partial(_compare, bag, episode.namespace, recording)
+        results, comparisons = zip(*in_forks(compare, groups_of(recording.parts(), jobs)))
+    result, compared = merged(results), Compared.merged(comparisons)
+    faults, notes = _message_faults(bag, episode, compared, limits.any_size)
+    words = [*recording.description.warnings, *faults, _words(result, compared, bool(faults))]
     return result.difference is None and not result.left_out and not faults, "; ".join(words), notes
 
 
-def _message_faults(bag: Path, episode: Episode, comparison: Comparison, any_size: bool) -> tuple[list[str], list[str]]:
+def _compare(
+    bag: Path, namespace: str, recording: Recording, parts: Sequence[RecordedPart]
+) -> tuple[ReplayResult, Compared]:
+    with Comparison(bag, namespace) as comparison:
+        result = Replay(recording, observe=comparison.observe).run(parts)
+    return result, comparison.result
+
+
+def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
     """Returns sentences on topics that were changed, and notes on those that only the replay has otherwise.
 
     The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
@@ -159,7 +181,7 @@ def _message_faults(bag: Path, episode: Episode, comparison: Comparison, any_siz
     return faults, notes
 
 
-def _words(result: ReplayResult, comparison: Comparison, has_faults: bool) -> str:
+def _words(result: ReplayResult, comparison: Compared, has_faults: bool) -> str:
     if result.difference is not None:
         each, last = result.difference.checkpoint, result.difference.last_agreement
         since = "the first state" if last is None else f"the same until tick {last.tick}"

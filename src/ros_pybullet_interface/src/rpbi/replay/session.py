@@ -1,14 +1,17 @@
 """Runs a recorded session again and compares the hashes of its states."""
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
 from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.commands import KEYFRAME, apply_command
 from rpbi.world.saved.description import WorldDescription
+from rpbi.world.saved.values import from_text
 
 
 class Checkpoint(NamedTuple):
@@ -43,6 +46,41 @@ class Recording:
     description: WorldDescription
     commands: dict[int, dict[int, RecordedCommand]] = field(default_factory=dict)
     checkpoints: set[Checkpoint] = field(default_factory=set)
+
+    def parts(self) -> list[RecordedPart]:
+        """Returns the parts that can be replayed by themselves, in their order."""
+        parts = []
+        start = Checkpoint(0, 0, 0, self.description.start_hash)
+        checkpoints = sorted({start, *self.checkpoints})
+        for resets in sorted({each.resets for each in checkpoints}):
+            commands = self.commands.get(resets, {})
+            ends = [index for index, each in sorted(commands.items()) if each.what == KEYFRAME]
+            states = [each for each in checkpoints if each.resets == resets]
+            for begin, end in zip([None, *ends], [*ends, None]):
+                first = 0 if begin is None else begin + 1
+                own = tuple(each for each in states if first <= each.commands and (end is None or each.commands <= end))
+                if own or end is not None:
+                    keyframe = None if begin is None else commands[begin]
+                    parts.append(RecordedPart(resets, first, keyframe, own, end))
+        return parts
+
+
+class RecordedPart(NamedTuple):
+    """A stretch of a recording, from a start of the world or a keyframe to the next keyframe or the last state.
+
+    Attributes:
+        resets: Number of resets of the world before.
+        first: Index of its first command.
+        keyframe: The command of the keyframe that it begins at; None for a start.
+        checkpoints: The recorded states in it, in their order.
+        end: Index of the command of the keyframe that it ends with, None if it ends with the last state.
+    """
+
+    resets: int
+    first: int
+    keyframe: RecordedCommand | None
+    checkpoints: tuple[Checkpoint, ...]
+    end: int | None
 
 
 class Difference(NamedTuple):
@@ -98,51 +136,69 @@ class Replay:
         self._resets = 0
         self._world = World.from_description(recording.description)
         self._agreed = self._ticks = 0
+        self._agreement: Checkpoint | None = None
         self._left_out: list[str] = []
 
-    def run(self) -> ReplayResult:
-        """Replays all that can be, each reset being a new start, up to the first difference."""
-        difference = None
-        lives: dict[int, set[Checkpoint]] = {}
-        for checkpoint in {Checkpoint(0, 0, 0, self._recording.description.start_hash), *self._recording.checkpoints}:
-            lives.setdefault(checkpoint.resets, set()).add(checkpoint)
+    def run(self, parts: Sequence[RecordedPart] | None = None) -> ReplayResult:
+        """Replays all that can be, each reset being a new start, up to the first difference.
+
+        Args:
+            parts: Parts of the recording in their order, all by default. A part that follows the one before goes on
+                from there; others begin at their recorded keyframes. Every part but the last of a life ends with a
+                keyframe that is compared with the recorded one: if all parts agree, wherever they were replayed, so
+                does the whole.
+        """
+        difference, goes_on = None, False
         try:
-            for turn, resets in enumerate(sorted(lives)):
-                if turn:
-                    self._world.reset()
-                self._resets = resets
-                self._observe(self._world, resets, self._world.read_rest())
-                difference = self._live(sorted(lives[resets]), self._recording.commands.get(resets, {}))
+            for turn, part in enumerate(self._recording.parts() if parts is None else parts):
+                if not goes_on:
+                    try:
+                        self._begin(part, turn == 0)
+                    except InterfaceError as error:
+                        self._left_out.append(f"from the keyframe before command {part.first} on: {error}")
+                        continue
+                difference, goes_on = self._live(part)
                 if difference is not None:
                     break
         finally:
             self._world.close()
         return ReplayResult(self._agreed, self._ticks, difference, tuple(self._left_out))
 
-    def _live(self, checkpoints: list[Checkpoint], commands: Mapping[int, RecordedCommand]) -> Difference | None:
-        """Runs from a start of the world to its last recorded state; returns the first that differs."""
-        done = 0
-        agreement: Checkpoint | None = None
-        for checkpoint in checkpoints:
+    def _begin(self, part: RecordedPart, is_new: bool) -> None:
+        if not is_new:
+            self._world.reset()
+        if part.keyframe is not None:
+            self._world.enter_keyframe(str(from_text(part.keyframe.data)))
+        self._resets, self._agreement = part.resets, None
+        self._observe(self._world, part.resets, self._world.read_rest())
+
+    def _live(self, part: RecordedPart) -> tuple[Difference | None, bool]:
+        """Runs through a part; returns the first state that differs, and whether the next part goes on from there."""
+        commands = self._recording.commands.get(part.resets, {})
+        done = part.first
+        ends = [] if part.end is None else [Checkpoint(part.resets, commands[part.end].tick, part.end + 1, "")]
+        for checkpoint in (*part.checkpoints, *ends):
             missing = next((index for index in range(done, checkpoint.commands) if index not in commands), None)
             if missing is not None:
                 self._left_out.append(
                     f"from {checkpoint} on: command {missing} is not in the recording, which has to begin before the "
                     "first command, or before a reset"
                 )
-                return None
+                return None, False
             try:
                 done = self._advance(checkpoint, commands, done)
             except (InterfaceError, ValueError) as error:
                 at = f"tick {self._world.clock.tick}"
                 self._left_out.append(f"from {at} on, before {checkpoint}: {error}")
-                return None
+                return None, False
+            if not checkpoint.state_hash:
+                continue
             state_hash = self._world.state_hash()
             if state_hash != checkpoint.state_hash:
-                return Difference(checkpoint, state_hash, agreement)
+                return Difference(checkpoint, state_hash, self._agreement), False
             self._agreed += 1
-            agreement = checkpoint
-        return None
+            self._agreement = checkpoint
+        return None, part.end is not None
 
     def _advance(self, to: Checkpoint, commands: Mapping[int, RecordedCommand], done: int) -> int:
         """Applies commands and steps up to a checkpoint; returns how many commands were applied since the start."""

@@ -10,6 +10,8 @@ from custom_ros_tools.errors import InterfaceError
 from .command_log import RecordedCommand
 from .values import from_text, trusting
 
+KEYFRAME = "keyframe"
+"""What a command is that has the text of a keyframe."""
 _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "input": lambda world, slot, value: world.apply_input(slot, value),
     "add": lambda world, _, arguments: world.add(*arguments),
@@ -22,7 +24,7 @@ _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
-    "keyframe": lambda world, _, recorded: world.keyframe(recorded),
+    KEYFRAME: lambda world, _, recorded: world.keyframe(recorded),
 }
 """Commands to a world other than actions on its bodies."""
 

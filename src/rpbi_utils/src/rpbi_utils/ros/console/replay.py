@@ -8,10 +8,11 @@ from typing import Annotated
 
 from tqdm import tqdm
 
-from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.foreign import printable_lines
 from custom_ros_tools.plugins import trust_only
+from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.replay.recorded_session import MAX_TICKS, read_recording, require_few_ticks
@@ -25,6 +26,7 @@ def replay(
     trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
     max_ticks: Annotated[int, Argument("N", parse=int)] = MAX_TICKS,
     any_size: Annotated[bool, Argument("")] = False,
+    jobs: Annotated[int, Argument("N", parse=int)] = 1,
 ) -> int:
     """Runs a recorded session again and compares its states; without a bag, the demo's.
 
@@ -37,7 +39,10 @@ def replay(
         trust: Python packages that the bag may have imported, for types of your own
         max_ticks: bags of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
         any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+        jobs: processes at once, for a recording with keyframes; 1 without it
     """
+    if jobs < 1:
+        raise UsageError(f"--jobs: expected at least 1, got {jobs}")
     logging.basicConfig(format="replay: %(message)s", level=logging.ERROR)
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who made the bag")
     try:
@@ -46,7 +51,8 @@ def replay(
             print(f"replay: warning: {printable_lines(str(warning))}", file=sys.stderr)
         ticks = require_few_ticks(bag, recording, max_ticks)
         with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=quiet) as bar:
-            result = Replay(recording, bar.update).run()
+            groups = groups_of(recording.parts(), jobs)
+            result = merged(in_forks(lambda parts: Replay(recording, bar.update).run(parts), groups))
     except (InterfaceError, OSError):
         raise
     except Exception as error:  # a bag may have anything in it
