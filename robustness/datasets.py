@@ -38,6 +38,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=500, help="of each format; default: %(default)s")
     parser.add_argument("--first", type=int, default=0, help="the first seed; default: %(default)s")
+    parser.add_argument("--formats", nargs="+", default=list(MAKERS), choices=MAKERS, help="default: all")
     arguments = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="hostile-"))
     good = good_datasets(folder)
@@ -46,8 +47,12 @@ def main() -> None:
     modules.mkdir()
     (modules / f"{MODULE}.py").write_text("import pathlib\npathlib.Path('canary').touch()\nclass Canary: pass\n")
     sys.path.append(str(modules))
-    rows, is_fine = [], True
-    for name in MAKERS:
+    print(
+        "| format | data sets | no fault | faults | signals | tracebacks | code | written | longest [s] | memory [MB] |"
+    )
+    print("|---" * 10 + "|", flush=True)
+    is_fine = True
+    for name in arguments.formats:
         trials = []
         for hostile in hostile_datasets(name, good[name], seeds, folder):
             before = _content(folder)
@@ -60,12 +65,7 @@ def main() -> None:
                 print(f"{name} {hostile.seed} ({hostile.how}): {trial}", flush=True)
             else:
                 shutil.rmtree(hostile.path.parent)
-        rows.append(_row(name, trials))
-    print(
-        "| format | data sets | no fault | faults | signals | tracebacks | code | written | longest [s] | memory [MB] |"
-    )
-    print("|---" * 10 + "|")
-    print(*rows, sep="\n")
+        print(_row(name, trials), flush=True)
     print("load:", *(f"{load:.1f}" for load in os.getloadavg()))
     if is_fine:
         shutil.rmtree(folder)

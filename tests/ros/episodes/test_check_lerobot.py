@@ -117,6 +117,14 @@ PLANTED: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "video missing": (lambda folder: (folder / VIDEO).unlink(), rf"{VIDEO}: is missing, with the images of episodes 1"),
     "video truncated": (truncate(VIDEO), rf"{VIDEO}: cannot be (read|decoded)"),
+    "colours swapped": (
+        refilm(lambda images: [each[..., ::-1].copy() for each in images]),
+        r"episode 1: its red, green and blue are the blue, green, red of the images",
+    ),
+    "frames frozen": (
+        refilm(lambda images: [*images[:10], *[images[10]] * 20, *images[30:]]),
+        r"episode 1: \d+ frames are frozen while the images that were exported move, first frame (9|10|11)",
+    ),
     "image missing": (refilm(lambda images: images[:-1]), rf"{VIDEO}: 41 frames, but its episodes have 42 rows"),
     "image black": (
         refilm(lambda images: [*images[:20], np.zeros_like(images[20]), *images[21:]]),

@@ -18,7 +18,7 @@ MAX_VALUES = 20_000_000
 MAX_ROW_BYTES = 100_000_000
 """Bytes of one image of an HDF5 file."""
 MAX_OBJECTS = 100_000
-"""Groups and data sets of an HDF5 file, each counted as often as it is reached."""
+"""Groups and data sets of an HDF5 file."""
 MAX_PLACE = 1_000_000_000
 """Largest number of a file or folder."""
 _PLACEHOLDER = re.compile(r"\{(\w+)(?::0?(\d)d)?\}")
@@ -93,8 +93,8 @@ def read_parquet(path: Path) -> Any:
 def hdf5_faults(file: Any, size: int) -> Iterator[str]:
     """Yields a sentence for each object of an HDF5 file that is not read.
 
-    These are links, but for those by which groups have their members; data that lie in other files, that are no numbers
-    or texts, or that unfold to too much.
+    These are links, but for those by which groups have their members; objects with two names; data that lie in other
+    files, that are no numbers or texts, or that unfold to too much.
 
     Args:
         file: The open file.
@@ -104,6 +104,7 @@ def hdf5_faults(file: Any, size: int) -> Iterator[str]:
 
     waiting = [(file, "")]
     objects = values = 0
+    known: set[int] = set()
     most = max(MAX_VALUES, size)
     while waiting:
         group, path = waiting.pop()
@@ -117,6 +118,11 @@ def hdf5_faults(file: Any, size: int) -> Iterator[str]:
                 yield f"{place}: expected no link, found {type(group.get(name, getlink=True)).__name__}"
                 continue
             each = group[name]
+            address = h5py.h5o.get_info(each.id).addr
+            if address in known or each == file:
+                yield f"{place}: expected a group or data set of its own, found one that has another name, too"
+                continue
+            known.add(address)
             if isinstance(each, h5py.Group):
                 waiting.append((each, place))
                 continue

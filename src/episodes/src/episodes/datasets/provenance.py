@@ -27,12 +27,6 @@ Array = NDArray[Any]
 FOLDER, EXPORT = "rpbi", "export.json"
 VERSION = 1
 """Version of these files."""
-COARSE = 8
-"""Rows and columns of a coarse image."""
-_BRIGHTNESS = (0.299, 0.587, 0.114)
-"""Shares of red, green and blue, as codecs have them; compression keeps brightness better than colours."""
-_STRIDE = 2
-"""Distance of the rows and columns of pixels that count for a coarse image."""
 
 
 def file_digest(path: Path) -> str:
@@ -140,75 +134,6 @@ def frame_changes(found: Sequence[int], stored: Sequence[int]) -> Iterator[str]:
 
 def _crc(column: Array) -> int:
     return zlib.crc32(np.ascontiguousarray(column, column.dtype.newbyteorder("<")).tobytes())
-
-
-# --- Coarse images
-
-
-def coarse(pixels: Array) -> Array:
-    """Returns the mean brightness of 8 by 8 parts of an image.
-
-    Args:
-        pixels: Shape (height, width, 3), uint8.
-
-    Returns:
-        Shape (8, 8), float16.
-    """
-    part = pixels[::_STRIDE, ::_STRIDE]
-    rows = np.linspace(0, part.shape[0], COARSE + 1).astype(int)[:-1]
-    columns = np.linspace(0, part.shape[1], COARSE + 1).astype(int)[:-1]
-    counts = np.outer(np.diff([*rows, part.shape[0]]), np.diff([*columns, part.shape[1]]))
-    by_row = np.add.reduceat(part, rows, axis=0, dtype=np.uint32)
-    sums = np.add.reduceat(by_row, columns, axis=1) @ np.array(_BRIGHTNESS)
-    return (sums / counts).astype(np.float16)
-
-
-MAX_IMAGE_DIFFERENCE = 12.0
-"""Largest difference between a frame and its image, of 255, as the root mean square over the parts."""
-MIN_IMAGE_DIFFERENCE = 3.0
-"""Least such difference that is reported; in between, one that is a multiple of the median of the video is."""
-MEDIANS = 5.0
-"""That multiple."""
-MIN_GAIN = 0.5
-"""Another order of frames, or another camera, is reported if it leaves less than this share of squared differences."""
-MIN_MOTION = 1e-2
-"""Mean squared difference, of 255 squared, below which neither is reported."""
-
-
-def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterator[str]:
-    """Yields a sentence if the frames of a video are not the images that were exported.
-
-    Args:
-        key: The camera.
-        found: Coarse images of the frames, shape (n, 8, 8).
-        stored: Coarse images of the images of all cameras.
-    """
-    found = found.astype(float)
-    images = {camera: each.astype(float) for camera, each in stored.items() if each.shape == found.shape}
-    if key not in images:
-        return
-    own = images.pop(key)
-    rest = _mean_square(found - own)
-    for other, each in images.items():
-        if rest > MIN_MOTION and _mean_square(found - each) < MIN_GAIN * rest:
-            yield f"its frames are the images of '{other}'"
-            return
-    if len(found) > 2:
-        at, right = found - found.mean(axis=0), own - own.mean(axis=0)
-        rest = _mean_square(at[1:-1] - right[1:-1])
-        for words, shifted in (("late", right[:-2]), ("early", right[2:])):
-            if rest > MIN_MOTION and _mean_square(at[1:-1] - shifted) < MIN_GAIN * rest:
-                yield f"its frames are {words} by one frame"
-                return
-    differences = np.sqrt(((found - own) ** 2).mean(axis=(1, 2)))
-    limit = min(max(MIN_IMAGE_DIFFERENCE, MEDIANS * float(np.median(differences))), MAX_IMAGE_DIFFERENCE)
-    wrong = np.flatnonzero(differences > limit)
-    if len(wrong):
-        yield f"{len(wrong)} frames show another image than was exported, first frame {wrong[0]}"
-
-
-def _mean_square(values: Array) -> float:
-    return float((values**2).mean())
 
 
 # --- Files

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from episodes.datasets.coarse_images import coarse, frozen_faults, image_faults
 from episodes.datasets.foreign_files import file_name, read_json, read_parquet
+from episodes.datasets.format import STATE
 from episodes.datasets.layouts import lerobot as layout
-from episodes.datasets.provenance import coarse, image_faults, read_images
+from episodes.datasets.provenance import read_images
 from episodes.datasets.statistics import statistics
 from episodes.datasets.video import VideoFacts, read_video
 
@@ -365,15 +367,23 @@ class _Check:
             if not len(times) or np.abs(times[_nearest(times, wanted)] - wanted).max() > MAX_TIME_ERROR_S:
                 yield f"{where}: no frame at each of its times from {start:g} s on"
                 continue
+            found = images[_nearest(times, wanted)]
             if not self._stored.get(row["episode_index"]):
+                yield from (f"{where}: {fault}" for fault in frozen_faults(found, self._states(row)))
                 continue
             try:
                 stored = read_images(self._folder, row["episode_index"])
             except ValueError as error:
                 yield f"{where}: {error}"
                 continue
-            found = images[_nearest(times, wanted)]
             yield from (f"{where}: {fault}" for fault in image_faults(key, found, stored))
+
+    def _states(self, row: Mapping[str, Any]) -> Array:
+        """Returns the positions of the joints in an episode, shape (length, columns); empty for none."""
+        parts = self._values.get(STATE, [])
+        if not parts or len({part.shape[1] for part in parts}) != 1:
+            return np.empty((0, 0))
+        return np.concatenate(parts)[row["dataset_from_index"] : row["dataset_to_index"]]
 
 
 def _is_feature(feature: Any) -> bool:

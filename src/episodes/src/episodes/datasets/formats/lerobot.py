@@ -14,9 +14,10 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
+from episodes.datasets.coarse_images import coarse
 from episodes.datasets.format import Array, CameraFeature, DatasetFormat, ExportedEpisode, Schema, require_room
 from episodes.datasets.layouts import lerobot as layout
-from episodes.datasets.provenance import checksums, coarse
+from episodes.datasets.provenance import checksums
 from episodes.datasets.statistics import ImageStatistics, pooled, statistics
 
 try:
@@ -235,8 +236,8 @@ class _Film:
 
     @property
     def coarse(self) -> Array:
-        """Coarse images, shape (n, 8, 8)."""
-        return np.array(self._coarse)
+        """Coarse images, shape (n, 8, 8, 3), float16."""
+        return np.array(self._coarse, np.float16)
 
     @property
     def statistics(self) -> dict[str, list[Any]]:
