@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from rpbi.images import CameraImages
 from rpbi.samples import AprilTagsSample
 from rpbi.world import World
 from rpbi.world.forks import shadow
+from rpbi.world.saved.description import WorldDescription
 
 AHEAD = 60
 """Ticks for which worlds go on."""
@@ -124,6 +126,14 @@ def test_poses_that_a_reset_keeps_are_saved(world: World) -> None:
     assert set(known) == {"eye", "placed", "gone"} and known["eye"][1] == Pose((0.0, 0.1, 1.2), DOWN)
     elsewhere = World.from_state(world.save())
     assert cameras(elsewhere) == known
+    elsewhere.close()
+
+
+def test_descriptions_from_before_have_no_cameras(world: World) -> None:
+    described = json.loads(world.describe())
+    del described["cameras"]
+    elsewhere = World.from_description(WorldDescription(json.dumps(described)))
+    assert set(elsewhere.bodies) == set(world.bodies) and not elsewhere.cameras
     elsewhere.close()
 
 

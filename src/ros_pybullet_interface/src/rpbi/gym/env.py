@@ -110,7 +110,8 @@ class WorldEnv(gymnasium.Env[Any, Any]):
             ValueError: If the action has another type or shape than the space, or a number that is not finite. Then
                 nothing has happened.
         """
-        check_action(self.action_space, action)
+        if action is not None or self.task.needs_action:
+            check_action(self.action_space, action)
         self._task.count += 1
         observation = self._line.run(action, self._task.act, self._step, self._observe)
         reward, has_succeeded = self._task.reward(), self._task.has_succeeded()

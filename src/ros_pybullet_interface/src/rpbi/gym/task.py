@@ -43,6 +43,8 @@ class WorldTask(ABC):
     """
 
     Config: ClassVar[type[WorldTaskConfig]] = WorldTaskConfig
+    needs_action: ClassVar[bool] = True
+    """Whether every step needs an action of the action space. Otherwise `act` may get None, too."""
 
     def __init__(self, world: World, config: Any) -> None:
         self.world, self.config = world, config

@@ -56,6 +56,7 @@ class SceneTask(WorldTask):
     """Does what a scene is about: actions move its robots, or are None, for a scene that acts itself."""
 
     Config = SceneTaskConfig
+    needs_action = False
 
     def __init__(self, world: World, config: SceneTaskConfig) -> None:
         super().__init__(world, config)
