@@ -144,3 +144,10 @@ def test_descriptions_cannot_grow_the_text_of_a_configuration(state):
     description = json.loads(state.description) | {"descriptions": {"a": "<robot/>" * 1000}}
     with pytest.raises(ValueError, match="has a text for 'a'"):
         WorldDescription(json.dumps(description))
+
+
+def test_a_configuration_that_does_not_fit_is_reported_by_key(state):
+    config = '{"rpbi.bodies.dynamic:DynamicObjectConfig":{"name":"box","baseMass":"1","size":2}}'
+    with pytest.raises(ConfigError) as caught:
+        World.from_state(changed(state, config=config))
+    assert {(each.file, each.key) for each in caught.value.problems} >= {("box.yaml", "baseMass"), ("box.yaml", "size")}

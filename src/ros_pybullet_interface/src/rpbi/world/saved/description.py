@@ -162,7 +162,9 @@ class WorldDescription:
             if not isinstance(config, kind):
                 raise ValueError(f"expected a {full_name(kind)}, got {shown(config)}")
             return config
-        except ValueError as error:  # pydantic's are such, too
+        except ConfigError as error:
+            raise ConfigError([Problem(printable(file), each.key, each.message) for each in error.problems]) from None
+        except ValueError as error:
             raise ConfigError([Problem(printable(file), "", str(error))]) from None
 
 

@@ -87,7 +87,7 @@ def _value(plain: Any) -> Any:
         return {_value(name): _value(item) for name, item in content}
     made = _class_of(key)
     if issubclass(made, ConfigModel):
-        return made.model_validate(content, context={"file": "~recorded"})
+        return made.parse(content, "~recorded")
     return made(*map(_value, content))
 
 
