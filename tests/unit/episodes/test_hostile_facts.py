@@ -12,7 +12,7 @@ import yaml
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
 from episodes.errors import EpisodeError
-from episodes.files import folders_of_world, store_files, with_stored_files
+from episodes.files import files_of_world, store_files, with_stored_files
 from episodes.folder import BAG, FACTS, EpisodeFolder, file_in, hold, is_held, read_facts
 from episodes.listing import details_of, table_of
 
@@ -135,20 +135,20 @@ def test_what_is_no_description_is_rejected(tmp_path: Path, description: str) ->
 
 
 def test_files_outside_of_the_world_are_not_copied(tmp_path: Path) -> None:
-    for name in ("world/main.yaml", "world/own.yaml", "private/secret.yaml", "private/world.yaml"):
+    for name in ("world/main.yaml", "world/own.yaml", "world/.ssh/id", "private/secret.yaml", "private/world.yaml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("password: 1")
     main = tmp_path / "world/main.yaml"
     main.write_text("dynamic_objects: [own.yaml]")
-    files = {
-        str(tmp_path / name): "" for name in ("world/own.yaml", "private/secret.yaml", "world/../private/secret.yaml")
-    }
+    names = ("world/own.yaml", "world/.ssh/id", "private/secret.yaml", "world/../private/secret.yaml")
+    files = {str(tmp_path / name): "" for name in names}
     paths = []
     for file, further in ((main, []), (tmp_path / "private/world.yaml", []), (main, [tmp_path / "private"])):
         description = _description(file=str(file), files=files)
-        stored, faults = store_files(description, tmp_path / "files", [*folders_of_world(description), *further])
+        stored, faults = store_files(description, tmp_path / "files", files_of_world(description, further))
         paths.append([Path(each["path"]).name for each in stored])
-        assert ("not copied" in "".join(faults)) == (not further)
+        [text] = [each for each in faults if each.startswith("not copied")]
+        assert text.count(str(tmp_path)) == len(files) - len(stored)
     assert paths == [["own.yaml"], [], ["own.yaml", "secret.yaml", "secret.yaml"]]
 
 
@@ -156,7 +156,7 @@ def test_a_urdf_outside_of_the_world_is_not_read(tmp_path: Path) -> None:
     urdf = tmp_path / "r.urdf"
     urdf.write_text('<robot name="r"><link name="l"/></robot>')
     description = _description(files={str(urdf): ""})
-    stored, faults = store_files(description, tmp_path / "files", folders_of_world(description))
+    stored, faults = store_files(description, tmp_path / "files", files_of_world(description))
     assert stored == [] and f"not copied, since they are in no folder of the world or of copy_from: {urdf}" in faults[0]
 
 

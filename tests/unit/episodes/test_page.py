@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -42,3 +45,12 @@ def test_a_page_that_is_too_large_is_built_with_fewer_times(scene: PageScene) ->
     assert len(page.encode()) < MAX_BYTES and 10 < len(shown.times) < TIMES
     note, rate = shown.all_notes
     assert note == "a note" and rate.startswith("the view has ") and rate in page
+
+
+def test_texts_of_others_are_no_html(scene: PageScene) -> None:
+    odd = "</title></script><script>x()</script>"
+    lines = {odd: {odd: pd.Series([0.0, 1.0], [0.0, 1.0])}}
+    few = scene.coarser(10)
+    links = [replace(few.links[0], body=odd, name=odd)]
+    page, _ = page_of(replace(few, title=odd, notes=[odd], panels=lines, links=links))
+    assert odd not in page and page.count("u003c/script>") == 8

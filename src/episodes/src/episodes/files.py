@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -38,14 +38,14 @@ _NAMED = 5
 
 
 def store_files(
-    description: str, store: Path, folders: Sequence[Path] | None = None
+    description: str, store: Path, is_own: Callable[[Path], bool] = lambda _: True
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Copies the files that a world's description names, and the meshes of its URDFs, into a folder.
 
     Args:
         description: JSON, as on `rpbi/world_description`.
         store: The folder; a file is `HASH.EXTENSION` there. Copies that exist are kept.
-        folders: Folders whose files are copied; None for all files.
+        is_own: Whether a file may be copied, by its path without links; see `files_of_world`.
 
     Returns:
         For each file its `path`, its `sha256`, and for a URDF `meshes`, their paths by the names in it; and sentences
@@ -55,7 +55,7 @@ def store_files(
         ConfigError: If it is no description.
     """
     data = _described(description)
-    copies = _Copies(store, folders)
+    copies = _Copies(store, is_own)
     for path, expected in data["files"].items():
         if path in data["descriptions"]:
             copies.add_meshes(path, write_description(data["descriptions"][path]))
@@ -68,24 +68,36 @@ def store_files(
     return list(copies.stored.values()), copies.all_faults
 
 
-def folders_of_world(description: str) -> list[Path]:
-    """Returns the folders whose files belong to a world: those of ROS packages, of its main file and of robots' data.
+def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[Path], bool]:
+    """Returns whether a file belongs to a world whose description may come from anybody.
 
-    The description may come from anybody. A folder that it names counts only if a main file is there.
+    These are the files in ROS packages, in the folder of the main file if one is there, in the data of robots, and in
+    further folders. In the former, names of files and folders that begin with a dot are left out.
+
+    Raises:
+        ConfigError: If it is no description.
     """
-    data = load_foreign_json(description, "rpbi/world_description")
-    main = data.get("file") if isinstance(data, dict) else None
-    return [*_package_folders(), *([Path(main).parent] if isinstance(main, str) and _is_main_file(main) else ())]
+    main = _described(description).get("file")
+    folders = [*_package_folders(), *([Path(main).parent] if isinstance(main, str) and _is_main_file(main) else ())]
+    own, all_of = ([Path(os.path.realpath(each)) for each in group] for group in (folders, further))
+
+    def is_own(path: Path) -> bool:
+        if any(path.is_relative_to(folder) for folder in all_of):
+            return True
+        inner = [path.relative_to(folder).parts for folder in own if path.is_relative_to(folder)]
+        return any(not any(part.startswith(".") for part in parts) for parts in inner)
+
+    return is_own
 
 
 class _Copies:
     """Copies of the files of one world, see `store_files`."""
 
-    def __init__(self, store: Path, folders: Sequence[Path] | None) -> None:
+    def __init__(self, store: Path, is_own: Callable[[Path], bool]) -> None:
         self.stored: dict[str, dict[str, Any]] = {}
         self.faults: list[str] = []
         self._store, self._left = store, MAX_ALL_BYTES
-        self._folders = None if folders is None else [os.path.realpath(each) for each in folders]
+        self._is_own = is_own
         self._foreign: list[str] = []
 
     @property
@@ -101,7 +113,7 @@ class _Copies:
         """Copies a file, and returns its hash; empty if it cannot be read, or is not to be copied."""
         if path in self.stored:
             return str(self.stored[path]["sha256"])
-        if not self._is_own(path):
+        if printable(path, len(path)) != path or not self._is_own(Path(os.path.realpath(path))):
             self._foreign.append(printable(path, 200))
             return ""
         try:
@@ -143,12 +155,6 @@ class _Copies:
             if self.add(path):
                 meshes[name] = path
         self.stored.setdefault(urdf, {"path": urdf, "sha256": ""})["meshes"] = meshes
-
-    def _is_own(self, path: str) -> bool:
-        if printable(path, len(path)) != path:
-            return False
-        real = Path(os.path.realpath(path))
-        return self._folders is None or any(real.is_relative_to(folder) for folder in self._folders)
 
 
 def _described(description: str) -> dict[str, Any]:

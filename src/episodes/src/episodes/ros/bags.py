@@ -120,7 +120,7 @@ def episodes_to_dataframes(
         for topic, table in found.items():
             tables.setdefault(topic, {})[episode.number] = table
     for fault in faults:
-        _log.warning("left out: %s", fault)
+        _log.warning("left out: %s", printable(fault))
     if faults and not tables:
         raise EpisodeError(folder.path, f"no episode can be read: {'; '.join(faults)}")
     for topic in sorted((wanted or set()) - known):

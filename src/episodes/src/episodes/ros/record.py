@@ -32,7 +32,7 @@ from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from episodes.config import RecordParameters
 from episodes.errors import EpisodeError
 from episodes.facts import checked_label
-from episodes.files import folders_of_world, store_files
+from episodes.files import files_of_world, store_files
 from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, hold, versions, write_facts
 from episodes.listing import clock_note
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
@@ -218,8 +218,8 @@ class RecordNode:
     def _begin(self, topics: list[str]) -> None:
         parameters = self._parameters
         description = self._simulator.description
-        folders = [*folders_of_world(description), *(Path(each).expanduser() for each in parameters.copy_from)]
-        files, faults = store_files(description, self._folder.files, folders)
+        is_own = files_of_world(description, (Path(each).expanduser() for each in parameters.copy_from))
+        files, faults = store_files(description, self._folder.files, is_own)
         self._episode, self._part = self._folder.begin(
             started=datetime.now().astimezone().isoformat(timespec="seconds"),
             namespace=parameters.namespace,
