@@ -43,7 +43,7 @@ def spoil(data: Any, chance: random.Random) -> Any:
         if way < 0.1:
             del data[key]
         elif way < 0.2:
-            data[str(odd_value(chance))[:1000]] = data[key]
+            data[chance.choice(("", "x" * LONG, "\x1b[2J", "../../canary", "0"))] = data[key]
         else:
             data[key] = spoil(data[key], chance)
         return data
