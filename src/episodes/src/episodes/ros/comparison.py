@@ -149,12 +149,13 @@ class Comparison:
 
     def _read_until(self, time_ns: int) -> None:
         """Reads the messages that were recorded until a time, and drops those that waited too long."""
+        oldest = time_ns - 5 * WINDOW_NS
         while self._coming is not None and self._coming.record_time_ns <= time_ns:
-            self._keep(self._coming)
+            if self._coming.record_time_ns > oldest:  # a replay may begin at a keyframe, hours after the first message
+                self._keep(self._coming)
             self._coming = next(self._messages, None)
-        if time_ns - self._swept_ns > 5 * WINDOW_NS:
+        if oldest > self._swept_ns:
             self._swept_ns = time_ns
-            oldest = time_ns - 5 * WINDOW_NS
             self._waiting = {key: each for key, each in self._waiting.items() if key[2] > oldest}
 
     def _keep(self, message: BagMessage) -> None:
