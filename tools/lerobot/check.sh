@@ -19,7 +19,8 @@ if [[ ! -e $environment/ready ]]; then
   # LeRobot 0.4.4 by itself, since it asks for a torch for graphics cards and for packages of robots; this torchvision is
   # the last one with a reader of videos, which needs none of its compiled parts
   "$environment/bin/pip" install --quiet torch==2.13.0 "numpy<2.3" av==15.1.0 "pyarrow<26" "datasets>=4,<5" \
-    "huggingface_hub<1" accelerate jsonlines einops draccus==0.10.0 deepdiff pandas pillow rich lerobot-doctor==0.2.0
+    "huggingface_hub<1" accelerate jsonlines einops draccus==0.10.0 deepdiff pandas pillow rich pyyaml \
+    rospkg lerobot-doctor==0.2.0
   "$environment/bin/pip" install --quiet --no-deps lerobot==0.4.4 torchvision==0.24.1
   touch "$environment/ready"
 fi

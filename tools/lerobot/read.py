@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/episodes/src"))
-from episodes.datasets.provenance import changes, coarse, image_faults, read_episode, read_export, read_images
+from episodes.datasets.coarse_images import coarse, image_faults
+from episodes.datasets.provenance import changes, read_episode, read_export, read_images
 
 try:
     import torchvision

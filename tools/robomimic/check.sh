@@ -13,7 +13,7 @@ here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 environment=$(mktemp -d)
 trap 'rm -rf "$environment"' EXIT
 /usr/bin/python3 -m venv "$environment"
-"$environment/bin/pip" install --quiet wheel numpy h5py
+"$environment/bin/pip" install --quiet wheel numpy h5py pyyaml rospkg
 "$environment/bin/pip" install --quiet --no-deps robomimic==0.3.0
 "$environment/bin/python" -m robomimic.scripts.get_dataset_info --dataset "$dataset/dataset.hdf5"
 "$environment/bin/python" "$here/read.py" "$dataset"
