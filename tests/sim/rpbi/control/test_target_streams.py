@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from worlds import iiwa, write_world
 from rpbi.control.joint_command import JointCommand
 from rpbi.world import World
 
-FIRST = "lbr_iiwa_joint_1"
+FIRST, SECOND = "lbr_iiwa_joint_1", "lbr_iiwa_joint_2"
 DT_S = 0.002
 EVERY = 10
 """Ticks between two targets of a stream at 50 Hz."""
@@ -132,6 +133,44 @@ def test_a_stall_costs_little_effort(build, velocities):
     ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
     effort, _ = follow_jittery(build(), jittery(random.Random(0), "sending", 0.0, 0.03), velocities)
     assert effort < 1.5 * ideal
+
+
+def lift(time_s: float) -> float:
+    """Returns the position of the second joint, which carries the arm, in a swing that grows for a second."""
+    share = min(time_s, 1.0)
+    return 0.49 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2) * math.sin(math.pi * time_s)
+
+
+def lift_effort(world: World, targets: list[tuple[int, float, int]]) -> float:
+    """Returns the largest effort [N m] of the second joint by targets: tick, position [rad], stamp [ns]."""
+    arm = world.bodies["iiwa"]
+    index, waiting, efforts = arm.model[SECOND].index, deque(targets), []
+    for tick in range(targets[-1][0]):
+        while waiting[0][0] <= tick:
+            _, position, stamp_ns = waiting.popleft()
+            world.put("iiwa/target", JointCommand([SECOND], [position], stamp_ns=stamp_ns))
+        world.step()
+        efforts.append(abs(arm.pb.getJointState(arm.body_id, index)[3]))
+    return max(efforts[500:])
+
+
+@pytest.mark.parametrize("stamps", ["sending", "sample"])
+def test_arrivals_on_a_busy_machine_cost_little_effort(build, stamps):
+    """The arrivals were recorded: 50 targets a second, up to 80 ms late, sent by a process with little priority."""
+    arrivals = np.loadtxt(Path(__file__).with_name("busy_machine.csv"), int, delimiter=",", skiprows=1).tolist()
+    sent_us = [stamp_us if stamps == "sending" else 20_000 * n for n, (_, stamp_us) in enumerate(arrivals)]
+    late = [(tick, lift(0.02 * n), 1000 * (us + 10**6)) for n, ((tick, _), us) in enumerate(zip(arrivals, sent_us))]
+    every = [(tick, lift(DT_S * tick), round(1e9 * (1.0 + DT_S * tick))) for tick in range(TICKS)]
+    assert lift_effort(build(), late) < 1.5 * lift_effort(build(), every)
+
+
+def test_a_stream_that_stops_for_late_targets_says_so_once(build, caplog):
+    late = [20, 15, 25]
+    targets = [(10 * n + (late[n // 100] if n in (100, 200, 299) else 0), 0.003 * n, 0) for n in range(300)]
+    lift_effort(build(), [*targets, (3100, 0.9, 0)])
+    warnings = [record.getMessage() for record in caplog.records if "late" in record.getMessage()]
+    assert len(warnings) == 1 and "iiwa: targets come too late: the motion had stopped for " in warnings[0]
+    assert "target_buffer_s is 20 ms" in warnings[0]
 
 
 def test_a_single_target_acts_at_the_next_tick(build):

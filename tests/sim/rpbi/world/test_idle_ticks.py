@@ -31,14 +31,14 @@ def build(tmp_path):
 
 def _by_steps(world, is_idle_skipped):
     """Returns the samples of a run with a target that another thread puts, with their ticks."""
-    step, samples = world.pb.stepSimulation, []
+    step, samples = world.pb.advance, []
 
     def physics():
         step()
         if world.clock.tick == PUSH_TICK - 1:
             world.put("iiwa/target", PUSH)
 
-    world.pb.stepSimulation = physics
+    world.pb.advance = physics
     while world.clock.tick < TICKS:
         due = world.step()
         samples += [(world.clock.tick, world.clock.stamp_ns, repr(sample)) for sample in due]
@@ -51,6 +51,7 @@ def test_idle_ticks_leave_the_world_as_steps_do(build):
     stepped, skipped = build(), build()
     assert _by_steps(skipped, True) == _by_steps(stepped, False)
     assert skipped.state_hash() == stepped.state_hash() and skipped.clock.tick == TICKS
+    assert not skipped.pb.changes.unrecorded
 
 
 def test_an_idle_tick_calls_nothing_but_physics_and_clocks(build):

@@ -44,7 +44,7 @@ class JointDrive:
         self.controlled: Callable[[], frozenset[int]] = frozenset
         """Returns the joints that a controller drives."""
         self._interpolates = interpolation != "hold"
-        self._streams = TargetStreams(motors, self.dt_s, interpolation == "smooth", buffer_s)
+        self._streams = TargetStreams(motors, name, self.dt_s, interpolation == "smooth", buffer_s)
 
     def follow(self, commands: Iterable[ResolvedCommand]) -> None:
         """Follows targets from now on, unless the control mode has changed since they were checked."""

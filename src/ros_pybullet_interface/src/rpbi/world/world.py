@@ -467,7 +467,7 @@ class World:
         """
         if self._pushed or self.attachments.limited or not all(each.is_idle for each in self._stepping):
             return 0
-        clock, mailbox, step, now = self.clock, self.mailbox, self.pb.stepSimulation, time.monotonic
+        clock, mailbox, step, now = self.clock, self.mailbox, self.pb.advance, time.monotonic
         first, last = clock.tick, clock.tick + min(ticks, self._sensors.idle_ticks)
         begin_s = now_s = now()
         while clock.tick < last and now_s < end_s and mailbox.is_empty:

@@ -12,6 +12,7 @@ velocity for a while, then slow down and come back to the last target.
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 
@@ -20,12 +21,16 @@ from rpbi.control.motors import POSITION_MODES, Motors, ResolvedCommand, coalesc
 from .jitter_buffer import EVERY_TICK, JitterBuffer
 from .segment import StreamSegment, agree
 
+log = logging.getLogger(__name__)
+
 ADAPTATION_PERIODS = 4.0
 """Time constant with which the window of the moving average follows the period [periods]."""
 HURRIED = 0.5
 """Share of the time between targets below which the time for a way says nothing of the velocity to come."""
 SAME_TIME = 1e-9
 """Difference of times that is an error of rounding [ticks]."""
+QUIET_S = 60.0
+"""Time after a warning of late targets without another [s] of the world's time."""
 RETURN_PERIODS = 5.0
 """Time in which a stream that went on beyond its last target comes back to it [periods]."""
 
@@ -47,7 +52,7 @@ class TargetStream:
         limited: Callable[[int, float], float] | None = None,
     ) -> None:
         self.joints = frozenset(held)
-        self._buffer, self._smooth, self._limits = buffer, smooth, limited
+        self.buffer, self._smooth, self._limits = buffer, smooth, limited
         self._segments: deque[StreamSegment] = deque()
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
@@ -57,6 +62,8 @@ class TargetStream:
         self._window = self._lagging_window = self._wanted_window = 0.0
         self.set_points = held
         """Where the joints are to be now."""
+        self.gap = 0.0
+        """Time for which it had stopped when the newest target came, since that came too late [ticks]."""
         self.rests = True
         """Whether there is nothing to do until the next target."""
 
@@ -68,7 +75,8 @@ class TargetStream:
             slopes: Velocities by joint index [rad or m per tick]; may be empty.
             stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
         """
-        playout = self._buffer.add(tick, stamp_ns, goal)
+        playout = self.buffer.add(tick, stamp_ns, goal)
+        self.gap = playout.gap
         if playout.is_immediate:
             self._segments.clear()
             self._velocities.clear()
@@ -141,7 +149,7 @@ class TargetStream:
 
     def _go_beyond(self) -> None:
         """Extrapolates from the last target at its velocity, slows down and returns to it."""
-        last, length = self._segments[-1], self._buffer.extrapolation
+        last, length = self._segments[-1], self.buffer.extrapolation
         if last.slopes is None:
             first = then = {index: self._next_velocity(index) for index in last.way}
         else:
@@ -189,15 +197,35 @@ class TargetStreams:
     """Follows the position targets of one robot; joints whose targets come together are a stream.
 
     Args:
+        name: The robot, for messages.
         dt_s: Length of a tick [s].
         smooth: Whether corners are rounded.
         buffer_s: Delay in which late targets are still in time [s].
     """
 
-    def __init__(self, motors: Motors, dt_s: float, smooth: bool, buffer_s: float) -> None:
-        self._motors, self._dt_s, self._smooth, self._buffer_s = motors, dt_s, smooth, buffer_s
+    def __init__(self, motors: Motors, name: str, dt_s: float, smooth: bool, buffer_s: float) -> None:
+        self._motors, self._name, self._dt_s = motors, name, dt_s
+        self._smooth, self._buffer_s = smooth, buffer_s
+        self._quiet_until = 0
+        """Tick from which late targets are reported again."""
         self._waiting: tuple[ResolvedCommand, ...] = ()
         self._streams: dict[frozenset[int], TargetStream] = {}
+
+    def _report_gap(self, tick: int, stream: TargetStream) -> None:
+        if tick < self._quiet_until:
+            return
+        self._quiet_until = tick + round(QUIET_S / self._dt_s)
+        stopped_ms, delay_ms, buffer_ms = (
+            1e3 * each for each in (stream.gap * self._dt_s, stream.buffer.delay * self._dt_s, self._buffer_s)
+        )
+        log.warning(
+            "%s: targets come too late: the motion had stopped for %.0f ms; they are delayed by %.0f ms now,"
+            " target_buffer_s is %.0f ms; end other programs, or raise it",
+            self._name,
+            stopped_ms,
+            delay_ms,
+            buffer_ms,
+        )
 
     @property
     def rest(self) -> bool:
@@ -250,7 +278,10 @@ class TargetStreams:
                 JitterBuffer(self._dt_s, self._buffer_s), held, self._smooth, self._motors.nearest_allowed
             )
         slopes = {index: command.velocities[index] * self._dt_s for index in joints} if command.velocities else {}
-        self._streams[joints].push(tick, goal, slopes, command.stamp_ns)
+        stream = self._streams[joints]
+        stream.push(tick, goal, slopes, command.stamp_ns)
+        if stream.gap:
+            self._report_gap(tick, stream)
 
     def _drive(self, tick: int, stream: TargetStream) -> None:
         before = stream.set_points
