@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rpbi_examples.scenes.parts.lanes import Stamp, lanes, middles, ways_along
+from rpbi_examples.scenes.parts.lanes import lanes, middles, ways_along
 
 
 def test_lanes_are_parallel_and_joined_by_half_circles():
@@ -29,10 +29,3 @@ def test_cells_divide_a_rectangle():
     cells = middles((0.4, 0.2), (4, 2))
     assert cells.shape == (4, 2, 2)
     assert cells[0, 0] == pytest.approx((-0.15, -0.05)) and cells[3, 1] == pytest.approx((0.15, 0.05))
-
-
-def test_a_turned_tool_covers_what_is_under_it():
-    stamp = Stamp(1.0, 2.0, np.pi / 6)
-    along, across = np.array((np.cos(np.pi / 6), 0.5)), np.array((-0.5, np.cos(np.pi / 6)))
-    offsets = np.array([0.29 * along, 0.31 * along, 0.09 * across, 0.11 * across, 0.29 * along + 0.09 * across])
-    assert stamp.covers((1.0, 2.0) + offsets, (0.3, 0.1)).tolist() == [True, False, True, False, True]

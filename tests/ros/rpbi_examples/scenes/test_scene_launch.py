@@ -36,12 +36,12 @@ def _ends(ros, *arguments):
 
 
 def test_an_episode_ends_as_in_the_score_and_an_interrupt_ends_all(ros):
-    process = ros.start(["roslaunch", "rpbi_examples", "dual_arm.launch", "seed:=4", *OPTIONS])
+    process = ros.start(["roslaunch", "rpbi_examples", "dual_arm.launch", "seed:=4", "noise:=true", *OPTIONS])
     wait_until(lambda: process.poll() is not None or "seed 5" in ros.output(process), "an episode has ended", 240.0)
     stop_group(process)
     output = ros.output(process)
     assert not re.search("FATAL|ERROR|Traceback|has died", output), output
-    env = make_env("dual_arm")
+    env = make_env("dual_arm", noise=True)
     result = run_episode(env, 4)
     assert result.success, result
     figures = result.figures

@@ -47,6 +47,29 @@ def test_a_target_out_of_reach_is_told_of(env):
     assert len(efforts) == 32 and max(map(abs, efforts.values())) > 20.0  # torques hold it, not motors
 
 
+@pytest.mark.parametrize("noise", [False, True])
+def test_success_is_judged_over_the_whole_episode(noise, monkeypatch):
+    """A hand on the floor, or a lean, for one cycle in the middle is a failure at the end."""
+    env = make_env("talos", noise=noise)
+    scene, stage = begin(env, 3), EnvStage(env)
+    stage.cycle()
+    act = scene.act()
+    for _ in range(60):
+        next(act)
+        for deed in scene.take_deeds():
+            stage.do(deed)
+        stage.cycle()
+    monkeypatch.setattr(scene, "_has_stayed", True)
+    assert scene.has_succeeded(), "it stands"
+    assert (scene.sensed.poses["ball"] != scene.target) == noise
+    upright, on_feet = scene.seen, scene.seen.contacts["floor"]
+    on_hand = on_feet[0]._replace(other_link="arm_left_7_link")
+    scene.look(upright._replace(contacts={"floor": (*on_feet, on_hand)}))
+    scene.look(upright)
+    assert not scene.has_succeeded()
+    env.close()
+
+
 def test_a_policy_moves_the_hand_while_the_controller_balances(env):
     observation, *_ = act_at_random(env, 25)
     scene = env.task.scene

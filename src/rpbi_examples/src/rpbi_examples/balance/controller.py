@@ -8,12 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.schema import ListOf, NonNegative, Text, Unit
+from custom_ros_tools.schema import ListOf, NonNegative, Text, Unit, optional
 from robot_model.asset_files import ExistingFile
 from robot_model.geometry import Pose
 from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.controllers.controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
 from rpbi.engine.inputs import check_pose
+from rpbi_examples.scenes.sensing import BaseEstimate
 
 from .dynamics import FREE, FloatingRobot, turn_between
 from .program import WholeBodyProgram, wrench_cone
@@ -50,6 +51,9 @@ class BalanceConfig(ControllerConfig):
     period_ticks: int = Field(2, ge=1, description="Ticks from one solution to the next; efforts stay in between.")
     capture_gain: NonNegative = Field(3.0, description="How far the centre of pressure goes beyond the capture point.")
     hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Stiffness of the hand, by mass.")
+    noise_seed: Annotated[int, Field(ge=0)] | None = optional(
+        "Seed of noise and delay with which the pose of the base is measured; without it, the true one is used."
+    )
     hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's way.")
 
 
@@ -78,6 +82,8 @@ class Balance(Controller):
 
     def start(self, state: RobotState, tick: int) -> None:
         """Stands as it is measured."""
+        seed, period_s = self.config.noise_seed, self.config.period_ticks * self.arm.dt_s
+        self._estimate = None if seed is None else BaseEstimate(state.base, period_s, seed)
         self._robot.update(state)
         self._posture = self._robot.positions.copy()
         self._height = self._robot.centre[2]
@@ -91,6 +97,9 @@ class Balance(Controller):
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
         """Returns the efforts of all joints."""
         if self._ticks % self.config.period_ticks == 0:
+            if self._estimate is not None:
+                position, quat_xyzw = self._estimate.update(state.base, *state.base_twist)
+                state = state._replace(base=state.base._replace(position=position, quat_xyzw=quat_xyzw))
             self._robot.update(state)
             self._solve(targets.get("target"))
         self._ticks += 1

@@ -62,7 +62,7 @@ class Cup(Scene):
         """Comes, grasps, lifts, swings to the shelf, puts the cup down and leaves."""
         urdf = "{rpbi_examples}/robots/kinova_hand.urdf"
         arm = PolarArm(self, "kinova", urdf, "base", "j2s6s200_end_effector", Pose((0.0, 0.0, TABLE_M)))
-        start = Spot.of(self.seen.poses["cup"].position)
+        start = Spot.of(self.sensed.poses["cup"].position)
         yield from self._move_fingers(OPEN, OPEN, 0.02)
         for out in (-BACK_M, -NEAR_M):
             yield from arm.swing(start.moved(out, GRASP_M), SPEED, TURN_SPEED)
@@ -71,11 +71,12 @@ class Cup(Scene):
         if not {f"j2s6s200_link_finger_tip_{n}" for n in FINGERS} <= self._touching():
             raise SceneFailedError("kinova: expected both fingertips at the cup, got a hand that closed beside it")
         yield from arm.swing(arm.spot.moved(up=ABOVE_M), SPEED, TURN_SPEED)
-        cup = Spot.of(self.seen.poses["cup"].position)
+        yield from self.measure()
+        cup = Spot.of(self.sensed.poses["cup"].position)
         risen_mm, expected_mm = 1e3 * (cup.height - start.height), 1e3 * ABOVE_M
         if risen_mm < 0.9 * expected_mm:
             raise SceneFailedError(f"kinova: expected the cup to rise by {expected_mm:.0f} mm, got {risen_mm:.0f} mm")
-        goal = Spot.of(self._goal_in_world())
+        goal = Spot.of((self.sensed.poses["shelf"] @ self._goal).position)
         above = Spot(*(end + hand - held for end, hand, held in zip(goal, arm.spot, cup))).moved(up=ABOVE_M)
         for out in (-FRONT_M, 0.0):
             yield from arm.swing(above.moved(out), SPEED, TURN_SPEED)

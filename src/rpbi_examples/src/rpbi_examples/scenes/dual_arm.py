@@ -57,7 +57,7 @@ class DualArm(Scene):
 
     def act(self) -> Iterator[None]:
         """Approaches, presses, lifts, carries, lowers and lets go."""
-        start = self.seen.poses["box"]
+        start = self.sensed.poses["box"]
         for share in np.linspace(0.0, 1.0, 75):
             self._hold(start, 0.12 - 0.10 * smooth(share))
             yield

@@ -96,13 +96,13 @@ class Factory(Scene):
 
     def _reachable(self, side: str) -> list[str]:
         """Returns the parts that an arm may take, the outermost first."""
-        out_m = {part: SIDES[side] * tag.position[1] for part, tag in on_belt(self.seen.tags).items()}
+        out_m = {part: SIDES[side] * tag.position[1] for part, tag in on_belt(self.sensed.tags).items()}
         mine = [part for part in out_m if 0.0 <= out_m[part] < REACH_M and self._tries[part] < TRIES]
         return sorted((part for part in mine if part not in self._busy.values()), key=lambda part: -out_m[part])
 
     def _has_brought(self) -> bool:
         """Returns whether the belt has brought the next parts, or all that are left."""
-        places = [tag.position[1] for tag in on_belt(self.seen.tags).values()]
+        places = [tag.position[1] for tag in on_belt(self.sensed.tags).values()]
         are_last = len(places) + len(self._placed) >= self.of
         return min(places, default=1.0) < -STATION_M or (are_last and sum(places) <= 0.0)
 
@@ -122,13 +122,13 @@ class Factory(Scene):
 
     def _take(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
         """Goes over a part, looks again, grasps it and lifts it."""
-        kind, tag = PARTS[part], on_belt(self.seen.tags)[part]
+        kind, tag = PARTS[part], on_belt(self.sensed.tags)[part]
         yield from hand.open(kind.half_m + SPARE_M, 0.02)
         is_in_middle = abs(tag.position[1]) < MIDDLE_M
         while is_in_middle and not self._middle.take(side):
             yield hand.target
         for height in (HOVER_M, 0.0):
-            tag = on_belt(self.seen.tags).get(part, tag)
+            tag = on_belt(self.sensed.tags).get(part, tag)
             x, y, _ = tag.position
             yaw = grasp_yaw(kind, yaw_of(tag.quat_xyzw), SIDES[side] * GRASP_RAD)
             yield from hand.go((x, y, BELT_Z_M + kind.height_m / 2.0 + height), yaw)

@@ -95,7 +95,8 @@ class Handover(Scene):
         yield from arm.follow(self._grasp, 1.5)
         yield from arm.close_on(holders)
         yield from arm.go(Pose(above(arm.target.position, LIFT_M), arm.target.quat_xyzw), 1.2)
-        thing = self._where()
+        yield from self.measure()
+        thing = self.sensed.poses[self.thing]
         in_gripper, yaw = arm.pose().inverse() @ thing, yaw_of(thing.quat_xyzw) - yaw_to(thing.position, BASE)
 
         def standing(place: Vector) -> Pose:
@@ -105,8 +106,8 @@ class Handover(Scene):
         yield from arm.go(standing(SHOWN_M), 1.8)
         yield from self.wait(ALONE_S)
         yield from until(self.person.holds_out)
-        yield from arm.follow(lambda: standing(above(self.person.palm().position, LIFT_M)), 2.0)
-        for _ in arm.go(standing(above(self.person.palm().position, LOWEST_M)), 4.5):
+        yield from arm.follow(lambda: standing(above(self.sensed.poses["palm"].position, LIFT_M)), 2.0)
+        for _ in arm.go(standing(above(self.sensed.poses["palm"].position, LOWEST_M)), 4.5):
             if holders.force("human") > CARRIED_N:
                 break
             yield
@@ -118,11 +119,12 @@ class Handover(Scene):
 
     def _grasp(self) -> Pose:
         """Returns the gripper at the thing, where that is now."""
-        return upright_grasp(self._where(), GRASP_M - self._half_m)
+        return upright_grasp(self.sensed.poses[self.thing], GRASP_M - self._half_m)
 
     def note(self) -> None:
         """Notes waves, who holds the thing, how it and the palm move, and forces on the person."""
         self.person.note()
+        self.landmarks = {"palm": self.person.palm()}
         self._holders.note()
         self._on_palm.note((self.person.palm().inverse() @ self._where()).position)
         self._largest_tilt_deg = max(self._largest_tilt_deg, tilt_deg(self._where()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -11,6 +12,10 @@ import numpy as np
 from custom_ros_tools.errors import InterfaceError
 from robot_model.geometry import ZERO, Pose, Vector, normalized
 
+from .sensing import SensedPoses
+
+MEASURE_S = 0.5
+"""Time in which things at rest are measured with noise [s]."""
 TAG_DIGITS = 6
 """Digits of poses of tags after the point [m]; detectors have noise of far more."""
 
@@ -155,7 +160,10 @@ class Scene(ABC):
         of: Number of parts of the task.
         cycle_ticks: Ticks of a cycle.
         longest_s: Time after which an episode ends [s].
-        seen: The newest view of the world, before the first cycle an empty one.
+        seen: The newest view of the world, before the first cycle an empty one. It is true, for judgement.
+        sensed: The view that policies act by: `seen`, and with noise the poses and tags that sensors report.
+        landmarks: Further poses that a policy senses, in the world, such as that of a palm; `sensed.poses` has them.
+        is_noisy: Whether sensors have noise and delay, see `sensing`; set before `prepare`.
         goal_numbers: Numbers of the episode that a policy has to know beside what is seen, such as a place [m].
     """
 
@@ -169,7 +177,11 @@ class Scene(ABC):
 
     def __init__(self, random: np.random.Generator) -> None:
         self.random = random
-        self.seen = Seen()
+        self.seen = self.sensed = Seen()
+        self.landmarks: dict[str, Pose] = {}
+        self.is_noisy = False
+        self._noise = random.spawn(3)  # of bodies, of tags, of robots; spawning changes no other random numbers
+        self._bodies, self._tags = SensedPoses[str](self._noise[0]), SensedPoses[int](self._noise[1])
         self.goal_numbers: tuple[float, ...] = ()
         self._deeds: list[Deed] = []
 
@@ -247,11 +259,23 @@ class Scene(ABC):
         """Sees the world at the end of a cycle."""
         self.seen = seen
         self.note()
+        poses, tags = {**seen.poses, **self.landmarks}, seen.tags
+        if self.is_noisy:
+            poses, tags = self._bodies.track(seen.time_s, poses), self._tags.track(seen.time_s, tags)
+        self.sensed = seen._replace(poses=poses, tags=tags)
 
     def take_deeds(self) -> list[Deed]:
         """Returns what it did since the last call, in this order."""
         deeds, self._deeds = self._deeds, []
         return deeds
+
+    def measure(self) -> Iterator[None]:
+        """Waits until things at rest are measured well, if sensors have noise; used as `yield from self.measure()`.
+
+        Every episode begins with it.
+        """
+        if self.is_noisy:
+            yield from self.wait(MEASURE_S)
 
     def wait(self, duration_s: float) -> Iterator[None]:
         """Waits; used as `yield from self.wait(0.5)`."""
@@ -323,7 +347,7 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
 
     cycle()
     try:
-        for _ in scene.act():
+        for _ in chain(scene.measure(), scene.act()):
             cycle()
             if scene.seen.time_s >= scene.longest_s:
                 reason = f"not done after {scene.longest_s:g} s"

@@ -59,7 +59,7 @@ class SeedResult(NamedTuple):
         }
 
 
-def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Generator[SeedResult, None, None]:
+def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) -> Generator[SeedResult, None, None]:
     """Runs a scene with some seeds, and yields the results as they come; its processes end when it is closed.
 
     An error of the world ends the episode alone, as failed; the next one has a new world.
@@ -68,6 +68,7 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Generator[SeedResu
         scene: A name of `SCENES`, or `module:Class`.
         seeds: The seeds.
         jobs: Number of processes.
+        noise: Whether poses are sensed with noise and delay.
 
     Raises:
         InterfaceError: If the world cannot be made, or a process has ended.
@@ -75,7 +76,7 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Generator[SeedResu
     if jobs == 1:
         try:
             for seed in seeds:
-                yield _run(scene, seed)
+                yield _run(scene, seed, noise)
         finally:
             _close()
         return
@@ -85,7 +86,7 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int) -> Generator[SeedResu
     pool = ProcessPoolExecutor(jobs, context, initializer=_end_with_parent)
     try:
         with _interrupts_blocked():
-            running = [pool.submit(_run, scene, seed) for seed in seeds]
+            running = [pool.submit(_run, scene, seed, noise) for seed in seeds]
         for done in as_completed(running):
             yield done.result()
     except BrokenProcessPool:
@@ -129,10 +130,10 @@ def _close() -> None:
     _env = None
 
 
-def _run(scene: str, seed: int) -> SeedResult:
+def _run(scene: str, seed: int, noise: bool) -> SeedResult:
     """Runs an episode in the environment of this process, which is made for the first one and after an error."""
     global _env
-    _env = _env or make_env(scene, "rgb_array")
+    _env = _env or make_env(scene, "rgb_array", noise)
     try:
         result = run_episode(_env, seed)
         return SeedResult(seed, result, _env.world.state_hash(), None if result.success else _env.render())
@@ -143,11 +144,12 @@ def _run(scene: str, seed: int) -> SeedResult:
         return SeedResult(seed, result, "", None)
 
 
-def summary(scene: str, results: Sequence[SeedResult]) -> dict[str, Any]:
+def summary(scene: str, results: Sequence[SeedResult], noise: bool = False) -> dict[str, Any]:
     """Returns the score of a scene as plain data: what is done, of how much, and a row for each seed."""
     rows = [each.row() for each in sorted(results, key=lambda each: each.seed)]
     return {
         "scene": scene,
+        "noise": noise,
         "success": sum(row["done"] for row in rows),
         "of": sum(row["of"] for row in rows),
         "seeds": len(rows),

@@ -18,8 +18,7 @@ from .scene import Scene, SceneFailedError, Watched
 URDF = "{example-robot-data}/robots/talos_data/robots/talos_reduced_box.urdf"
 HAND, POINT = "gripper_left_base_link", Pose((0.0, 0.0, -0.13))
 """The hand, and the point between its fingers, as in configs/talos/talos.yaml [m]."""
-TORSO, SOLES = "torso_2_link", ("left_sole_link", "right_sole_link")
-FEET = {"leg_left_6_link", "leg_right_6_link"}
+TORSO, SOLES, FEET = "torso_2_link", ("left_sole_link", "right_sole_link"), {"leg_left_6_link", "leg_right_6_link"}
 HEIGHT_M, LOWEST_M = 1.0223, 0.8
 """Height of the pelvis at the start, and the least while the robot stands."""
 MOST_SHIFT, MOST_RISE_M, MOST_TURN = 0.05, 2e-3, (0.01, 0.01, 0.2)
@@ -32,9 +31,8 @@ IMPULSE, PUSH_S = 10.0, 0.1
 """Of a push [N s], and how long it takes [s]."""
 REACHED_S, BACK_S, STAYS_S = 3.0, 4.0, 2.0
 """By when the hand is at its target, by when it is back after a push, and how long it stays there then."""
-NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG = 0.02, 0.01, 5.0
-"""Largest error of the hand, way of the feet, and lean of the torso at the end."""
-HIDDEN = Pose((0.0, 0.0, -1.0))
+NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG, MOST_LEAN_DEG = 0.02, 0.01, 5.0, 15.0
+"""Largest error of the hand, way of the feet, lean of the torso at the end, and at any time of the episode."""
 
 
 class Talos(Scene):
@@ -54,27 +52,28 @@ class Talos(Scene):
         super().__init__(random)
         self._robot = _robot()
         x, y, above, *turn = random.uniform(-1.0, 1.0, 6) * (MOST_SHIFT, MOST_SHIFT, MOST_RISE_M, *MOST_TURN)
-        yaw = quaternion_of((0.0, 0.0, turn[2]))
-        tilt = quaternion_of((turn[0], turn[1], 0.0))
+        yaw, tilt = quaternion_of((0.0, 0.0, turn[2])), quaternion_of((turn[0], turn[1], 0.0))
         self._start = Pose((x, y, HEIGHT_M + abs(above)), quaternion_product(yaw, tilt))
         in_front: Vector = tuple(random.uniform(NEAREST, FARTHEST).tolist())
         self.target = Pose((x, y, 0.0), yaw) @ Pose(in_front, FORWARD)
         self.goal_numbers = self.target.position
         self._yaw, self.push_angle = turn[2], float(random.uniform(-math.pi, math.pi))
-        self.impulse = IMPULSE
-        self._until_push_s = float(random.uniform(0.0, 1.0))
+        self.impulse, self._until_push_s = IMPULSE, float(random.uniform(0.0, 1.0))
         self._feet: list[Vector] = []
-        self._lean_deg = self._most_lean_deg = self._slip_m = self._late_error_m = 0.0
-        self._is_late = self._has_stayed = False
+        self._most_lean_deg = self._slip_m = self._late_error_m = 0.0
+        self._is_late = self._has_stayed = self._has_touched = False
 
     def prepare(self) -> None:
         """Puts the robot onto the floor, not quite upright."""
         self.place("talos", self._start)
+        if self.is_noisy:
+            self.tune("talos/balance", noise_seed=int(self._noise[2].integers(2**31)))
 
     def act(self) -> Iterator[None]:
         """Stands, reaches, is pushed and brings its hand back."""
+        self.landmarks = {"ball": self.target}
         yield from self._stand(0.5)
-        self.put("talos/balance/target", self.target)
+        self.put("talos/balance/target", self.sensed.poses["ball"])
         yield from self.beside()
 
     def beside(self) -> Iterator[None]:
@@ -92,20 +91,21 @@ class Talos(Scene):
         self._has_stayed = True
 
     def note(self) -> None:
-        """Notes lean, way of the feet and error of the hand."""
-        self._lean_deg = tilt_deg(self.pose(TORSO))
+        """Notes lean, contacts, way of the feet and error of the hand."""
         if self._feet:
-            self._most_lean_deg = max(self._most_lean_deg, self._lean_deg)
+            self._has_touched |= any(touch.other_link not in FEET for touch in self.seen.contacts["floor"])
+            self._most_lean_deg = max(self._most_lean_deg, tilt_deg(self.pose(TORSO)))
             ways = [norm(minus(self.pose(sole).position, start)) for sole, start in zip(SOLES, self._feet)]
             self._slip_m = max(self._slip_m, *ways)
         if self._is_late:
             self._late_error_m = max(self._late_error_m, self._error_m())
 
     def has_succeeded(self) -> bool:
-        """Returns whether it stands upright on both feet, where they were, and the hand has come back and stayed."""
+        """Returns whether it always stood on its feet alone and now does upright, and the hand came back and stayed."""
+        stood = not self._has_touched and self._slip_m < MAX_SLIP_M and self._most_lean_deg < MOST_LEAN_DEG
         on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
-        stands = on_floor == FEET and self._slip_m < MAX_SLIP_M and self._lean_deg < MAX_LEAN_DEG
-        return stands and self._has_stayed and self._late_error_m < NEAR_M
+        stands = on_floor == FEET and tilt_deg(self.pose(TORSO)) < MAX_LEAN_DEG
+        return stood and stands and self._has_stayed and self._late_error_m < NEAR_M
 
     def figures(self) -> dict[str, float]:
         """Returns the error of the hand after it is back, the largest lean and the way of the feet."""
@@ -128,7 +128,7 @@ class Talos(Scene):
         self.place("stick", Pose(behind, quaternion_of((-sin * math.pi / 2.0, cos * math.pi / 2.0, 0.0))))
         self.shove(f"talos/{TORSO}", scaled(self.impulse / PUSH_S, (cos, sin, 0.0)), PUSH_S)
         yield from self._stand(PUSH_S)
-        self.place("stick", HIDDEN)
+        self.place("stick", Pose((0.0, 0.0, -1.0)))  # out of sight
 
     def _stand(self, duration_s: float) -> Iterator[None]:
         """Waits.

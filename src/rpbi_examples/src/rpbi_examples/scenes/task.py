@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from pydantic import Field
 
+from custom_ros_tools import schema
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import Fraction, Position, Positive, Text
 from robot_model.geometry import Pose
@@ -45,6 +46,7 @@ class SceneTaskConfig(WorldTaskConfig):
     """Options of the task of a scene."""
 
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
+    noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
     low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the box that bodies are seen in.")
     high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
     speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
@@ -93,6 +95,7 @@ class SceneTask(WorldTask):
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
         self._beside, self._has_failed = None, False
+        self.scene.is_noisy = self.config.noise
         self.scene.prepare()
         self._do_all()
         self.scene.seen = self._see()
@@ -150,15 +153,15 @@ class EnvStage(Stage):
         self._env.step(None)
 
 
-def make_env(scene: str, render_mode: str | None = None) -> WorldEnv:
-    """Makes the environment of a scene: a name of `SCENES`, or `module:Class`.
+def make_env(scene: str, render_mode: str | None = None, noise: bool = False) -> WorldEnv:
+    """Makes the environment of a scene: a name of `SCENES`, or `module:Class`, with noise of the sensed poses or not.
 
     Raises:
         UnknownNameError: If there is no such scene.
         MissingDependency: If it needs an extra.
     """
     kind = SCENES.find(scene)
-    task = {"type": TASK, "scene": scene, "action_ticks": kind.cycle_ticks}
+    task = {"type": TASK, "scene": scene, "action_ticks": kind.cycle_ticks, "noise": noise}
     return WorldEnv(kind.world, task, render_mode=render_mode)
 
 

@@ -9,22 +9,20 @@ import numpy as np
 from robot_model.geometry import Pose, dot, plus, quaternion_of, quaternion_product, rotated
 
 from .parts.arm import LedArm
-from .parts.lanes import Stamp, lanes, middles, share_of_way
+from .parts.lanes import Patch, Stamp, lanes, middles, share_of_way
 from .scene import Scene, SceneFailedError, Watched
 
 URDF, SPONGE = "{rpbi_examples}/robots/kuka_lwr_sponge.urdf", "end_effector_sponge"
 ARM = "kuka_lwr", URDF, "lwr_arm_0_link", SPONGE, Pose((0.5, 0.0, 0.0))
 """The arm, its chain and its base in the world, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
-SPONGE_M, STAIN_M = (0.06, 0.03), 0.009
-"""Half the extents of the sponge, as in the URDF, and radius of a stain, as in configs/wiping/stain.yaml."""
 FACING = (1.0, 0.0, 0.0, 0.0)
 """Orientation of the sponge on the board: its z axis points into the board."""
 PIVOT, FACE_M = (-0.16, 0.0, 0.15), 0.06
 """Ball joint of the board's stand in the world [m], and height of the board's face over it."""
 RANGES = ((-0.02, -0.02, -0.1, 0.3, -0.15, 2000.0, 0.4), (0.02, 0.02, 0.1, 0.5, 0.15, 5000.0, 1.0))
 """Shift of the board along x and y [m], turns about x, y and z [rad], stiffness of the sponge [N/m], friction."""
-SIZE_M, STAINS, CELLS = (0.25, 0.36), (8, 10), (50, 72)
-"""Extents of the dirty part of the board; it is divided into parts with a stain each, and into cells for coverage."""
+SIZE_M, STAINS, CELLS, STAIN_M = (0.25, 0.36), (8, 10), (50, 72), 0.009
+"""Extents of the dirty part of the board; its parts with a stain each, and cells for coverage; radius of a stain."""
 LANES, LENGTH_M, PITCH_M, SPEED = 3, 0.36, 0.084, 0.15
 """The path, and the speed along it [m/s]; in one of the lanes, a stain is wholly under the sponge."""
 OVER_M, PATIENCE_S = 0.05, 4.0
@@ -75,12 +73,13 @@ class Wiping(Scene):
 
     def act(self) -> Iterator[None]:
         """Goes over the board, presses, wipes lane by lane, and goes away."""
-        board, path = self.seen.poses["board"], lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
+        path = lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
         arm = yield from self._press(*path[0])
+        board = self.sensed.poses["board"]
         for x, y in path:
             self.put("kuka_lwr/wipe/target", board @ Pose((x, y, 0.0), FACING))
             yield
-            self._wipe(board.inverse() @ arm.pose())
+            self._wipe(arm.pose())
         self.switch("kuka_lwr", stop=("wipe",))
         yield
         arm = LedArm(self, *ARM)
@@ -91,7 +90,7 @@ class Wiping(Scene):
         arm = yield from self._press(*lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02)[0].tolist())
         while True:
             yield
-            self._wipe(self.seen.poses["board"].inverse() @ arm.pose())
+            self._wipe(arm.pose())
 
     def has_succeeded(self) -> bool:
         """Returns whether the force was held along the way, and the stains are gone."""
@@ -109,7 +108,7 @@ class Wiping(Scene):
 
     def _press(self, x: float, y: float) -> Generator[None, None, LedArm]:
         """Goes over a place of the board [m], and presses there; returns the arm."""
-        board, arm = self.seen.poses["board"], LedArm(self, *ARM)
+        board, arm = self.sensed.poses["board"], LedArm(self, *ARM)
         yield from arm.go(board @ Pose((x, y, OVER_M), FACING), 2.0)
         self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
         self.switch("kuka_lwr", start=("wipe",))
@@ -122,14 +121,15 @@ class Wiping(Scene):
         return arm
 
     def _wipe(self, sponge: Pose) -> None:
-        """Notes where the sponge is on the board and how it presses; what is wholly under it then vanishes."""
-        stamp, force = Stamp.of(sponge), self._normal_force()
-        self.stamps.append(stamp)
+        """Notes where the sponge is and how it presses; what it wholly touches then vanishes from the board."""
+        board, force = self.seen.poses["board"], self._normal_force()
+        self.stamps.append(Stamp.of(board.inverse() @ sponge))
         self.forces.append(force)
         if self._is_held(force):
-            self.covered |= stamp.covers(middles(SIZE_M, CELLS), SPONGE_M)
-            inner = SPONGE_M[0] - STAIN_M, SPONGE_M[1] - STAIN_M
-            for name in [name for name in self.left if stamp.covers(self.stains[name], inner)]:
+            touching = [touch.position for touch in self.seen.contacts["board"] if touch.other == ARM[0]]
+            patch = Patch.of(board, touching)
+            self.covered |= patch.covers(middles(SIZE_M, CELLS))
+            for name in [name for name in self.left if patch.covers(self.stains[name], STAIN_M)]:
                 self.left.remove(name)
                 self.vanish(name)
 

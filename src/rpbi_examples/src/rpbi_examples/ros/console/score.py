@@ -24,6 +24,7 @@ def score(
     seeds: Annotated[str, Argument("A-B")] = "1-100",
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*.json")] = None,
     out: Annotated[Path, Argument("FOLDER", parse=Path, files="*")] = Path("out/score"),
+    noise: Annotated[bool, Argument("")] = False,
     jobs: Annotated[int | None, Argument("N", parse=int)] = None,
 ) -> int:
     """Runs a scene from many random starts, as fast as possible, and reports how often it succeeds.
@@ -35,13 +36,14 @@ def score(
     in FOLDER/SCENE_failures.png. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
 
     Usage:
-        ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--jobs N]
+        ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--noise] [--jobs N]
 
     Args:
         SCENE: cup, wiping, handover, talos, factory or dual_arm; or module:Class of your own
         seeds: the seeds, such as 1-100 or 17; 1-100 without it
         json: file of the results, a row for each seed
         out: folder of the pictures; out/score without it
+        noise: poses are sensed with noise and delay, as in the launch file with noise:=true; a score of its own
         jobs: episodes at once, each in a process of its own; the number of processors without it
     """
     if ":" not in scene and scene not in SCENES:
@@ -57,7 +59,7 @@ def score(
     try:
         with (
             tqdm(total=len(numbers), unit=" episodes", leave=False, mininterval=period_s) as bar,
-            closing(run_seeds(scene, numbers, min(jobs or os.cpu_count() or 1, len(numbers)))) as running,
+            closing(run_seeds(scene, numbers, min(jobs or os.cpu_count() or 1, len(numbers)), noise)) as running,
         ):
             for each in running:
                 results.append(each)
@@ -66,9 +68,12 @@ def score(
         code = INTERRUPTED
     if not results:
         return code
-    found = summary(scene, results)
+    found = summary(scene, results, noise)
     _print(found["rows"])
-    print(f"{scene}: {found['success']} of {found['of']}", *[f"({len(results)} of {len(numbers)} seeds)"] * (code > 0))
+    print(
+        f"{scene}{' with noise' * noise}: {found['success']} of {found['of']}",
+        *[f"({len(results)} of {len(numbers)} seeds)"] * (code > 0),
+    )
     if json:
         write_json(json, found)
     pictures = out / f"{scene.replace(':', '.')}_failures.png"

@@ -11,7 +11,7 @@ from pydantic import Field
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Text
+from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Switch, Text
 from rpbi_examples.scenes import SCENES
 from rpbi_examples.scenes.scene import SceneResult, broken_off, run_scene
 
@@ -26,6 +26,7 @@ class SceneNodeConfig(ConfigModel):
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
     seed: Count = Field(1, description="Seed of the first episode; each has the next one.")
     episodes: Count = Field(0, description="Number of episodes; 0: until it is stopped.")
+    noise: Switch = Field(False, description="Whether poses are sensed with noise and delay.")
     real_time_factor: NonNegative = Field(1.0, description="Simulated seconds a second; 0: as fast as possible.")
 
 
@@ -36,6 +37,7 @@ def _run() -> None:
     succeeded = 0
     for number, seed in enumerate(count(config.seed), 1):
         scene = kind(np.random.default_rng(seed))
+        scene.is_noisy = config.noise
         rospy.loginfo("seed %d", seed)
         stage.begin(scene)
         try:

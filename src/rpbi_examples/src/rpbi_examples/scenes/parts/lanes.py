@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
-from robot_model.geometry import Pose, rotated
+from robot_model.geometry import Pose, Vector, rotated
 
 
 class Stamp(NamedTuple):
@@ -30,19 +31,40 @@ class Stamp(NamedTuple):
         x, y, _ = rotated(tool.quat_xyzw, (1.0, 0.0, 0.0))
         return cls(*tool.position[:2], math.atan2(y, x))
 
-    def covers(self, points: np.ndarray, half: tuple[float, float]) -> np.ndarray:
-        """Returns whether points of the plane are under a tool of half the extents `half` [m].
+
+class Patch(NamedTuple):
+    """The convex area between the points where a tool touches a plane.
+
+    Attributes:
+        edges: Outward normal and offset of each edge, shape (n, 3): inside, their product with (x, y, 1) is at most 0.
+            Without any, nothing is inside.
+    """
+
+    edges: np.ndarray
+
+    @classmethod
+    def of(cls, plane: Pose, points: Iterable[Vector]) -> Patch:
+        """Returns the patch of contact points in the world [m], in the frame of a plane; none if they have no area."""
+        flat = [(plane.inverse() @ Pose(point)).position[:2] for point in points]
+        try:
+            return cls(ConvexHull(np.reshape(flat, (-1, 2))).equations)
+        except (QhullError, ValueError):
+            return cls(np.zeros((0, 3)))
+
+    def covers(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Returns whether points of the plane are inside, as far as a margin from each edge [m].
 
         Args:
             points: Shape (..., 2) [m].
-            half: Along the x and y axis of the tool [m].
+            margin: Least distance from each edge [m].
 
         Returns:
             Booleans, shape (...).
         """
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        inside = np.abs((points - (self.x, self.y)) @ [[cos, -sin], [sin, cos]]) < half
-        return np.asarray(inside.all(axis=-1))
+        if not len(self.edges):
+            return np.zeros(np.shape(points)[:-1], bool)
+        depth = np.asarray(points) @ self.edges[:, :2].T + self.edges[:, 2]
+        return np.asarray((depth <= -margin).all(axis=-1))
 
 
 def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:

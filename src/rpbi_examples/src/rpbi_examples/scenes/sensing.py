@@ -1,0 +1,108 @@
+"""Poses as a tracking system measures them, with noise and late; smoothed, and of a base that knows its velocity."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from robot_model.geometry import (
+    Pose,
+    Vector,
+    minus,
+    norm,
+    plus,
+    quaternion_of,
+    quaternion_product,
+    rotation_between,
+    scaled,
+)
+
+NOISE_M, NOISE_RAD, DELAY_S = 0.002, math.radians(1.0), 0.02
+"""Standard deviations of each axis of a position [m] and of a rotation vector [rad]; age of a measurement [s]."""
+MEAN_OF = 25
+"""Number of measurements that smoothing amounts to; the first ones count alike."""
+JUMP_M, JUMP_RAD = 4.0 * NOISE_M, 4.0 * NOISE_RAD
+"""Distances from the smoothed pose beyond which a measurement counts alone: the body moves."""
+BASE_SMOOTHED_S = 0.2
+"""Time over which a moving base corrects its error by measurements [s]."""
+ROUNDING_S = 1e-9
+
+Key = TypeVar("Key", str, int)
+
+
+def noisy(pose: Pose, random: np.random.Generator) -> Pose:
+    """Returns a measurement of a pose."""
+    shift, turn = NOISE_M * random.standard_normal(3), NOISE_RAD * random.standard_normal(3)
+    return _moved(pose, tuple(shift.tolist()), tuple(turn.tolist()))
+
+
+class SensedPoses(Generic[Key]):
+    """Measures poses with noise and delay, and smooths those of bodies that rest.
+
+    Args:
+        random: Random numbers of the noise.
+    """
+
+    def __init__(self, random: np.random.Generator) -> None:
+        self._random = random
+        self._on_the_way: deque[tuple[float, dict[Key, Pose]]] = deque()
+        self._smoothed: dict[Key, tuple[int, Pose]] = {}
+
+    def track(self, time_s: float, poses: Mapping[Key, Pose]) -> dict[Key, Pose]:
+        """Returns the smoothed poses that are known at a time [s], of those that are measured now and were before."""
+        self._on_the_way.append((time_s, {key: noisy(poses[key], self._random) for key in sorted(poses)}))
+        while len(self._on_the_way) > 1 and self._on_the_way[1][0] <= time_s - DELAY_S + ROUNDING_S:
+            self._on_the_way.popleft()
+        _, measured = self._on_the_way[0]
+        self._smoothed = {key: self._corrected(key, pose) for key, pose in measured.items()}
+        return {key: pose for key, (_, pose) in self._smoothed.items()}
+
+    def _corrected(self, key: Key, measured: Pose) -> tuple[int, Pose]:
+        """Returns a smoothed pose, and the number of measurements in it."""
+        if key not in self._smoothed:
+            return 1, measured
+        count, pose = self._smoothed[key]
+        off, turn = minus(measured.position, pose.position), rotation_between(pose.quat_xyzw, measured.quat_xyzw)
+        if norm(off) > JUMP_M or norm(turn) > JUMP_RAD:
+            return 1, measured
+        count = min(count + 1, MEAN_OF)
+        return count, _moved(pose, scaled(1.0 / count, off), scaled(1.0 / count, turn))
+
+
+class BaseEstimate:
+    """Where the base of a robot is: it follows the velocity, and corrects itself by measured poses that are late.
+
+    Args:
+        base: The pose at the start.
+        period_s: Time between two updates [s].
+        seed: Seed of the noise.
+    """
+
+    def __init__(self, base: Pose, period_s: float, seed: int) -> None:
+        self._random, self._period_s = np.random.default_rng(seed), period_s
+        self._pose = noisy(base, self._random)
+        self._past: deque[tuple[Pose, Pose]] = deque(maxlen=round(DELAY_S / period_s) + 1)
+        """Poses as they are measured, and as they were estimated then."""
+
+    def update(self, base: Pose, linear: Vector, angular: Vector) -> Pose:
+        """Returns the estimated pose, a period later.
+
+        Args:
+            base: The true pose, which is measured.
+            linear: Its velocity [m/s].
+            angular: Its angular velocity [rad/s].
+        """
+        self._pose = _moved(self._pose, scaled(self._period_s, linear), scaled(self._period_s, angular))
+        self._past.append((noisy(base, self._random), self._pose))
+        (measured, then), gain = self._past[0], self._period_s / BASE_SMOOTHED_S
+        shift, turn = minus(measured.position, then.position), rotation_between(then.quat_xyzw, measured.quat_xyzw)
+        self._pose = _moved(self._pose, scaled(gain, shift), scaled(gain, turn))
+        return self._pose
+
+
+def _moved(pose: Pose, shift: Vector, turn: Vector) -> Pose:
+    return Pose(plus(pose.position, shift), quaternion_product(quaternion_of(turn), pose.quat_xyzw))
