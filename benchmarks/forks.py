@@ -19,12 +19,15 @@ SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
 sys.path += (support := [str(SUPPORT / each) for each in ("worlds", "robots")])
 os.environ["PYTHONPATH"] = os.pathsep.join((os.environ.get("PYTHONPATH", ""), *support))  # of forks
 import sleeping_session as script  # noqa: E402
+import streaming_session  # noqa: E402
 
 from rpbi.world import World  # noqa: E402
+from rpbi.world.loading import load_world  # noqa: E402
 
 SEEDS, QUICK_SEEDS = 200, 5
 FIRST_SEED = 5000
 """Seeds from here on were not used before."""
+FIRST_KEYFRAME_SEED = 9000
 SHORTEST, LONGEST, AHEAD = 100, 900, 500
 """Ticks before a state is saved, and after."""
 ASLEEP = 0.4
@@ -36,6 +39,12 @@ CHOSEN, QUICK_CHOSEN = 100, 5
 LARGEST_S = 0.2
 PREPARED_S = 2.0
 """Time between the start of the process that forks, and the first prediction."""
+OLD_S, QUICK_OLD_S = 3600.0, 20.0
+"""Age of a world with a target at every tick [s]."""
+KEYFRAME_S = 5.0
+"""Period of its keyframes [s]."""
+MOST_S, MOST_PAUSE_S = 1.0, 0.05
+"""Largest time to restore, fork and predict; largest processor time of a part of a keyframe [s]."""
 SAVED_S = 10
 """Time with a target at every tick before a save [s]."""
 BESIDE_S, QUICK_BESIDE_S = 20.0, 5.0
@@ -53,6 +62,10 @@ def run(quick: bool) -> list[Result]:
         *_predictions(QUICK_CHOSEN if quick else CHOSEN),  # while this process is as large as a script is
         *_exact(QUICK_SEEDS if quick else SEEDS),
         *_saves(),
+        *_keyframes("sleeping", script, QUICK_SEEDS if quick else SEEDS),
+        *_keyframes("streaming", streaming_session, QUICK_SEEDS if quick else SEEDS),
+        *_old(QUICK_OLD_S if quick else OLD_S, 0.01),
+        *_old(QUICK_OLD_S, 0.001),
         *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
     ]
 
@@ -168,6 +181,74 @@ def _saves() -> list[Result]:
     what = f"save after {SAVED_S} s, {world.commands.count} targets"
     world.close()
     return [Result("forks", f"{what}: time", taken_s, "s"), Result("forks", f"{what}: file", size / 1000, "kB")]
+
+
+def _keyframes(name: str, session: Any, seeds: int) -> list[Result]:
+    """Compares worlds that go on from a keyframe with the running one: by hashes, here by all samples too."""
+    same = dict.fromkeys(("from_state, with all samples", "restore", "fork", "another process"), 0)
+    for seed in range(FIRST_KEYFRAME_SEED, FIRST_KEYFRAME_SEED + seeds):
+        with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
+            world = session.build(Path(folder), seed)
+            session.run(world, seed, int(np.random.default_rng(seed).integers(SHORTEST, LONGEST)))
+            file = Path(folder) / "here.world"
+            state = world.save(file, keyframe=True)
+            with world.fork()[0] as fork:
+                fork.step(AHEAD)
+                forked = fork.state_hash()
+            samples = [world.step() for _ in range(AHEAD)]
+            expected = world.state_hash()
+            other = World.from_state(file)
+            is_same = [other.step() for _ in range(AHEAD)] == samples
+            same["from_state, with all samples"] += is_same and other.state_hash() == expected
+            other.close()
+            command = [sys.executable, "-c", ELSEWHERE, str(file), str(AHEAD)]
+            printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+            same["another process"] += printed.partition("hash: ")[2].split()[0] == expected
+            same["fork"] += forked == expected
+            world.restore(state)
+            same["restore"] += _hash_later(world) == expected
+            world.close()
+    what = f"keyframes of {name} sessions"
+    return [
+        Result("forks", f"{what}, {way}: equal, of {seeds}", count, "", None, Target(seeds, at_least=True))
+        for way, count in same.items()
+    ]
+
+
+def _old(seconds: float, dt_s: float) -> list[Result]:
+    """Restores, forks and predicts a world of a certain age just before its next keyframe, and times keyframes."""
+    random = np.random.default_rng(FIRST_SEED)
+    world = World(load_world(KUKA, overrides={"timeStep": dt_s}))
+    ticks, period, pauses = round(seconds / dt_s), round(KEYFRAME_S / dt_s), []
+    for tick in range(ticks + period - 1):
+        world.put(TARGET, {"lwr_arm_0_joint": float(random.uniform(-0.5, 0.5))})
+        world.step()
+        if (tick + 1) % period == 0:
+            parts, longest_s, is_over = world.keyframe_in_parts(), 0.0, False
+            while not is_over:
+                begin_s = time.thread_time()
+                is_over = next(parts, parts) is parts
+                longest_s = max(longest_s, time.thread_time() - begin_s)
+            pauses.append(longest_s)
+    durations = {}
+    state = world.save()
+    for what, ask in (
+        ("restore", lambda: world.restore(state)),
+        ("World.from_state", lambda: World.from_state(state).close()),
+        ("fork", lambda: world.fork()[0].close()),
+        ("predict 200 ticks", lambda: world.predict([[]], TICKS)),
+    ):
+        begin_s = time.perf_counter()
+        ask()
+        durations[what] = time.perf_counter() - begin_s
+    world.close()
+    what = f"the KUKA at {1.0 / dt_s:g} Hz after {seconds:g} s"
+    aged = f"{what} of targets, {KEYFRAME_S:g} s after its last keyframe"
+    return [
+        Result("forks", f"{what}: longest part of a keyframe, median", float(np.median(pauses)), "s"),
+        Result("forks", f"{what}: longest part of {len(pauses)}", max(pauses), "s", None, Target(MOST_PAUSE_S)),
+        *(Result("forks", f"{aged}: {way}", taken_s, "s", None, Target(MOST_S)) for way, taken_s in durations.items()),
+    ]
 
 
 def _beside_a_node(seconds: float) -> list[Result]:
