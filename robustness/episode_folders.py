@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
+import importlib
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections import Counter
@@ -17,6 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), *map(str, (ROOT / "tests/support").iterdir())]
+
 
 import episodes.ros.view  # noqa: E402
 import episodes.view.page  # noqa: E402, F401
@@ -42,6 +46,9 @@ def main() -> None:
         FORMATS.configured(name, "")
     for name in ("episodes", "view", "export"):
         command_of(f"episodes.ros.console.{name}")
+    importlib.import_module("pyarrow.parquet")
+    gc.freeze()  # else each fork copies what its collections look at
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell has its background jobs ignore
     readers = {name: READERS[name] for name in arguments.readers}
     table: dict[str, list[Trial]] = {name: [] for name in readers}
     with contextlib.suppress(KeyboardInterrupt):  # which prints the table so far

@@ -140,7 +140,7 @@ def test_files_outside_of_the_world_are_not_copied(tmp_path: Path) -> None:
         (tmp_path / name).write_text("password: 1")
     main = tmp_path / "world/main.yaml"
     main.write_text("dynamic_objects: [own.yaml]")
-    names = ("world/own.yaml", "world/.ssh/id", "private/secret.yaml", "world/../private/secret.yaml")
+    names = ("world/own.yaml", "world/.ssh/id", "private/secret.yaml")
     files = {str(tmp_path / name): "" for name in names}
     paths = []
     for file, further in ((main, []), (tmp_path / "private/world.yaml", []), (main, [tmp_path / "private"])):
@@ -149,7 +149,15 @@ def test_files_outside_of_the_world_are_not_copied(tmp_path: Path) -> None:
         paths.append([Path(each["path"]).name for each in stored])
         [text] = [each for each in faults if each.startswith("not copied")]
         assert text.count(str(tmp_path)) == len(files) - len(stored)
-    assert paths == [["own.yaml"], [], ["own.yaml", "secret.yaml", "secret.yaml"]]
+    assert paths == [["own.yaml"], [], ["own.yaml", "secret.yaml"]]
+    for name in ("world/../private/secret.yaml", "world/own.yaml\x1b", "x"):
+        path = name if name == "x" else f"{tmp_path}/{name}"
+        for description in (
+            _description(files={path: ""}),
+            _description(files={path: ""}, descriptions={path: "<robot/>"}),
+        ):
+            stored, [fault] = store_files(description, tmp_path / "files")
+            assert stored == [] and "not copied: expected the absolute path" in fault and "\x1b" not in fault
 
 
 def test_a_urdf_outside_of_the_world_is_not_read(tmp_path: Path) -> None:

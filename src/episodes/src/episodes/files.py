@@ -18,7 +18,7 @@ import rospkg
 from custom_ros_tools.config import load_config, read_file
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.files import atomic_file
-from custom_ros_tools.foreign import load_foreign_json, path_below, printable, read_below
+from custom_ros_tools.foreign import MAX_PATH_BYTES, load_foreign_json, path_below, printable, read_below
 from robot_model.asset_files import ASSETS, pybullet_data, resolve_package
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.files import found_mesh, write_description
@@ -26,7 +26,7 @@ from rpbi.config.world import main_file_model
 from rpbi.world.objects import object_sections
 
 from .errors import EpisodeError
-from .facts import MAX_FILES
+from .facts import MAX_FILES, MAX_LABEL
 
 URDF = ".urdf"
 MAX_FILE_BYTES = 2**29
@@ -57,6 +57,9 @@ def store_files(
     data = _described(description)
     copies = _Copies(store, is_own)
     for path, expected in data["files"].items():
+        if not _is_plain(path):
+            copies.faults.append(f"not copied: expected the absolute path of a file, got {printable(path, MAX_LABEL)}")
+            continue
         if path in data["descriptions"]:
             copies.add_meshes(path, write_description(data["descriptions"][path]))
             continue
@@ -113,7 +116,7 @@ class _Copies:
         """Copies a file, and returns its hash; empty if it cannot be read, or is not to be copied."""
         if path in self.stored:
             return str(self.stored[path]["sha256"])
-        if printable(path, len(path)) != path or not self._is_own(Path(os.path.realpath(path))):
+        if not _is_plain(path) or not self._is_own(Path(os.path.realpath(path))):
             self._foreign.append(printable(path, 200))
             return ""
         try:
@@ -154,7 +157,13 @@ class _Copies:
             path = str(found.resolve() if ".." in found.parts else found.absolute())
             if self.add(path):
                 meshes[name] = path
-        self.stored.setdefault(urdf, {"path": urdf, "sha256": ""})["meshes"] = meshes
+        if urdf in self.stored or len(self.stored) < MAX_FILES:
+            self.stored.setdefault(urdf, {"path": urdf, "sha256": ""})["meshes"] = meshes
+
+
+def _is_plain(path: str) -> bool:
+    """Returns whether a path is absolute, and can be stored in a description of an episode."""
+    return path.startswith("/") and ".." not in path.split("/") and printable(path, MAX_PATH_BYTES) == path
 
 
 def _described(description: str) -> dict[str, Any]:
