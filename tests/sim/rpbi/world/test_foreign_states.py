@@ -8,10 +8,10 @@ import os
 import sys
 
 import pytest
-from worlds import FLOOR, box, write_world
+from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
-from rpbi.replay.session import Recording, Replay
+from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.saved import state as state_files
 from rpbi.world.saved.command_log import RecordedCommand
@@ -151,3 +151,21 @@ def test_a_configuration_that_does_not_fit_is_reported_by_key(state):
     with pytest.raises(ConfigError) as caught:
         World.from_state(changed(state, config=config))
     assert {(each.file, each.key) for each in caught.value.problems} >= {("box.yaml", "baseMass"), ("box.yaml", "size")}
+
+
+def test_a_value_that_fails_in_a_later_step_is_named(tmp_path):
+    world = World.from_file(write_world(tmp_path, collision=(FLOOR,), robots=(iiwa(),)))
+    world.put("iiwa/target", {"lbr_iiwa_joint_2": 0.1})
+    for _ in range(5):
+        world.step()
+    state = world.save()
+    world.close()
+    hostile = state._replace(
+        commands=tuple(each._replace(data=each.data.replace("0.1", "[1]")) for each in state.commands)
+    )
+    with pytest.raises(InterfaceError, match="tick 0: "):
+        World.from_state(hostile)
+    commands = {0: dict(enumerate(hostile.commands))}
+    checkpoint = Checkpoint(0, state.tick, len(state.commands), state.state_hash)
+    result = Replay(Recording(WorldDescription(state.description), commands, {checkpoint})).run()
+    assert "from tick 0 on" in result.left_out[0]

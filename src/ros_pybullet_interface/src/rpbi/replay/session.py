@@ -187,9 +187,10 @@ class Replay:
                 return None, False
             try:
                 done = self._advance(checkpoint, commands, done)
-            except (InterfaceError, ValueError) as error:
+            except Exception as error:  # a recording may have anything in it, which fails at once or in a later step
                 at = f"tick {self._world.clock.tick}"
-                self._left_out.append(f"from {at} on, before {checkpoint}: {error}")
+                words = error if isinstance(error, (InterfaceError, ValueError)) else f"{type(error).__name__}: {error}"
+                self._left_out.append(f"from {at} on, before {checkpoint}: {words}")
                 return None, False
             if not checkpoint.state_hash:
                 continue
