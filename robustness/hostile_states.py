@@ -237,7 +237,7 @@ def _bomb(rng: random.Random, path: Path, data: bytes) -> None:
     )
     with gzip.open(path, "wb", 1) as file:
         file.write(head)
-        for _ in range(rng.choice((1, 100, 1000))):
+        for _ in range(rng.choice((1, 30, 300))):
             file.write(unit * (1_000_000 // len(unit)))
 
 

@@ -126,7 +126,7 @@ def _restored(ros: RosSystem, pool: ThreadPoolExecutor, path: Path) -> tuple[str
     except TimedOut:
         ros.call("/rpbi/stop", Trigger)
         ros.call("/rpbi/start", Trigger)
-        answer, verdict = asked.result(LONGEST_S), "stopped"
+        answer, verdict = asked.result(6 * LONGEST_S), "stopped"
     text = answer.message
     return verdict or ("taken" if answer.success else "refused" if text.strip() else "silent"), text, answered_s
 

@@ -111,7 +111,8 @@ def load_foreign_json(text: str | bytes, file: str, most_bytes: int = MAX_BYTES,
         if len(text) > most_bytes:
             raise ValueError(f"has {len(text)} bytes, expected at most {most_bytes}")
         data = json.loads(text)
-        _check_size(data, most_values)
+        if len(text) > min(2 * MAX_DEPTH, most_values):  # a shorter one has fewer levels and values
+            _check_size(data, most_values)
     except RecursionError:
         raise ConfigError([Problem(file, "", f"has more than {MAX_DEPTH} levels")]) from None
     except ValueError as error:  # wrong UTF-8 and wrong JSON are such, too

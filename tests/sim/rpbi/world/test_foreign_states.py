@@ -122,6 +122,19 @@ def test_commands_out_of_order_are_refused(state, tmp_path):
             WorldState.read(tmp_path / "order.world")
 
 
+@pytest.mark.parametrize("name", ["box\x1b[2J", "box\n"])
+def test_names_and_hashes_cannot_write_to_a_terminal(state, tmp_path, name):
+    file = tmp_path / "names.world"
+    for hostile in (
+        state._replace(commands=(RecordedCommand(0, name, "halt", '""'),)),
+        state._replace(state_hash=name),
+    ):
+        hostile.write(file)
+        with pytest.raises(ConfigError, match="control characters|hexadecimal") as caught:
+            WorldState.read(file)
+        assert str(caught.value).isprintable()
+
+
 def test_pipes_and_files_that_unfold_too_far_are_refused(state, tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.world")
     with pytest.raises(ConfigError, match="is not an ordinary file"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import suppress
@@ -29,6 +30,7 @@ MAX_COMMANDS = 2_000_000
 """Largest number of commands in a file: 33 minutes of a target in each tick at 1 kHz."""
 MAX_TICKS = 20_000_000
 """Age of a state beyond which it is refused without `max_ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+_HASH = re.compile("[0-9a-f]{32}")
 _BEGINNING = b'{"format": '
 
 
@@ -117,6 +119,10 @@ class WorldState(NamedTuple):
         if not 0 <= count <= MAX_COMMANDS:
             raise ValueError(f"expected 0 to {MAX_COMMANDS} commands, got {shortened(str(count))}")
         commands = tuple(RecordedCommand(*_typed(next_line(), int, str, str, str)) for _ in range(count))
+        if not _HASH.fullmatch(state_hash):
+            raise ValueError(f"expected a hash of 32 hexadecimal digits, got '{shortened(state_hash)}'")
+        if not all(command.name.isprintable() and command.what.isprintable() for command in commands):
+            raise ValueError("a command has a name with control characters")
         ticks = [0, start, *(command.tick for command in commands), tick]
         if ticks != sorted(ticks):
             raise ValueError("the ticks of its commands are not in order, or beyond its own")
