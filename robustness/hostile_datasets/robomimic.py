@@ -119,11 +119,11 @@ def members(file: h5py.File, chance: random.Random) -> None:
     way = chance.randrange(4)
     group = file[chance.choice(("data", "data/demo_0", OBSERVATIONS, "mask"))] if "mask" in file else file["data"]
     if way == 0:
-        for number in range(chance.choice((100, 20_000))):
+        for number in range(chance.choice((100, 3_000))):
             group.create_group(f"demo_{number + 5}")
     elif way == 1:
         for _ in range(300):
-            group = group.create_group("obs")
+            group = group.create_group("level")
     elif way == 2:
         for text in ("\x1b]0;owned\x07", "demo_\u202e", "demo_999999999999999999999", "demo_-1", "demo_", "x" * 60_000):
             group.require_group(text)

@@ -86,6 +86,10 @@ def test_links_and_values_elsewhere_are_named(tmp_path: Path) -> None:
         file.create_dataset("data/picture", (3, 60_000, 60_000, 3), "u1", chunks=True)
         file.create_dataset("data/zeros", (10**9, 7), "f4", chunks=True)
         faults = {fault.partition(": ")[0]: fault.partition(": ")[2] for fault in hdf5_faults(file, 1000)}
+        del file["data"]
+        file.create_dataset("next/pictures", (10**7, 84, 84, 3), "u1", chunks=True)
+        (fault,) = hdf5_faults(file, 1000)
+    assert fault == "next/pictures: expected at most 1,073,741,824 bytes of images in all, found more"
     assert faults == {
         "data/linked": "expected no link, found ExternalLink",
         "data/soft": "expected no link, found SoftLink",

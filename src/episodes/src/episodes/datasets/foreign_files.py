@@ -17,6 +17,10 @@ MAX_VALUES = 20_000_000
 """Values of a table, or of numbers in an HDF5 file, that any file may have; larger ones have one for each byte."""
 MAX_ROW_BYTES = 100_000_000
 """Bytes of one image of an HDF5 file."""
+MAX_UNFOLDED_BYTES = 2**30
+"""Bytes of all images of an HDF5 file; larger ones may have `MAX_COMPRESSION` times the bytes of the file."""
+MAX_COMPRESSION = 1032
+"""Largest compression ratio of such images, that of gzip."""
 MAX_OBJECTS = 100_000
 """Groups and data sets of an HDF5 file."""
 MAX_PLACE = 1_000_000_000
@@ -103,7 +107,8 @@ def hdf5_faults(file: Any, size: int) -> Iterator[str]:
     import h5py
 
     waiting = [(file, "")]
-    objects = values = 0
+    objects = values = unfolded = 0
+    most_bytes = max(MAX_UNFOLDED_BYTES, MAX_COMPRESSION * size)
     known: set[int] = set()
     most = max(MAX_VALUES, size)
     while waiting:
@@ -135,7 +140,12 @@ def hdf5_faults(file: Any, size: int) -> Iterator[str]:
                 yield f"{place}: expected numbers or texts, found {str(each.dtype):.60}"
             elif each.ndim > 2 and each.size * each.dtype.itemsize > MAX_ROW_BYTES * max(1, each.shape[0]):
                 yield f"{place}: expected images of at most {MAX_ROW_BYTES:,} bytes, found larger ones"
-            elif each.ndim <= 2:
+            elif each.ndim > 2:
+                unfolded += each.size * each.dtype.itemsize
+                if unfolded > most_bytes:
+                    yield f"{place}: expected at most {most_bytes:,} bytes of images in all, found more"
+                    return
+            else:
                 values += each.size * max(1, each.dtype.itemsize // 8)
                 if values > most:
                     yield f"{place}: expected at most {most:,} values in all, found more"
