@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable
@@ -291,7 +292,11 @@ def test_another_recording_than_that_of_the_export_is_named(exported, demos, tmp
     bag = tmp_path / "demos/episode_000001/episode.bag"
     bag.write_bytes(bag.read_bytes() + b"0")
     shutil.rmtree(tmp_path / "demos/episode_000002")
+    pipe = tmp_path / "demos/episode_000000/episode.bag"
+    pipe.unlink()
+    os.mkfifo(pipe)
     code, text = run("check_dataset", exported("lerobot"), "--source", tmp_path / "demos")
     assert code == 1
     assert f"{bag}: is not the recording that episode 1 was exported from" in text
     assert "episode 2: its recording cannot be read: " in text
+    assert f"episode 0: its recording cannot be read: {pipe}: expected an ordinary file" in text

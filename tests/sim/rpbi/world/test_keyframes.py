@@ -22,6 +22,7 @@ from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.keyframes import keyframe as keyframes
 from rpbi.world.keyframes.building import KeyframeTimer
+from rpbi.world.keyframes.graph import GraphReader
 from rpbi.world.loading import load_object
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.description import WorldDescription
@@ -287,3 +288,36 @@ def test_motions_that_would_end_the_process_are_refused(heap):
 def test_files_with_keyframes_read_back(heap, tmp_path: Path):
     state = heap.save(tmp_path / "here.world", keyframe=True)
     assert type(state).read(tmp_path / "here.world") == state
+
+
+@pytest.mark.parametrize(
+    "attributes, named",
+    [
+        ([["halt", ["method", ["anchor", "arm"], "link_pose"]]], "halt"),
+        (
+            [
+                [
+                    "later",
+                    [
+                        "method",
+                        ["named", "rpbi.world.saved.state:WorldState", ["", ["tuple", [], 1], 0, ""], 0],
+                        "write",
+                    ],
+                ]
+            ],
+            "write",
+        ),
+        ([["later", ["method", ["anchor", "arm"], "__init__"]]], "__init__"),
+        ([["__class__", 1]], "__class__"),
+    ],
+    ids=["hides a method", "writes a file", "special", "class"],
+)
+def test_forged_keyframe_replaces_no_method_and_calls_no_other(tmp_path, attributes, named):
+    world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
+    arm = world.bodies["iiwa"]
+    reader = GraphReader((), {"arm": arm})
+    reader.fill(arm, [["later", ["method", ["anchor", "arm"], "link_pose"]]])
+    assert arm.later == arm.link_pose
+    with pytest.raises(ValueError, match=f"'{named}' is no"):
+        reader.fill(arm, attributes)
+    world.close()

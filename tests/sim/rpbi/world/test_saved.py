@@ -294,6 +294,17 @@ def test_states_of_other_worlds_and_versions_are_refused(arm, tmp_path):
     assert arm.clock.tick == 0, "it is reset"
 
 
+def test_world_of_a_state_restores_that_state(arm):
+    state = arm.save()
+    again = World.from_state(state)
+    hash_later(again, 20)
+    again.restore(state)
+    assert again.state_hash() == state.state_hash
+    with pytest.raises(InterfaceError, match="another world"):
+        again.restore(state._replace(description=state.description.replace("box", "bin")))
+    again.close()
+
+
 UNRECORDED = {
     "changeDynamics": lambda world: world.pb.changeDynamics(world.bodies["box"].body_id, -1, mass=2.0),
     "setGravity": lambda world: world.pb.setGravity(0.0, 0.0, -1.62),

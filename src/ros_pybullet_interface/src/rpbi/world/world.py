@@ -122,7 +122,7 @@ class World:
         self.pb.changes.unrecorded = ""
         self.start_hash = self.state_hash()
         """Hash of the state when it was built, or was reset the last time."""
-        self._description = ""
+        self._description = self._built_from = ""
         self._start: StartState | None = None
         """Its start, once a reset without rebuilding was asked for."""
         self._keyframe, self._keyframe_tick = "", 0
@@ -175,6 +175,7 @@ class World:
         except ValueError as error:
             raise InterfaceError(str(error)) from None
         world = cls.from_description(description, trust)
+        world._built_from = state.description
         try:
             if world.start_hash != description.start_hash:
                 reasons = "; ".join(description.warnings) or "the processor or a library may be another"
@@ -704,7 +705,7 @@ class World:
         Raises:
             InterfaceError: If it is of another world, or files have changed since.
         """
-        if state.description != self.describe():
+        if state.description not in (self.describe(), self._built_from):
             raise InterfaceError(
                 "the state is of another world, or one of its files has changed: build that world by World.from_state"
             )

@@ -21,7 +21,7 @@ from episodes.datasets.provenance import (
     read_export,
 )
 from episodes.errors import EpisodeError
-from episodes.folder import BAG, EpisodeFolder
+from episodes.folder import BAG, EpisodeFolder, file_in
 
 Array = NDArray[Any]
 
@@ -152,7 +152,8 @@ def source_faults(dataset: Path, folder: EpisodeFolder) -> Iterator[str]:
     for index, number in enumerate(numbers):
         try:
             folder.read(number)
-            bag = folder.folder_of(number) / BAG
+            place = folder.folder_of(number)
+            bag = file_in(place, BAG) or place / BAG  # which cannot be opened then
             if file_digest(bag) != read_episode(dataset, index)["source"]["bag_sha256"]:
                 yield f"{bag}: is not the recording that episode {index} was exported from"
         except (EpisodeError, OSError) as error:

@@ -29,6 +29,8 @@ from rpbi.samples import ContactsSample
 
 _MADE = ("rpbi.bodies.", "rpbi.control.", "rpbi.engine.clock", "rpbi.samples", "rpbi.sensors.", "rpbi.world.")
 """Starts of the modules of this package whose objects come and go while a world runs."""
+_CALLED = ("rpbi.bodies.", "rpbi.control.", "rpbi.sensors.")
+"""Starts of the modules of this package whose objects have methods that a state refers to."""
 _KEPT = (FunctionType, BuiltinFunctionType, partial, type)
 """Code that objects hold, which stays as it is."""
 _NUMBERS = "fiub"
@@ -199,7 +201,7 @@ class GraphReader:
         """
         with _one_error():
             for attribute, plain in attributes:
-                if attribute.startswith("__"):
+                if attribute.startswith("__") or callable(getattr(type(owner), attribute, None)):
                     raise ValueError(f"'{attribute}' is no attribute of a state")
                 value = self._value(plain, _attribute(owner, attribute))
                 if value is not NOTHING:
@@ -241,7 +243,9 @@ class GraphReader:
 
     def _method(self, owner: Any, name: str) -> Any:
         one = self._value(owner, NOTHING)
-        if isinstance(one, self._fixed) or not isinstance(getattr(type(one), name), FunctionType) or name[:2] == "__":
+        kind = type(one)
+        may_be_called = is_foreign(one) or kind.__module__.startswith(_CALLED)
+        if not may_be_called or not isinstance(getattr(kind, name), FunctionType) or name[:2] == "__":
             raise ValueError(f"'{name}' is no method of {full_name(type(one))} that a state refers to")
         return getattr(one, name)
 
