@@ -25,7 +25,7 @@ class Report(NamedTuple):
     Attributes:
         targets: How many.
         commands: How many were answered by one.
-        refused: How many were not safe, by check.
+        refused: How many gave no command as they are: those that are not safe by check, and those of one stamp.
         worst: Largest share of each limit.
         nearest_m: The smallest distance, inf if none was watched.
         brakings: How many brakings were followed to their end.
@@ -64,6 +64,8 @@ def fuzz(
         decision = guard.decide(target.position, around._replace(age_s=target.age_s, stamp_step_s=target.step_s))
         if decision.violation is not None:
             refused[decision.violation.check] += 1
+        elif decision.command is None:
+            refused["same stamp"] += 1
         if decision.command is not None:
             commands += 1
             run.append(decision.command)

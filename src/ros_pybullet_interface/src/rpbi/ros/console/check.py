@@ -1,7 +1,6 @@
 """The command `check`."""
 
 import logging
-import signal
 import sys
 from collections.abc import Iterator
 from typing import Annotated
@@ -23,7 +22,6 @@ def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
 
     It ends with 1 if there are problems. `{package}/PATH` is resolved.
     """
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # so that it may be piped into `head`
     warnings = _Warnings()
     logging.getLogger().addHandler(warnings)
     try:
