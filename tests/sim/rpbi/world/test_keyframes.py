@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -283,6 +284,17 @@ def test_motions_that_would_end_the_process_are_refused(heap):
         cut = text[:number] + forged + text[text.index(",", number) :]
         with pytest.raises(InterfaceError, match="makes no sense"):
             World.from_state(state._replace(keyframe=keyframes._packed(cut)))
+
+
+def test_forged_schedule_of_sensors_is_not_used(heap):
+    state = heap.save(keyframe=True)
+    text = keyframes._unpacked(state.keyframe)
+    backwards = re.sub(r'\["_numerator",(\d+)\]', r'["_numerator",-\1]', text)
+    assert backwards != text
+    forged = World.from_state(state._replace(keyframe=keyframes._packed(backwards)))
+    for _ in range(50):
+        assert forged.step() == heap.step(), "it ends, with the samples that are due"
+    forged.close()
 
 
 def test_files_with_keyframes_read_back(heap, tmp_path: Path):

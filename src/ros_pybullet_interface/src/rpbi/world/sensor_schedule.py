@@ -104,6 +104,17 @@ class SensorSchedule:
         """Has all due as in the beginning, at tick 0."""
         for each in self._all():
             each.read_tick = -1
+        self.reschedule()
+
+    def reschedule(self) -> None:
+        """Has all due by their rates from the present tick on, whatever else a file has set.
+
+        Raises:
+            ValueError: If a rate is not finite, or negative.
+        """
+        for each in self._all():
+            if not 0.0 <= each.sensor.hz < math.inf:
+                raise ValueError(f"'{each.sensor.name}': expected a finite rate of at least 0 Hz, got {each.sensor.hz}")
             each.schedule_from(self._clock.tick, self._clock.dt_ns)
         self._rebuild()
 

@@ -633,11 +633,12 @@ class World:
                 read = Keyframe(keyframe)
                 self._contents.rebuild(read.recipe, read.changed)
                 self._pushed = read.enter(self, self._contents)
+            self.clock.skip(read.tick - self.clock.tick)
+            self._contents.sensors.reschedule()
         except InterfaceError:
             raise
         except Exception as error:  # the text may hold anything
             raise InterfaceError(f"the keyframe makes no sense in this world: {shortened(str(error))}") from error
-        self.clock.skip(read.tick - self.clock.tick)
         self._keyframe, self._keyframe_tick = keyframe, read.tick
 
     def save(self, file: str | Path | None = None, *, keyframe: bool = False) -> WorldState:
