@@ -126,7 +126,7 @@ FLOORS: dict[str, Callable[..., dict[str, Any]]] = {
 
 
 def bouncing_by_floor() -> Table:
-    """How high a ball of restitution 1 comes back from ten heights 0.5 mm apart, by the kind of floor."""
+    """Measures the rebound ratio of a ball with restitution 1 from ten heights 0.5 mm apart, for each kind of floor."""
     rows = []
     for name, (keys, engine) in REBOUNDS.items():
         cells = []

@@ -45,7 +45,7 @@ PLACES = (
 
 
 class Place(NamedTuple):
-    """What a maker may use.
+    """Tools of a maker.
 
     Attributes:
         rng: Source of all that is random.

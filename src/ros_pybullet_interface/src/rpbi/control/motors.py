@@ -147,11 +147,11 @@ class Motors:
         """Tick at which the target of a joint expires, by joint index."""
         self._renewed: set[int] = set()
         self._told: dict[int, tuple[int, dict[str, Any]]] = {}
-        """The mode of PyBullet's motor of each joint, and its arguments, as told last; PyBullet keeps them."""
+        """The mode of PyBullet's motor of each joint, and its newest arguments; PyBullet keeps them."""
         self.switch(mode)
 
     def resume(self) -> None:
-        """Tells PyBullet again what it was told last, for another client that has the same robot."""
+        """Sends the newest arguments of all motors again, to another client that has the same robot."""
         for index, (mode, arguments) in self._told.items():
             self._tell(index, mode, arguments)
 

@@ -715,7 +715,7 @@ class World:
         """Checks that all changes were recorded.
 
         Raises:
-            InterfaceError: If PyBullet was told something that no command repeats.
+            InterfaceError: If a call has changed PyBullet that no command repeats.
         """
         if name := self.pb.changes.unrecorded:
             raise InterfaceError(

@@ -121,7 +121,7 @@ def difference(first: str, second: str) -> str:
 
 
 def _enter(motions: Mapping[str, BodyMotion], sleepers: tuple[str, ...], contents: WorldContents) -> None:
-    """Puts bodies in a fresh client where they were, and tells PyBullet the rest that it keeps."""
+    """Puts bodies in a fresh client where they were, and sets attachments, motors and sleep there."""
     for name, body in contents.bodies.items():
         motions[name].put(body)
     contents.attachments.resume()
@@ -169,7 +169,7 @@ def refuse(world: Any) -> None:
         )
     for name, body in world.bodies.items():
         if body.is_soft:
-            raise InterfaceError(f"'{name}' is soft: PyBullet neither tells nor takes the state of soft bodies")
+            raise InterfaceError(f"'{name}' is soft: PyBullet neither reports nor takes the state of soft bodies")
         if is_foreign(body):
             kind = type(body).__name__
             raise InterfaceError(

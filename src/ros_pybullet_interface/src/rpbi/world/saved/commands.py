@@ -11,7 +11,7 @@ from .command_log import RecordedCommand
 from .values import from_text, trusting
 
 KEYFRAME = "keyframe"
-"""What a command is that has the text of a keyframe."""
+"""Kind of a command that has the text of a keyframe."""
 _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "input": lambda world, slot, value: world.apply_input(slot, value),
     "add": lambda world, _, arguments: world.add(*arguments),

@@ -1,4 +1,4 @@
-"""How to build the bodies of a world in a fresh client, in the same way each time."""
+"""Recipes: the bodies of a world are built in a fresh client, in the same way each time."""
 
 from __future__ import annotations
 
