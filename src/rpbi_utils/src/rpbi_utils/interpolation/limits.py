@@ -80,10 +80,10 @@ class Peaks(NamedTuple):
     """Largest speeds and accelerations of a motion.
 
     Attributes:
-        velocity: Of each row that is interpolated as a number [m/s or rad/s], shape (S,).
-        acceleration: Likewise [m/s^2 or rad/s^2].
-        angular_velocity: Of the orientation, if it is interpolated as one [rad/s].
-        angular_acceleration: Likewise [rad/s^2].
+        velocity: Speed of each row that is interpolated as a number [m/s or rad/s], shape (S,).
+        acceleration: Acceleration of each of these rows [m/s^2 or rad/s^2], shape (S,).
+        angular_velocity: Angular speed of an orientation that is interpolated as one [rad/s].
+        angular_acceleration: Its angular acceleration [rad/s^2].
     """
 
     velocity: NDArray[np.float64]
