@@ -141,6 +141,19 @@ def test_the_logger_has_the_signals_of_the_last_second(example, screen):
         screen.run("xdotool", "keyup", "Left")
 
 
+def test_two_keys_are_as_fast_as_one(example, screen):
+    signals = example.listen("operator_node/signal", Float64MultiArray)
+    screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync", "keydown", "Left")
+    try:
+        wait_until(lambda: any(signals.messages[-1].data), "a key moves it")
+        assert np.linalg.norm(signals.messages[-1].data) == pytest.approx(0.4)
+        screen.run("xdotool", "keydown", "f")
+        wait_until(lambda: all(signals.messages[-1].data[::2]), "two keys move it")
+        assert np.linalg.norm(signals.messages[-1].data) == pytest.approx(0.4)
+    finally:
+        screen.run("xdotool", "keyup", "Left", "keyup", "f")
+
+
 def test_mouse_moves_the_arm(example, screen, follows):
     with device(example, screen, "mouse"):
         window = ("search", "--sync", "--onlyvisible", "--name", "^mouse$")  # before it is visible, it gets no mouse

@@ -3,29 +3,24 @@
 import math
 from collections.abc import Sequence
 
-from pydantic import Field
-
-from custom_ros_tools.schema import NonNegative
-
-from .mapping import AxesConfig, Mapping
-
-
-class IsometricConfig(AxesConfig):
-    """The axes that make up the signal, and the largest length of the signal."""
-
-    scale: NonNegative = Field(1.0, description="Length of the signal at full deflection.")
+from .mapping import Mapping
+from .scale import ScaleConfig
 
 
 class IsometricMapping(Mapping):
-    """Scales the vector a of the axes to at most `scale`: `scale * min(n, 1) / n * a`, where n is the length of a."""
+    """Limits the vector a of the axes to length 1, then scales it: `scale * min(n, 1) / n * a`, where n is its length.
 
-    Config = IsometricConfig
+    A list of factors multiplies axis by axis: `[-0.2, 0.2, 0.2]` reverses the first one.
+    """
 
-    def __init__(self, config: IsometricConfig) -> None:
+    Config = ScaleConfig
+
+    def __init__(self, config: ScaleConfig) -> None:
         self._config, self.size = config, len(config.axes_idx)
+        self._scale = config.factors
 
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
         """Returns the signal, see `Mapping`."""
         picked = self._config.pick(axes)
-        factor = self._config.scale / max(math.hypot(*picked), 1.0)  # min(n, 1) / n, also for n = 0
-        return tuple(factor * axis for axis in picked)
+        length = max(math.hypot(*picked), 1.0)  # min(n, 1) / n, also for n = 0
+        return tuple(scale * axis / length for scale, axis in zip(self._scale, picked))

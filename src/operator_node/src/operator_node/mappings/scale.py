@@ -29,6 +29,11 @@ class ScaleConfig(AxesConfig):
             raise KeyedError("scale", f"{expected}, got {len(self.scale)}")
         return self
 
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The factor of each of `axes_idx`."""
+        return tuple(self.scale) if len(self.scale) > 1 else tuple(self.scale) * len(self.axes_idx)
+
 
 class ScaleMapping(Mapping):
     """Scales each axis independently: `scale * axes[axes_idx]`."""
@@ -37,7 +42,7 @@ class ScaleMapping(Mapping):
 
     def __init__(self, config: ScaleConfig) -> None:
         self._config, self.size = config, len(config.axes_idx)
-        self._scale = config.scale if len(config.scale) > 1 else config.scale * self.size
+        self._scale = config.factors
 
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
         """Returns the signal, see `Mapping`."""
