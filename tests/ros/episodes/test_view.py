@@ -13,12 +13,14 @@ from typing import Any
 
 import msgspec
 import numpy as np
+import pybullet
 import pytest
 import rosbag
 import rospy
 import zstandard
 from genpy import Time
 from node_world import add, main_config, publishing, remove
+from pybullet_utils.bullet_client import BulletClient
 from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import JointState
 from soft_meshes import DEFORMABLE, block
@@ -29,7 +31,12 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder
 from episodes.folder import BAG
+from episodes.ros.view import scene_of_episode
+from episodes.view.first_view import FOV_RAD, first_view
+from episodes.view.scene import PageScene
 from ros_pybullet_interface.msg import Contacts, SimulationState
+from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+from rpbi.geometry import Pose
 from rpbi.world import World
 from rpbi_utils import bag_to_dataframes, transforms_between
 
@@ -88,6 +95,31 @@ class _Page:
         changed = [each["updates"]["points"] for _, each in self.of(name, "Update") if "points" in each["updates"]]
         found = [self.buffers[each["__binary_index"]] for each in (*created, *changed)]
         return [np.frombuffer(each, np.float32).reshape(-1, 2, 3) for each in found]
+
+
+def _pixels_at_first(scene: PageScene, width: int = 640, height: int = 270) -> list[int]:
+    """Returns how many pixels of the page's first view show each link that is there then, in order."""
+    client = BulletClient(pybullet.DIRECT)
+    bodies = []
+    for link in scene.links:
+        if not link.is_there[0]:
+            continue
+        place = Pose(tuple(link.poses.position[0]), tuple(link.poses.rotation[0].as_quat()))
+        bodies.append([])
+        for shape in link.shapes:
+            kind: dict[str, Any] = {"shapeType": pybullet.GEOM_BOX, "halfExtents": np.array(shape.size) / 2}
+            if shape in scene.meshes:
+                mesh = scene.meshes[shape]
+                corners, triangles = mesh.corners.tolist(), mesh.triangles.ravel().tolist()
+                kind = {"shapeType": pybullet.GEOM_MESH, "vertices": corners, "indices": triangles}
+            visual, pose = client.createVisualShape(**kind), place @ shape.pose_in_link
+            bodies[-1].append(client.createMultiBody(0.0, -1, visual, pose.position, pose.quat_xyzw))
+    view = client.computeViewMatrix(*scene.camera, (0.0, 0.0, 1.0))
+    opening = client.computeProjectionMatrixFOV(np.degrees(FOV_RAD), width / height, 0.05, 50.0)
+    options = {"renderer": pybullet.ER_TINY_RENDERER, "flags": pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX}
+    mask = np.reshape(client.getCameraImage(width, height, view, opening, **options)[4], -1)
+    client.disconnect()
+    return [int(np.isin(mask, of_link).sum()) for of_link in bodies]
 
 
 @pytest.fixture(scope="module")
@@ -201,6 +233,21 @@ def test_what_comes_and_goes_is_shown_while_it_is_there(page: _Page, tables: dic
     seen = [at_s for at_s in np.arange(0.0, page.seconds, 0.02) if page.is_visible("/ball/link0", at_s)]
     assert seen[0] == pytest.approx(on_tf[0], abs=0.1) and seen[-1] == pytest.approx(on_tf[-1], abs=0.1)
     assert page.is_visible("/box/link0", 0.0) and page.is_visible("/box/link0", page.seconds)
+
+
+def test_first_view_shows_all_links_from_above_the_floor(episode: EpisodeFolder) -> None:
+    """The world has no `resetDebugVisualizerCamera`."""
+    scene = scene_of_episode(episode, 0)
+    assert scene.camera[0][2] > 0.3
+    pixels = _pixels_at_first(scene)
+    names = [f"{link.body}/{link.name}" for link in scene.links if link.is_there[0]]
+    assert len(names) > 18 and {name: count for name, count in zip(names, pixels) if count < 10} == {}
+
+
+def test_first_view_is_that_of_the_world_if_it_has_one() -> None:
+    own = ResetDebugVisualizerCamera(cameraDistance=2.0, cameraPitch=-90.0, cameraTargetPosition=(1.0, 2.0, 0.0))
+    position, target = first_view(own, [], {})
+    np.testing.assert_allclose([position, target], [[1.0, 2.0, 2.0], [1.0, 2.0, 0.0]], atol=1e-9)
 
 
 def test_forces_are_arrows_and_lines(page: _Page) -> None:

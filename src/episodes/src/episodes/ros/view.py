@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,11 @@ from episodes.errors import EpisodeError
 from episodes.files import with_stored_files
 from episodes.folder import BAG, EARLIER, EpisodeFolder, file_in
 from episodes.view.bodies import add_later_bodies, links_of
+from episodes.view.first_view import first_view
 from episodes.view.forces import contact_arrows, force_panels, wrench_arrows
 from episodes.view.frames import Frames
 from episodes.view.meshes import meshes_of
-from episodes.view.scene import MAX_HZ, MAX_POSES, Array, PageScene, ShownLink
-from robot_model.geometry import Vector
+from episodes.view.scene import MAX_HZ, MAX_POSES, Array, PageScene
 from rpbi.replay.session import Recording
 from rpbi.world import World
 from rpbi_utils.bags.errors import BagError
@@ -32,8 +32,6 @@ CONTACTS, WRENCHES, JOINTS, TF = (
     "sensor_msgs/JointState",
     "tf2_msgs/TFMessage",
 )
-MIN_DISTANCE_M = 0.8
-"""Smallest distance of the camera from the middle of the scene [m], where the world has no camera of its own."""
 
 
 def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> PageScene:
@@ -96,11 +94,12 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
         of_body = {topic.removeprefix(prefix).removesuffix("/joint_states"): tables[topic] for topic in joints}
         states = tables[state[0]] if state else None
         shown, more = links_of(world, at_start, recording.commands, states, frames, of_body)
-        scene = PageScene(title, start_s, times, _camera(world, shown), shown, notes=[*notes, *more])
+        own_camera = world.config.resetDebugVisualizerCamera
     finally:
         world.close()
-    scene.meshes, of_meshes = meshes_of(shape for link in shown for shape in link.shapes)
-    scene.notes += of_meshes
+    meshes, of_meshes = meshes_of(shape for link in shown for shape in link.shapes)
+    camera = first_view(own_camera, shown, meshes)
+    scene = PageScene(title, start_s, times, camera, shown, meshes, notes=[*notes, *more, *of_meshes])
     scene.arrows = [contact_arrows(topic, tables[topic], frames.times) for topic in of_type[CONTACTS]]
     for topic in of_type[WRENCHES]:
         found = wrench_arrows(topic, tables[topic], frames)
@@ -122,21 +121,3 @@ def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[fl
         raise BagError(bag, "expected joint states, contacts or states of the simulator over some time, found none")
     count = max(2, min(math.ceil(seconds * MAX_HZ) + 1, most))
     return start_s, np.linspace(0.0, seconds, count)
-
-
-def _camera(world: World, links: Sequence[ShownLink]) -> tuple[Vector, Vector]:
-    """Returns the position of the camera and the point that it looks at: the world's own, else so that links are seen.
-
-    The world's own is that of PyBullet's window, `resetDebugVisualizerCamera`.
-    """
-    own = world.config.resetDebugVisualizerCamera
-    if own is not None:
-        target = np.array(own.cameraTargetPosition)
-        distance, yaw, pitch = own.cameraDistance, math.radians(own.cameraYaw), math.radians(own.cameraPitch)
-    else:
-        places = np.concatenate([link.poses.position for link in links] or [np.zeros((1, 3))])
-        low, high = places.min(axis=0), places.max(axis=0)
-        target, yaw, pitch = (low + high) / 2, math.radians(45.0), math.radians(-30.0)
-        distance = max(MIN_DISTANCE_M, 1.5 * float(np.linalg.norm(high - low)))
-    forward = np.array([-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)])
-    return tuple(target - distance * forward), tuple(target)

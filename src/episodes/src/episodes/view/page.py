@@ -15,6 +15,7 @@ import pandas as pd
 from custom_ros_tools.errors import MissingDependency
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
 
+from .first_view import FOV_RAD
 from .page_parts import BODY, HEAD
 from .scene import Array, Arrows, PageScene, ShownLink, TriangleMesh
 
@@ -27,8 +28,6 @@ MAX_BYTES = 2_000_000
 """Size of a page above which it has fewer times [bytes]."""
 MIN_TIMES = 10
 """Number of times that a page has at least."""
-FOV_RAD = np.radians(45.0)
-"""Vertical angle of view at the start [rad]."""
 STILL = 1e-5
 """Smallest motion between two times that is shown [m, and parts of a quaternion]."""
 POSE_STEP, ARROW_STEP = 2.0**-15, 2.0**-12

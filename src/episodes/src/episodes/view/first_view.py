@@ -1,0 +1,90 @@
+"""The first view of a page: from where a camera sees all links."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from robot_model.geometry import Vector
+from rpbi.bodies.visual_shapes import BodyShape
+from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+
+from .scene import Array, ShownLink, TriangleMesh
+
+FOV_RAD = math.radians(45.0)
+"""Vertical angle of view [rad]."""
+YAW_DEG, PITCH_DEG = 45.0, -30.0
+"""Direction of the camera where the world has none [deg]."""
+LARGE_M = 3.0
+"""Extent from which on a shape, such as a floor, need not be seen as a whole [m]."""
+MARGIN = 1.15
+"""Factor on the distance at which all links just fit."""
+MIN_DISTANCE_M = 0.8
+"""Smallest distance of the camera from the middle of the links [m]."""
+
+Camera = tuple[Vector, Vector]
+"""Position of a camera and the point that it looks at [m]."""
+
+
+def first_view(
+    own: ResetDebugVisualizerCamera, links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]
+) -> Camera:
+    """Returns the camera of the world; if the world names none, one that sees all links where they are at first.
+
+    Args:
+        own: That of PyBullet's window. PyBullet's default, which is below a floor, counts as none.
+        links: The links.
+        meshes: Meshes by shape.
+    """
+    if own != ResetDebugVisualizerCamera():
+        target = np.array(own.cameraTargetPosition)
+        return _camera(target, own.cameraDistance, _forward(own.cameraYaw, own.cameraPitch))
+    points = _points(links, meshes)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    forward = _forward(YAW_DEG, PITCH_DEG)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    to_points = points - middle
+    across = np.abs(np.stack([to_points @ right, to_points @ np.cross(right, forward)])).max(axis=0)
+    distance = MARGIN * float((across / math.tan(FOV_RAD / 2) - to_points @ forward).max())
+    return _camera(middle, max(MIN_DISTANCE_M, distance), forward)
+
+
+def _forward(yaw_deg: float, pitch_deg: float) -> Array:
+    """Returns the direction in which PyBullet's camera looks, a unit vector."""
+    yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
+    return np.array([-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)])
+
+
+def _camera(target: Array, distance: float, forward: Array) -> Camera:
+    return tuple(target - distance * forward), tuple(target)
+
+
+def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]) -> Array:
+    """Returns points to be seen, shape (n, 3) [m]: corners of small shapes, and the nearest point of each large one."""
+    corners = [each for link in links for each in _corners(link, meshes)]
+    if not corners:
+        return np.zeros((1, 3))
+    small = [each for each in corners if np.ptp(each, axis=0).max() <= LARGE_M]
+    large = [each for each in corners if np.ptp(each, axis=0).max() > LARGE_M]
+    seen = np.concatenate(small or large)
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    return np.concatenate([seen, *(np.clip(middle, each.min(axis=0), each.max(axis=0))[None] for each in large)])
+
+
+def _corners(link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> Iterator[Array]:
+    """Yields the corners of the box around each shape of a link, shape (8, 3) [m], when it is first there."""
+    first = int(np.argmax(link.is_there))
+    position, rotation = link.poses.position[first], link.poses.rotation[first]
+    for shape in link.shapes:
+        if shape in meshes:
+            ends = np.stack([meshes[shape].corners.min(axis=0), meshes[shape].corners.max(axis=0)])
+        else:
+            ends = np.outer((-0.5, 0.5), shape.size)
+        corners = np.array(list(itertools.product(*ends.T)))
+        in_link = Rotation.from_quat(shape.pose_in_link.quat_xyzw).apply(corners) + shape.pose_in_link.position
+        yield rotation.apply(in_link) + position
