@@ -6,12 +6,16 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from bench_worlds import arm_world
+from random_resets import exact_resets
 from result import Result, Target
 from session import JOINT_STATES, Session
 
@@ -21,6 +25,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join((os.environ.get("PYTHONPATH", ""), *s
 import sleeping_session as script  # noqa: E402
 import streaming_session  # noqa: E402
 
+from rpbi.geometry import Pose, Twist  # noqa: E402
 from rpbi.world import World  # noqa: E402
 from rpbi.world.loading import load_world  # noqa: E402
 
@@ -28,8 +33,22 @@ SEEDS, QUICK_SEEDS = 200, 5
 FIRST_SEED = 5000
 """Seeds from here on were not used before."""
 FIRST_KEYFRAME_SEED = 9000
+RESETS = 1000
 SHORTEST, LONGEST, AHEAD = 100, 900, 500
 """Ticks before a state is saved, and after."""
+SINCE, ON = 200, 300
+"""Ticks with further commands between a keyframe and the state, and ticks with a candidate's inputs after it."""
+Inputs = Mapping[str, Callable[[np.random.Generator], Any]]
+"""What makes a value, by input that always takes one."""
+DRIVEN: Inputs = {
+    "mobile/cmd_vel": lambda random: Twist((*random.uniform(-1.0, 1.0, 2).tolist(), 0.0), (0.0, 0.0, 0.5)),
+    "follower/pose": lambda random: Pose(tuple(random.uniform((0.3, -0.3, 0.0), (0.6, 0.3, 0.3)).tolist())),
+}
+STREAMED: Inputs = {
+    "gripper/target": lambda random: {"left": float(random.uniform(0.01, 0.05))},
+    "seen/pose": lambda random: Pose((0.5, float(random.uniform(-0.62, -0.58)), 0.12)),
+    "eye/pose": lambda random: Pose((float(random.uniform(0.3, 0.7)), 0.0, 2.0), streaming_session.LOOKS_DOWN),
+}
 ASLEEP = 0.4
 """Smallest share of worlds in which a body sleeps when they are saved."""
 KUKA = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
@@ -58,12 +77,14 @@ ELSEWHERE = (
 
 def run(quick: bool) -> list[Result]:
     """Compares random sessions in contact by their hashes, and predicts for an arm that pushes a box."""
+    seeds = QUICK_SEEDS if quick else SEEDS
     return [
         *_predictions(QUICK_CHOSEN if quick else CHOSEN),  # while this process is as large as a script is
-        *_exact(QUICK_SEEDS if quick else SEEDS),
+        *_exact(seeds),
         *_saves(),
-        *_keyframes("sleeping", script, QUICK_SEEDS if quick else SEEDS),
-        *_keyframes("streaming", streaming_session, QUICK_SEEDS if quick else SEEDS),
+        *_keyframes("sleeping", script.SleepingScript, script.build, DRIVEN, seeds),
+        *_keyframes("streaming", streaming_session.Script, streaming_session.build, STREAMED, seeds),
+        *exact_resets(range(QUICK_SEEDS if quick else RESETS)),
         *_old(QUICK_OLD_S if quick else OLD_S, 0.01),
         *_old(QUICK_OLD_S, 0.001),
         *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
@@ -183,36 +204,70 @@ def _saves() -> list[Result]:
     return [Result("forks", f"{what}: time", taken_s, "s"), Result("forks", f"{what}: file", size / 1000, "kB")]
 
 
-def _keyframes(name: str, session: Any, seeds: int) -> list[Result]:
-    """Compares worlds that go on from a keyframe with the running one: by hashes, here by all samples too."""
-    same = dict.fromkeys(("from_state, with all samples", "restore", "fork", "another process"), 0)
+def _keyframes(name: str, make: Any, build: Any, inputs: Inputs, seeds: int) -> list[Result]:
+    """Compares worlds that go on after a keyframe with the running one: by hashes, some by all samples too."""
+    same = dict.fromkeys(("from_state", "fork", "prediction", "restore"), 0)
     for seed in range(FIRST_KEYFRAME_SEED, FIRST_KEYFRAME_SEED + seeds):
         with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
-            world = session.build(Path(folder), seed)
-            session.run(world, seed, int(np.random.default_rng(seed).integers(SHORTEST, LONGEST)))
-            file = Path(folder) / "here.world"
-            state = world.save(file, keyframe=True)
-            with world.fork()[0] as fork:
-                fork.step(AHEAD)
-                forked = fork.state_hash()
-            samples = [world.step() for _ in range(AHEAD)]
-            expected = world.state_hash()
-            other = World.from_state(file)
-            is_same = [other.step() for _ in range(AHEAD)] == samples
-            same["from_state, with all samples"] += is_same and other.state_hash() == expected
-            other.close()
-            command = [sys.executable, "-c", ELSEWHERE, str(file), str(AHEAD)]
-            printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-            same["another process"] += printed.partition("hash: ")[2].split()[0] == expected
-            same["fork"] += forked == expected
-            world.restore(state)
-            same["restore"] += _hash_later(world) == expected
+            world = build(Path(folder), seed)
+            for way, is_same in _after_keyframe(world, make(seed), inputs, seed).items():
+                same[way] += is_same
+                if not is_same:
+                    print(f"keyframes, {name} session {seed}: {way} differs", file=sys.stderr)
             world.close()
-    what = f"keyframes of {name} sessions"
+    what = f"{SINCE} ticks after keyframes of {name} sessions"
     return [
         Result("forks", f"{what}, {way}: equal, of {seeds}", count, "", None, Target(seeds, at_least=True))
         for way, count in same.items()
     ]
+
+
+def _after_keyframe(world: World, script: Any, inputs: Inputs, seed: int) -> dict[str, bool]:
+    """Makes a keyframe, goes on with further commands, and returns by way whether it goes on in the same way."""
+    random = np.random.default_rng(seed)
+    for tick in range(ticks := int(random.integers(SHORTEST, LONGEST)) + SINCE):
+        if tick == ticks - SINCE:
+            world.keyframe()
+        script.act(world)
+        world.step()
+    state = world.save()
+    candidate = [(tick, slot, make(random)) for tick in range(0, ON, 50) for slot, make in inputs.items()]
+    with _second_thread():  # so that forks are those of a program of its own, which starts at the keyframe
+        (prediction,) = world.predict([candidate], ON)
+        with world.fork()[0] as fork:
+            forked = _go_on(candidate, fork.put, fork.step), fork.state_hash()
+    samples, expected = _go_on(candidate, world.put, world.step), world.state_hash()
+    same = {"fork": forked == (samples, expected), "prediction": prediction.state_hash == expected}
+    other = World.from_state(state)
+    same["from_state"] = _go_on(candidate, other.put, other.step) == samples and other.state_hash() == expected
+    other.close()
+    world.restore(state)
+    _go_on(candidate, world.put, world.step)
+    same["restore"] = world.state_hash() == expected
+    return same
+
+
+def _go_on(candidate: list[Any], put: Any, step: Any) -> list[Any]:
+    """Steps with the inputs of a candidate, and returns all samples."""
+    samples = []
+    for tick in range(ON):
+        for planned, slot, value in candidate:
+            if planned == tick:
+                put(slot, value)
+        samples += step()
+    return samples
+
+
+@contextmanager
+def _second_thread() -> Iterator[None]:
+    over = threading.Event()
+    thread = threading.Thread(target=over.wait)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def _old(seconds: float, dt_s: float) -> list[Result]:

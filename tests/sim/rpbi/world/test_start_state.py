@@ -5,7 +5,7 @@ from __future__ import annotations
 import gym_world
 import numpy as np
 import pytest
-from worlds import ball, write_world
+from worlds import FLOOR, ball, write_world
 
 from rpbi.world import World
 
@@ -88,3 +88,18 @@ def test_bodies_with_a_state_of_their_own_are_loaded_again(tmp_path):
         assert world.state_hash() == world.start_hash
         assert not set(before) & set(world.bodies.values())
         world.close()
+
+
+@pytest.mark.parametrize("state", ["ENABLE_SLEEPING", "ENABLE_SLEEPING|ACTIVATION_STATE_SLEEP"])
+def test_bodies_that_fell_asleep_fall_again(tmp_path, state):
+    dynamics = {"activationState": f"ACTIVATION_STATE_{state}"}
+    thing = ball(basePosition=[0.0, 0.0, 0.5], changeDynamics=dynamics)
+    world = World.from_file(write_world(tmp_path, collision=(FLOOR,), dynamic=(thing,), timeStep=0.005))
+    heights = []
+    for _ in range(2):
+        world.reset(rebuild=False)
+        for _ in range(500):
+            world.step()
+            heights.append(world.bodies["ball"].base_pose().position[2])
+    assert heights[:500] == heights[500:]
+    world.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import pybullet
 from pydantic.alias_generators import to_camel
 
 from rpbi.bodies import Body
@@ -23,6 +24,7 @@ APART_M = 1_000.0
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 UNDONE = ("halt", "pause", "move", "stop_motion", "set_joint_state")
 """Commands that the saved state undoes, whatever their value."""
+_SLEEPING = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 _FIELDS = {to_camel(field): field for field in LinkDynamics._fields}
 
 
@@ -38,8 +40,8 @@ class StartState:
     """The state that a world starts in, before its first tick.
 
     PyBullet's `restoreState` leads back to it to the last bit: there are no contacts yet whose history it would lose.
-    It knows neither set points of motors, which robots restart, nor dynamics, which are changed back. Whatever else
-    happened to a world makes it unreachable in this way.
+    It knows neither set points of motors, which robots restart, nor dynamics, which are changed back, nor sleep: worlds
+    with bodies that may sleep do not suit. Whatever else happened to a world makes it unreachable in this way.
 
     Args:
         pb: The client.
@@ -57,7 +59,9 @@ class StartState:
     @staticmethod
     def suits(contents: WorldContents) -> bool:
         """Returns whether a world has nothing that keeps a state which PyBullet does not know."""
-        others = (is_foreign(each) or each.is_soft or _is_rigid(each) for each in contents.bodies.values())
+        others = (
+            is_foreign(each) or each.is_soft or _is_rigid(each) or _may_sleep(each) for each in contents.bodies.values()
+        )
         return not (any(others) or contents.attachments.configs or contents.sensors.keep_state)
 
     def restore(self, commands: CommandLog) -> bool:
@@ -124,3 +128,11 @@ class StartState:
 def _is_rigid(body: Body) -> bool:
     """Returns whether the solver of rigid bodies moves a body, which `restoreState` refuses."""
     return bool(body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES)
+
+
+def _may_sleep(body: Body) -> bool:
+    """Returns whether PyBullet may put a body to sleep, which `restoreState` leaves as it is."""
+    config: Any = getattr(body, "config", None)
+    state = getattr(getattr(config, "changeDynamics", None), "activationState", None) or 0
+    flags = getattr(getattr(config, "loadURDF", None), "flags", None) or 0
+    return bool(state & _SLEEPING or flags & pybullet.URDF_ENABLE_SLEEPING)
