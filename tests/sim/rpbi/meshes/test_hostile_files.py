@@ -163,7 +163,8 @@ def test_what_is_wrong_with_a_urdf_is_named(tmp_path, case):
 
 def test_a_urdf_of_which_nothing_is_wrong_is_left_alone(tmp_path):
     path = tmp_path / "robot.urdf"
-    path.write_text(_urdf(MASSES.format("a", "1e0 "), LINK.format("b"), JOINT.format("a", "fixed", "a", "b")))
+    weighed = MASSES.format("a", "1e0 ").replace("</inertial>", '<inertia ixx="1" iyy="1" izz="1"/></inertial>')
+    path.write_text(_urdf(weighed, LINK.format("b"), JOINT.format("a", "fixed", "a", "b")))
     assert urdf_problems(str(path)) == [] and UrdfDocument(str(path)).root_link() == "a"
 
 

@@ -12,6 +12,7 @@ from custom_ros_tools.schema import HEAVIEST_KG, MAX_COORDINATE_M
 from robot_model.limits import MAX_MAGNITUDE
 
 from .document import Attribute, UrdfDocument
+from .elements import READ, Element
 
 LONGEST_NAME = 250
 """Largest length of a name [bytes]; PyBullet copies names into 1024 bytes on the stack."""
@@ -50,6 +51,21 @@ _NUMBERS = {
 """The largest number by element and attribute."""
 _VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
 """Attributes of three numbers."""
+_SHAPES = {
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "plane": ("normal",),
+    "mesh": ("filename",),
+}
+"""Attributes that each shape has."""
+_LIMITED = ("revolute", "prismatic")
+_INERTIA = ("ixx", "iyy", "izz")
+_CONTACT = (
+    *("inertia_scaling", "lateral_friction", "rolling_friction", "spinning_friction", "restitution"),
+    *("stiffness", "damping"),
+)
 
 
 def check_structure(document: UrdfDocument) -> None:
@@ -181,3 +197,63 @@ def _number_problem(tag: str, key: str, text: str) -> str:
     if (tag, key) == ("mass", "value") and numbers[0] < 0.0:
         return "must be >= 0 [kg]"
     return ""
+
+
+def missing_parts(document: UrdfDocument) -> Iterator[str]:
+    """Yields a sentence for each element or attribute that PyBullet needs and a URDF lacks, by link and joint.
+
+    PyBullet itself only reports "Cannot load URDF file".
+    """
+    if "name" not in document.root.attrib:
+        yield "<robot> has no name"
+    for link in document.root.iterfind("link"):
+        for fault in _link_faults(link):
+            yield f"link '{shortened(link.get('name', ''))}': {fault}"
+    for joint in document.joint_elements:
+        for fault in _joint_faults(joint):
+            yield f"joint '{shortened(joint.get('name', ''))}': {fault}"
+
+
+def _joint_faults(joint: Element) -> Iterator[str]:
+    if (kind := joint.get("type")) in _LIMITED and joint.find("limit") is None:
+        hint = ", or type continuous" if kind == "revolute" else ""
+        yield f'a {kind} joint needs <limit lower="" upper="" effort="" velocity=""/>{hint}'
+    dynamics = joint.find("dynamics")
+    if dynamics is not None and not dynamics.attrib.keys() & {"damping", "friction"}:
+        yield "<dynamics> needs damping or friction"
+
+
+def _link_faults(link: Element) -> Iterator[str]:
+    if (inertial := link.find("inertial")) is not None:
+        yield from _lacking(inertial, "mass", ("value",))
+        yield from _lacking(inertial, "inertia", _INERTIA)
+    if (contact := link.find("contact")) is not None:
+        for tag in _CONTACT:
+            yield from _lacking(contact, tag, ("value",)) if contact.find(tag) is not None else ()
+    for part in ("visual", "collision"):
+        for element in link.iterfind(part):
+            yield from _shape_faults(element)
+    for material in link.iterfind("visual/material"):
+        if "name" not in material.attrib:
+            yield "visual: <material> has no name"
+
+
+def _shape_faults(part: Element) -> Iterator[str]:
+    """Yields what PyBullet needs of the shape of a visual or a collision; it reads the first one."""
+    shapes = [shape for shape in part.iterfind("geometry/*") if shape.tag in READ]
+    if not shapes:
+        given = [f", got <{shortened(shape.tag)}>" for shape in part.iterfind("geometry/*")][:1]
+        yield f"{part.tag}: <geometry> needs one of {', '.join(_SHAPES)}{''.join(given)}"
+        return
+    for key in _SHAPES.get(shapes[0].tag, ()):
+        if key not in shapes[0].attrib:
+            yield f"{part.tag}: <{shapes[0].tag}> has no {key}"
+
+
+def _lacking(owner: Element, tag: str, keys: tuple[str, ...]) -> Iterator[str]:
+    """Yields what an element within another lacks."""
+    if (found := owner.find(tag)) is None:
+        yield f"<{owner.tag}> has no <{tag}>"
+        return
+    if lacking := [key for key in keys if key not in found.attrib]:
+        yield f"{owner.tag}: <{tag}> has no {', '.join(lacking)}"

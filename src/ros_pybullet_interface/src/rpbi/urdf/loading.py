@@ -5,6 +5,7 @@ import math
 import tempfile
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import Element, text_of
 from robot_model.urdf.files import found_mesh
-from robot_model.urdf.structure import check_structure, structure_problems
+from robot_model.urdf.structure import MAX_PROBLEMS, check_structure, missing_parts, structure_problems
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
@@ -56,7 +57,8 @@ def urdf_problems(path: str) -> list[str]:
         check_joints(path, document.root)
     except ConfigError as error:
         return [str(error)]
-    return [f"{path}: {problem}" for problem in _mesh_problems(document)]
+    faults = list(islice(missing_parts(document), MAX_PROBLEMS)) or _mesh_problems(document)
+    return [f"{path}: {fault}" for fault in faults]
 
 
 def check_joints(file: str, robot: Element) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from custom_ros_tools.config import load_config, replace_package
+from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from robot_model.geometry import Pose
@@ -18,6 +18,7 @@ from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.config.world import WorldConfig, main_file_model
 from rpbi.urdf.copies import joined_for_ros
 
+from .file_kinds import check_is_world, load_main_file, load_object_file
 from .legacy import MAIN
 from .objects import ObjectConfig, load_object, name_in, object_sections, parse_section, type_of
 
@@ -80,7 +81,7 @@ def load_world(
     Raises:
         ConfigError: With all problems of all files.
     """
-    data = ObjectEntry(path, overrides).apply_overrides(load_config(path))
+    data = ObjectEntry(path, overrides).apply_overrides(load_main_file(path))
     return _Reader(data, path, replace_package(path), robot_description).read()
 
 
@@ -130,6 +131,8 @@ class _Reader:
 
     def read(self) -> LoadedWorld:
         """Returns the world, or raise a ConfigError with all problems."""
+        if isinstance(self._data, Mapping):
+            check_is_world(self._data, self._file)
         try:
             model = main_file_model(object_sections())
             content = parse_section(MAIN, self._data, self._file, model, {"file": self._path})
@@ -179,7 +182,7 @@ class _Reader:
                 continue
             file = f"{entry.file} (changed by {key})" if entry.overrides else entry.file
             with self._noting_problems(file):
-                data = entry.apply_overrides(load_config(path))
+                data = entry.apply_overrides(load_object_file(path))
                 self._claim_name(data, file, "name")
                 context = {"file": path, "search_paths": search_paths, ROBOT_DESCRIPTION: self._robot_description}
                 yield data, file, context

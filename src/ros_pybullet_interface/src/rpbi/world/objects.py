@@ -10,6 +10,7 @@ from custom_ros_tools.plugins.table import config_of
 from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies import BODY_TYPES, Body, BodyConfig
 
+from .file_kinds import check_is_listed_right
 from .legacy import modernise
 
 _Model = TypeVar("_Model", bound=ConfigModel)
@@ -80,6 +81,8 @@ def load_object(kind: str, data: Mapping[str, Any], file: str, context: Mapping[
     try:
         section, model = _section_and_model(kind, file)
         if isinstance(data, Mapping):
+            if kind in BODY_TYPES:
+                check_is_listed_right(data, file, section, model.model_fields)
             data = {key: value for key, value in data.items() if key != TYPE}
         config = parse_section(section, data, file, model, context or {})
     except ConfigError as error:
