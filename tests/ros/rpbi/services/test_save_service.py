@@ -73,6 +73,16 @@ def test_a_world_is_what_it_was_and_goes_on_the_same(standing, tmp_path):
     elsewhere.close()
 
 
+def test_a_state_at_a_keyframe_has_no_commands(standing, tmp_path):
+    step(standing, 100)
+    file = tmp_path / "here.world"
+    assert save(file, keyframe=True) == f"saved tick 100 in {file}"
+    assert WorldState.read(file).commands == ()
+    expected = step(standing, 100)
+    assert restore(file) == "restored tick 100"
+    assert step(standing, 100) == expected
+
+
 def test_files_that_cannot_be_are_named_and_the_world_stays(standing, tmp_path):
     before = step(standing, 10)
     with pytest.raises(InterfaceError, match=r"expected the path of a \.world file, got '.*"):

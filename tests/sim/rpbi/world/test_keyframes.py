@@ -22,7 +22,7 @@ from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.keyframes import keyframe as keyframes
-from rpbi.world.keyframes.building import KeyframeTimer
+from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.keyframes.graph import GraphReader
 from rpbi.world.loading import load_object
 from rpbi.world.saved.command_log import RecordedCommand
@@ -215,11 +215,11 @@ def test_a_changed_command_or_keyframe_is_found_in_its_part(session):
     assert changed.difference is not None or "is not the recorded one" in changed.left_out[0]
 
 
-def test_a_timer_makes_keyframes_between_ticks(heap, caplog):
-    timer = KeyframeTimer(heap, 0.1)
+def test_a_maker_makes_keyframes_between_ticks(heap, caplog):
+    maker = KeyframeMaker(heap, 0.1)
     for tick in range(350):
         heap.step()
-        timer.poll()
+        maker.poll()
         if tick == 105:
             heap.change_dynamics("box0", ChangeDynamics(lateralFriction=0.3))  # while it is built
     moved = [each.tick for each in heap.commands.since(0)[1] if each.what == "keyframe"]
@@ -230,9 +230,36 @@ def test_a_timer_makes_keyframes_between_ticks(heap, caplog):
     heap.add("faulty_lab:Thing", {"name": "thing"}, "thing.yaml")
     for _ in range(250):
         heap.step()
-        timer.poll()
+        maker.poll()
     assert caplog.text.count("keyframe_every_s: no keyframe at tick") == 1
     assert [each.what for each in heap.commands.since(0)[1]].count("keyframe") == 3
+
+
+def test_a_maker_saves_the_state_of_a_keyframe(heap):
+    maker = KeyframeMaker(heap, 0.0)
+    asked = maker.save()
+    while not asked.done():
+        heap.step()
+        maker.poll()
+    state = asked.result()
+    assert state.commands == () and state.keyframe and state.tick == heap.clock.tick
+    again = World.from_state(state)
+    assert hash_later(again) == hash_later(heap)
+    again.close()
+    heap.add("faulty_lab:Thing", {"name": "thing"}, "thing.yaml")
+    refused = maker.save()
+    maker.poll()
+    with pytest.raises(InterfaceError, match="of another package"):
+        refused.result(0)
+
+
+def test_no_keyframe_is_made_while_a_state_is_restored(heap):
+    state = heap.save()
+    maker = KeyframeMaker(heap, 0.01)
+    heap.mailbox.hold(lambda: "the world is being restored")
+    for _ in heap.restoring(state):
+        maker.poll()
+    assert not heap.save().keyframe
 
 
 def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):

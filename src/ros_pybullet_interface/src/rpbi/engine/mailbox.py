@@ -48,6 +48,11 @@ class Mailbox:
             self._slots[slot] = value
 
     @property
+    def is_held(self) -> bool:
+        """Whether the world is busy, see `hold`."""
+        return self._busy is not None
+
+    @property
     def is_empty(self) -> bool:
         """Whether no value waits."""
         return not self._slots

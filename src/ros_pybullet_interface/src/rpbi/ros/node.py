@@ -26,7 +26,7 @@ from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.world import World
-from rpbi.world.keyframes.building import KeyframeTimer
+from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
 from rpbi.world_warnings import world_warnings
 
@@ -136,16 +136,15 @@ class SimulatorNode:
         helpers: list[Callable[[], None]] = [AttachmentPublisher(self._world).poll]
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
-        if config.keyframe_every_s:
-            helpers.append(KeyframeTimer(self._world, config.keyframe_every_s).poll)
+        keyframes = KeyframeMaker(self._world, config.keyframe_every_s)
         window = WindowTopics(self._world)
-        helpers += (self._cameras.poll, *window.polls)
+        helpers += (keyframes.poll, self._cameras.poll, *window.polls)
         self._simulation = Simulation(self._world, publishers, helpers)
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
         predictor = Predictor(self._simulation, ask, _max_predicted_ticks())
-        context = NodeContext(self._simulation, ask, self._objects, predictor, loading, state_folder())
+        context = NodeContext(self._simulation, ask, self._objects, predictor, loading, state_folder(), keyframes)
         window.serve(ask)
         for service in NODE_SERVICES:
             serve(service, context)

@@ -60,12 +60,13 @@ from rpbi.ros.headers import to_ros_time
 from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
+from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.loading import load_object, type_of
 
 from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
 from .prediction import Predictor, cancel_prediction, planned_input, predict
-from .states import restore, save
+from .states import restore, save, save_keyframe
 
 log = logging.getLogger(__name__)
 
@@ -95,6 +96,7 @@ class NodeContext(NamedTuple):
         predictor: Predicts from the present state.
         loading: Context for the files of objects, see `load_object`.
         state_folder: Folder that states are saved in and restored from.
+        keyframes: Makes keyframes between ticks.
     """
 
     simulation: Simulation
@@ -103,6 +105,7 @@ class NodeContext(NamedTuple):
     predictor: Predictor
     loading: Mapping[str, Any]
     state_folder: Path
+    keyframes: KeyframeMaker
 
 
 def _start(node: NodeContext, _: Any) -> Answer:
@@ -335,6 +338,7 @@ NODE_SERVICES = (
     Service("rpbi/step_with_inputs", StepWithInputs, _step_with_inputs),
     Service("rpbi/reset", Trigger, _reset),
     Service("rpbi/save", SetString, save),
+    Service("rpbi/save_keyframe", SetString, save_keyframe),
     Service("rpbi/restore", SetString, restore),
     Service("rpbi/predict", Predict, predict),
     Service("rpbi/cancel_prediction", Trigger, cancel_prediction),

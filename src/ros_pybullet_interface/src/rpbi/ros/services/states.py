@@ -1,8 +1,9 @@
-"""The services `rpbi/save` and `rpbi/restore`: states of the world as files in one folder."""
+"""The services `rpbi/save`, `rpbi/save_keyframe` and `rpbi/restore`: states of the world as files in one folder."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,19 @@ def state_folder() -> Path:
 
 def save(node: Any, request: SetStringRequest) -> Answer:
     """Saves the state of the world in a file, from which it can be restored."""
-    path = state_file(node.state_folder, request.data)
+    return _write(node, request.data, lambda: node.ask(node.simulation.world.save))
+
+
+def save_keyframe(node: Any, request: SetStringRequest) -> Answer:
+    """Makes a keyframe, and saves the state there: the file has no commands, and is restored at once."""
+    return _write(node, request.data, lambda: node.ask.wait_for(node.ask(node.keyframes.save)))
+
+
+def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
+    path = state_file(node.state_folder, name)
     if os.path.lexists(path) and not (path.is_file() and WorldState.is_file(path)):
         raise InterfaceError(f"{path}: exists, and is no saved state: it is not overwritten")
-    state = node.ask(node.simulation.world.save)
+    state = save()
     try:
         state.write(path)
     except OSError as error:

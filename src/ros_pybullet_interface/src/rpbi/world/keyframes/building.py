@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
@@ -13,6 +15,7 @@ from rpbi.config.world import WorldConfig
 from rpbi.engine.client import Client
 from rpbi.world.load_log import apply
 from rpbi.world.saved.recipe import Recipe
+from rpbi.world.saved.state import WorldState
 
 log = logging.getLogger(__name__)
 
@@ -52,14 +55,14 @@ class FreshClient:
         self.pb.disconnect()
 
 
-class KeyframeTimer:
-    """Makes keyframes of a `World` at a period, a part at each call of `poll`.
+class KeyframeMaker:
+    """Makes keyframes of a running `World`, a part at each call of `poll`: at a period, and when somebody asks.
 
-    A keyframe that is refused is reported once; there is no other one until the world is reset.
+    A keyframe of the period that is refused is reported once; there is no other one until the world is reset.
 
     Args:
         world: The world.
-        every_s: Period [s] of the world's time.
+        every_s: Period [s] of the world's time; 0 is none.
 
     Attributes:
         longest_s: Longest time that a part of the last keyframe took [s].
@@ -67,31 +70,63 @@ class KeyframeTimer:
 
     def __init__(self, world: Any, every_s: float) -> None:
         self._world = world
-        self._ticks: int = max(1, round(every_s / world.clock.dt_s))
+        self._ticks = max(1.0, round(every_s / world.clock.dt_s)) if every_s else math.inf
         self.longest_s = 0.0
         self._parts: Iterator[None] | None = None
+        self._asked: list[Future[WorldState]] = []
         self._is_refused = False
         self._resets, self._last = world.resets, world.clock.tick
 
+    def save(self) -> Future[WorldState]:
+        """Returns the state at the next keyframe, which is made in the coming calls of `poll`.
+
+        It fails with an InterfaceError if the keyframe is refused.
+        """
+        asked: Future[WorldState] = Future()
+        self._asked.append(asked)
+        return asked
+
     def poll(self) -> None:
-        """Makes the next part, if a keyframe is due or under way."""
+        """Makes the next part, if a keyframe is due, asked for or under way, and the world is not being restored."""
         world = self._world
+        if world.mailbox.is_held:
+            return
         if world.resets != self._resets:
             self._parts, self._is_refused = None, False
             self._resets, self._last = world.resets, world.clock.tick
         if self._parts is None:
-            if self._is_refused or world.clock.tick - self._last < self._ticks:
+            is_due = not self._is_refused and world.clock.tick - self._last >= self._ticks
+            if not is_due and not self._asked:
                 return
             self._parts, self.longest_s, self._last = world.keyframe_in_parts(), 0.0, world.clock.tick
         begin_s = time.perf_counter()
         try:
             next(self._parts)
         except StopIteration:
-            self._parts = None
+            self._finish(world.save)
         except InterfaceError as error:
-            self._parts, self._is_refused = None, True
-            log.warning("keyframe_every_s: no keyframe at tick %d, nor later: %s", world.clock.tick, error)
+            self._refuse(error)
             return
         self.longest_s = max(self.longest_s, time.perf_counter() - begin_s)
         if self._parts is None:
             log.debug("keyframe at tick %d: its longest part took %.3g s", world.clock.tick, self.longest_s)
+
+    def _refuse(self, error: InterfaceError) -> None:
+        if not self._asked:
+            self._is_refused = True
+            log.warning("keyframe_every_s: no keyframe at tick %d, nor later: %s", self._world.clock.tick, error)
+
+        def fail() -> WorldState:
+            raise error
+
+        self._finish(fail)
+
+    def _finish(self, state: Callable[[], WorldState]) -> None:
+        """Ends a keyframe, and answers those who have asked for one."""
+        asked, self._asked, self._parts = self._asked, [], None
+        for each in asked:
+            if each.set_running_or_notify_cancel():
+                try:
+                    each.set_result(state())
+                except InterfaceError as error:
+                    each.set_exception(error)
