@@ -124,10 +124,10 @@ def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
 
 def test_the_page_on_environments_shows_what_it_says(tmp_path):
     blocks = BLOCK.findall((ROOT / "docs/gym.md").read_text())
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     result = run("\nprint('-----')\n".join(blocks), tmp_path)
     assert result.returncode == 0, result.stderr
-    first, _, own, varied, vector, mode = result.stdout.split("-----\n")
+    first, _, _, own, varied, vector, mode = result.stdout.split("-----\n")
     assert first.startswith("['box/pose', 'goal', 'hand', 'kuka_lwr/joints'] False\n(")
     assert own.startswith("Box(-1.0, 1.0, (7,), float32) Box(0.0, 2.0, (1,), float32) [0.15")
     masses = numbers(varied)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib
 import sys
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
 
-from custom_ros_tools.errors import ConfigError, MissingDependency
+from custom_ros_tools.errors import ConfigError, MissingDependency, UnknownNameError
 from rpbi.gym.checks import problems
+from rpbi.gym.env import register
 from rpbi.gym.randomization import Randomization
 
 
@@ -43,6 +45,22 @@ def test_values_outside_of_a_space_are_named():
     assert problems(space, {**good, "a": np.full(2, 2, np.float32)})[0].startswith("observation['a']: expected numbers")
     assert problems(space, {**good, "b": 3}) == ["observation['b']: expected one of Discrete(3), got 3"]
     assert problems(space, [1]) == ["observation: expected a dict of ['a', 'b'], got list"]
+
+
+def test_unknown_arguments_are_answered_with_the_known_ones():
+    register("rpbi/Mistaken-v0", "world.yaml", "reach")
+    known = "known are world, task, randomization, cameras, render_mode"
+    message = f"unknown argument of an environment 'randomisation': {known}; did you mean 'randomization'?"
+    for make in (
+        lambda: gymnasium.make("rpbi/Mistaken-v0", randomisation={}),
+        lambda: gymnasium.make_vec("rpbi/Mistaken-v0", num_envs=2, vectorization_mode="sync", randomisation={}),
+        lambda: register("rpbi/Other-v0", "world.yaml", "reach", randomisation={}),
+    ):
+        with pytest.raises(UnknownNameError) as caught:
+            make()
+        assert str(caught.value) == message
+    with pytest.raises(UnknownNameError, match="'wrokers': .*; did you mean 'workers'?"):
+        gymnasium.make_vec("rpbi/Mistaken-v0", num_envs=2, wrokers=1)
 
 
 def test_without_gymnasium_the_extra_is_named(monkeypatch):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -28,6 +28,8 @@ from .tasks import TASKS
 from .views import Image, Views
 
 MODES = ("human", "rgb_array")
+ARGUMENTS = ("world", "task", "randomization", "cameras", "render_mode")
+"""Names of the arguments of an environment."""
 
 
 class WorldEnv(gymnasium.Env[Any, Any]):
@@ -48,7 +50,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     Raises:
         ConfigError: If a file is wrong; it lists all problems.
         PluginError: If a task of another package fails.
-        UnknownNameError: If there is no such task or camera.
+        UnknownNameError: If there is no such task, camera or argument.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES)}
@@ -61,7 +63,9 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         randomization: str | Mapping[str, Any] | None = None,
         cameras: Sequence[str] = (),
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
+        require_arguments(unknown)
         if render_mode not in (None, *MODES):
             raise ValueError(f"render_mode: expected None or one of {', '.join(MODES)}, got '{render_mode}'")
         varied = Randomization.read(randomization)
@@ -149,6 +153,14 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         return spaces.Dict({**space.spaces, **self._views.spaces})
 
 
+def require_arguments(given: Iterable[str], further: Iterable[str] = ()) -> None:
+    """Raises an UnknownNameError if a name is none of ARGUMENTS and of further ones."""
+    known = [*ARGUMENTS, *further]
+    for name in given:
+        if name not in known:
+            raise UnknownNameError("argument of an environment", name, known)
+
+
 def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) -> WorldTask:
     """Makes a task for a world, see `WorldEnv`.
 
@@ -231,7 +243,11 @@ def register(name: str, world: str, task: Any, **options: Any) -> None:
         world: Main YAML file of the world.
         task: The task, see `WorldEnv`.
         options: Further options of `WorldEnv`; those of `gymnasium.make` override them.
+
+    Raises:
+        UnknownNameError: If there is no such option.
     """
+    require_arguments(options)
     gymnasium.register(
         name,
         entry_point="rpbi.gym.env:WorldEnv",

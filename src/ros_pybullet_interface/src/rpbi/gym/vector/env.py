@@ -22,7 +22,7 @@ from gymnasium.vector.utils import batch_space, iterate
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.processes.child import start_child
 from rpbi.gym.checks import check_action
-from rpbi.gym.env import WorldEnv
+from rpbi.gym.env import WorldEnv, require_arguments
 
 from .arrays import SharedArrays
 
@@ -275,5 +275,10 @@ def make_vector(
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     **options: Any,
 ) -> WorldVectorEnv:
-    """Makes a vector of equal environments, for `gymnasium.make_vec`; the options are those of `WorldEnv`."""
+    """Makes a vector of equal environments, for `gymnasium.make_vec`; the options are those of `WorldEnv`.
+
+    Raises:
+        UnknownNameError: If there is no such option.
+    """
+    require_arguments(options, ("workers", "autoreset_mode"))
     return WorldVectorEnv([partial(WorldEnv, **options)] * num_envs, workers, autoreset_mode)
