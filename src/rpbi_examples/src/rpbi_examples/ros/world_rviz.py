@@ -1,0 +1,71 @@
+"""RViz for any world: with displays for its contact forces and camera images."""
+
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import rospkg
+import rospy
+import yaml
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.files import atomic_file
+from rpbi.config.sensors import FIRST_TOPIC_NAME
+from rpbi.world.loading import LoadedWorld, load_world
+
+_log = logging.getLogger(__name__)
+CONFIG = "-d"
+"""Option of RViz that names its configuration."""
+
+
+def main() -> None:
+    """Becomes RViz, with the arguments of this program; its configuration gets the displays of the running world.
+
+    Without a simulator that is configured by a file, or if that is wrong, which the simulator reports, there are none.
+    """
+    arguments = sys.argv[1:]
+    place = arguments.index(CONFIG) + 1
+    config = yaml.safe_load(Path(arguments[place]).read_text(encoding="utf-8"))
+    try:
+        world = _world()
+        config["Visualization Manager"]["Displays"] += _displays_of(world)
+        target = Path(rospkg.get_ros_home()) / "rviz" / f"{Path(world.file).parent.name}_{Path(world.file).stem}.rviz"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(target) as part:
+            part.write_text(yaml.safe_dump(config, sort_keys=False), encoding="utf-8")
+        arguments[place] = str(target)
+    except (InterfaceError, OSError, KeyError) as error:
+        _log.warning("RViz has no displays for contacts and cameras: %s", error)
+    os.execvp("rviz", ["rviz", *arguments])
+
+
+def _world() -> LoadedWorld:
+    """Returns the world that the simulator of this namespace is configured with."""
+    logging.getLogger("rpbi").setLevel(logging.ERROR)  # the simulator logs its warnings
+    given = rospy.get_param("ros_pybullet_interface")
+    file = given["config_file"]
+    if not file.startswith(("{", "package://")):
+        file = os.path.join(str(given.get("working_directory", "")).rstrip("\n"), file)
+    return load_world(file, overrides=given.get("config") or {})
+
+
+def _displays_of(world: LoadedWorld) -> Iterator[dict[str, Any]]:
+    """Yields displays for contact forces and camera images; of several cameras, only the first one is switched on."""
+    for each in world.objects:
+        contacts = getattr(each.config, "contacts", None)
+        if contacts is not None and contacts.arrows_hz:
+            topic = f"rpbi/{each.config.name}/contacts/arrows"
+            yield _display(
+                "MarkerArray", f"Forces on {each.config.name}", True, {"Marker Topic": topic, "Queue Size": 10}
+            )
+    for number, camera in enumerate(world.cameras):
+        name = FIRST_TOPIC_NAME if number == 0 else camera.config.name
+        options = {"Image Topic": f"rpbi/{name}/colour/image", "Transport Hint": "raw", "Queue Size": 2}
+        yield _display("Image", f"Image of {camera.config.name}", number == 0, options)
+
+
+def _display(kind: str, name: str, is_on: bool, options: dict[str, Any]) -> dict[str, Any]:
+    return {"Class": f"rviz/{kind}", "Name": name, "Enabled": is_on, "Value": is_on, **options}
