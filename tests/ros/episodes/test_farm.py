@@ -30,6 +30,7 @@ from episodes.ros.farm.farm import WORKER, Farm
 from episodes.ros.farm.maker import EpisodeMaker
 from episodes.ros.farm.remote import make_remotely
 from episodes.ros.verification import verify
+from rpbi_utils import bag_to_images
 
 ROOT = Path(__file__).resolve().parents[3]
 CONSOLE = (sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"))
@@ -105,6 +106,30 @@ def test_episodes_are_those_that_a_recorder_would_write(alone):
         LOG,
         "files",
     }
+
+
+def test_images_of_cameras_are_recorded_on_request(world, run, tmp_path):
+    camera = {"name": "eye", "hz": 20, "intrinsics": {"width": 64, "height": 48}, "object_tf": {"tf_id": "rpbi/eye"}}
+    pose = {"tf_id": "rpbi/eye", "position": [0.0, 0.0, 2.0], "rpy": [np.pi, 0.0, 0.0]}
+    red = {"shapeType": "GEOM_BOX", "halfExtents": [0.1, 0.1, 0.1], "rgbaColor": [1.0, 0.0, 0.0, 1.0]}
+    bodies: dict[str, Any] = {"collision": (FLOOR,), "dynamic": (box(createVisualShape=red),), "rgbd_sensor": camera}
+    path = write_world(tmp_path, **bodies, poses=[pose])
+    for out in ("first", "second"):
+        code, text = run(*words(path, tmp_path / out, episodes=1, jobs=1), "--images")
+        assert code == 0, text
+    assert digests(tmp_path / "first") == digests(tmp_path / "second")
+    assert verify(EpisodeFolder(tmp_path / "first"), 0).is_same
+    bag = EpisodeFolder(tmp_path / "first").folder_of(0) / BAG
+    images = list(bag_to_images(bag, "/rpbi/camera/colour/image/compressed"))
+    stamps = [time_s for time_s, _ in images]
+    assert len(images) > 3 and np.diff(stamps) == pytest.approx(0.05)
+    assert images[0][1].shape == (48, 64, 3) and images[0][1].std() > 5.0 and (images[0][1] != images[-1][1]).any()
+    code, text = run(*words(path, tmp_path / "first", episodes=1))
+    assert code == 1 and "farm.yaml: images: True there, False asked for" in text
+    code, text = run(*words(world, tmp_path / "none", episodes=1), "--images")
+    assert code == 1 and "rgbd_sensor: expected a camera for --images, got none" in text
+    code, text = run(*words(write_world(tmp_path, **bodies), tmp_path / "none", episodes=1, jobs=1), "--images")
+    assert code == 1 and "episode 0: camera 'eye' has no image: expected its frame in `poses`, or its pose" in text
 
 
 def test_workers_that_are_killed_cost_their_episode_alone(world, alone, tmp_path):

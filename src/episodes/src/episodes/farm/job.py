@@ -38,6 +38,7 @@ class FarmJob:
         ticks: Length of an episode that its policy does not end.
         world_sha256: SHA-256 of the description of the world, see `World.describe`.
         policy_sha256: SHA-256 of the file of the policy.
+        images: Whether the colour images of cameras are recorded.
         python_path: Folders in which the policy is looked for, too.
         facts: Further attributes of each `Episode`.
     """
@@ -48,6 +49,7 @@ class FarmJob:
     ticks: int
     world_sha256: str
     policy_sha256: str
+    images: bool = False
     python_path: tuple[str, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
@@ -75,8 +77,8 @@ class FarmJob:
 
     def _changes(self, there: Mapping[str, Any]) -> list[str]:
         """Returns sentences on the differences; of files whose names differ, the contents are not compared."""
-        own = self._identity()
-        changed = [key for key in own if there.get(key) != own[key]]
+        own, defaults = self._identity(), {each.name: each.default for each in fields(self)}
+        changed = [key for key in own if there.get(key, defaults[key]) != own[key]]
         values = [
             f"{key}: {printable(str(there.get(key)), 200)} there, {own[key]} asked for"
             for key in changed

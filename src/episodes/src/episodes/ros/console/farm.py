@@ -24,6 +24,7 @@ def farm(
     seed: Annotated[int, Argument("N", parse=int)] = 0,
     seconds: Annotated[float, Argument("S", parse=number, excludes="length")] = 10.0,
     ticks: Annotated[int, Argument("N", parse=int, excludes="length")] = 0,
+    images: Annotated[bool, Argument("")] = False,
     jobs: Annotated[int | None, Argument("N", parse=int)] = None,
     address: Annotated[str | None, Argument("HOST:PORT")] = None,
     disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
@@ -37,7 +38,7 @@ def farm(
 
     Usage:
         ./rpbi farm WORLD.yaml --policy MODULE:CLASS --episodes N [--out DIR] [--seed N] [--seconds S | --ticks N]
-                    [--jobs N] [--address HOST:PORT] [--disk-reserve-mb MB]
+                    [--images] [--jobs N] [--address HOST:PORT] [--disk-reserve-mb MB]
 
     Args:
         WORLD.yaml: the world
@@ -47,6 +48,7 @@ def farm(
         seed: seed of the farm; that of episode n is (N, n); 0 without it
         seconds: length of an episode that its policy does not end, in the world's time; 10 without it
         ticks: the same in ticks
+        images: records the colour images of all cameras, too, as JPEG
         jobs: episodes at once, each in a process of its own; the number of processors without it
         address: head of a Ray cluster that makes them instead, or auto; needs `./rpbi setup farm`
         disk_reserve_mb: free space of the disk that is never used; 200 without it
@@ -56,7 +58,7 @@ def farm(
             raise UsageError(f"{flag}: expected at least 1, got {value}")
     if seed < 0 or seconds <= 0.0:
         raise UsageError(f"--seed and --seconds: expected positive numbers, got {seed} and {seconds:g}")
-    folder, made = EpisodeFolder(out), Farm(world, policy, seed, seconds, ticks)
+    folder, made = EpisodeFolder(out), Farm(world, policy, seed, seconds, ticks, images)
     with made.claimed(folder):
         numbers = made.missing(folder, episodes)
         labels: Counter[str] = Counter()

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from episodes.errors import EpisodeError
 from episodes.farm.job import EpisodeOutcome, FarmJob, digest, policy_digest
 from episodes.farm.policy import POLICIES
@@ -38,13 +38,16 @@ class Farm:
         seed: Seed of the farm.
         seconds: Length of an episode that its policy does not end, in the world's time [s].
         ticks: The same in ticks; 0 if `seconds` counts.
+        images: Whether the colour images of cameras are recorded.
 
     Raises:
-        ConfigError: If the world is wrong, or there is no such policy.
+        ConfigError: If the world is wrong or has no camera for images, or there is no such policy.
         PhysicsError: If PyBullet cannot load the world.
     """
 
-    def __init__(self, world: str, policy: str, seed: int = 0, seconds: float = 10.0, ticks: int = 0) -> None:
+    def __init__(
+        self, world: str, policy: str, seed: int = 0, seconds: float = 10.0, ticks: int = 0, images: bool = False
+    ) -> None:
         here = os.getcwd()
         if here not in sys.path:
             sys.path.append(here)
@@ -52,11 +55,14 @@ class Farm:
         path = world if world.startswith(("{", "package://")) else str(Path(world).absolute())
         built = new_world(load_world(path))
         try:
+            if images and not built.cameras:
+                raise ConfigError([Problem(path, "rgbd_sensor", "expected a camera for --images, got none")])
             self._description = built.describe()
             length = ticks or max(1, round(seconds / built.clock.dt_s))
         finally:
             built.close()
-        self.job = FarmJob(path, policy, seed, length, digest(self._description), policy_digest(found), (here,))
+        world_sha256, policy_sha256 = digest(self._description), policy_digest(found)
+        self.job = FarmJob(path, policy, seed, length, world_sha256, policy_sha256, images, (here,))
 
     def missing(self, folder: EpisodeFolder, count: int) -> list[int]:
         """Returns the numbers below a count of episodes that are not in a folder; discarded ones count as there."""

@@ -74,7 +74,7 @@ class EpisodeMaker:
         try:
             world = new_world(self._loaded)
             self._check(world)
-            with EpisodeBag(part / BAG, world) as bag:
+            with EpisodeBag(part / BAG, world, job.images) as bag:
                 episode.label = EpisodeRun(job, self._policy, number, world).run(bag)
             episode.seconds = round(world.clock.time_s, 9)
             episode.state, episode.topics = "complete", measure_topics(part / BAG)
