@@ -67,6 +67,11 @@ class Pacer:
         return True
 
     @property
+    def period_s(self) -> float:
+        """Wall time of a tick [s]; 0 if ticks are made as fast as possible."""
+        return self._period_s
+
+    @property
     def is_free(self) -> bool:
         """Whether ticks are made as fast as possible."""
         return not self._period_s

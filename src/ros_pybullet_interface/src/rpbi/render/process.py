@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from rpbi.engine.priority import run_normally, yield_to_simulator
+
 from .channel import Channel
 from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Sink
@@ -24,7 +26,6 @@ from .messages import (
     WorldChanged,
 )
 from .mirror import Mirror
-from .priority import run_normally, yield_to_simulator
 from .renderers import Renderer, open_renderer
 
 log = logging.getLogger(__name__)

@@ -18,6 +18,7 @@ from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.urdf.files import write_description
+from rpbi.engine.priority import RealTimePriority
 from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.static_frames import StaticFrames
@@ -72,6 +73,13 @@ def _max_predicted_ticks() -> int:
         raise ConfigError(
             [Problem("~max_predicted_ticks", "", f"expected a whole number of at least 1, got {given!r}")]
         )
+    return given
+
+
+def _wants_real_time_priority() -> bool:
+    given = rospy.get_param("~real_time_priority", True)
+    if not isinstance(given, bool):
+        raise ConfigError([Problem("~real_time_priority", "", f"expected true or false, got {given!r}")])
     return given
 
 
@@ -139,7 +147,8 @@ class SimulatorNode:
         keyframes = KeyframeMaker(self._world, config.keyframe_every_s)
         window = WindowTopics(self._world)
         helpers += (keyframes.poll, self._cameras.poll, *window.polls)
-        self._simulation = Simulation(self._world, publishers, helpers)
+        self._priority = RealTimePriority() if _wants_real_time_priority() else None
+        self._simulation = Simulation(self._world, publishers, helpers, self._priority)
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
@@ -169,6 +178,8 @@ class SimulatorNode:
             if self._world.is_connected:
                 raise
         finally:
+            if self._priority is not None:
+                self._priority.end()  # while ROS shuts down, a thread of rospy spins
             has_gone = not self._world.is_connected
             send_at_once()  # such as the results of goals that it ends in the middle of
             self._cameras.close()

@@ -33,6 +33,11 @@ PARAMETERS = (
         "~max_predicted_ticks", False, "Most ticks of all candidates of a `rpbi/predict`; 1,000,000 by default."
     ),
     NodeParameter(
+        "~real_time_priority",
+        False,
+        "Whether the node runs with real-time priority while it needs less than half a processor; true by default.",
+    ),
+    NodeParameter(
         "~config",
         False,
         "The main YAML file as a mapping, or with `~config_file` the keys that differ; one of both is required.",

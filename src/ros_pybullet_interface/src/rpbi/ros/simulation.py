@@ -11,6 +11,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.config.world import checked_real_time_factor
 from rpbi.engine.pacer import Pacer
+from rpbi.engine.priority import RealTimePriority
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
 from rpbi.ros.publishers.status import StatePublisher, StatusPublisher
@@ -84,7 +85,13 @@ class Simulation:
     must return at once.
     """
 
-    def __init__(self, world: World, publishers: SamplePublishers, helpers: Sequence[Callable[[], None]]) -> None:
+    def __init__(
+        self,
+        world: World,
+        publishers: SamplePublishers,
+        helpers: Sequence[Callable[[], None]],
+        priority: RealTimePriority | None = None,
+    ) -> None:
         self.world = world
         self.running = False
         self._failure: str | None = None
@@ -100,7 +107,8 @@ class Simulation:
         self._before_tick = publishers.cameras.before_tick
         self._pacer = Pacer(world.clock.dt_s, world.config.real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._status = StatusPublisher(world, self._pacer, publishers.cameras.facts, publishers.cameras.fault)
+        cameras = publishers.cameras
+        self._status = StatusPublisher(world, self._pacer, cameras.facts, cameras.fault, priority)
         self._state = StatePublisher(world, self._pacer)
         self._commands = CommandPublisher(world)
 

@@ -13,9 +13,9 @@ from rosnode import cleanup_master_blacklist
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from rpbi.engine.priority import run_normally
 from rpbi.render.client import RenderClient
 from rpbi.render.frame import Camera
-from rpbi.render.priority import run_normally
 from rpbi.ros.headers import named_frame
 from rpbi.samples import SceneSample
 from rpbi.sensors.rgbd import RgbdSensor

@@ -16,6 +16,7 @@ from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Load, Pacer
+from rpbi.engine.priority import RealTimePriority
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.messages.topics import FastTopic
@@ -132,12 +133,19 @@ class StatusPublisher:
         pacer: Its pacer.
         facts: Returns further values for the diagnostics.
         fault: Returns a fault beside the world, of which the diagnostics warn; an empty text if there is none.
+        priority: Scheduling of the node's threads, which depends on its load; None: it is never changed.
     """
 
     def __init__(
-        self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]], fault: Callable[[], str]
+        self,
+        world: World,
+        pacer: Pacer,
+        facts: Callable[[], Mapping[str, str]],
+        fault: Callable[[], str],
+        priority: RealTimePriority | None,
     ) -> None:
         self._world, self._clock, self._pacer, self._facts, self._fault = world, world.clock, pacer, facts, fault
+        self._priority = priority
         self._load = Load.now(world.physics_s, world.clock.tick)
         """At the last message of the diagnostics."""
         self._slow_periods = 0
@@ -179,7 +187,11 @@ class StatusPublisher:
             self._slow_periods += 1
         else:
             self._slow_periods = 0
-        self._warn_of_cause(status.message)
+        before, self._load = self._load, Load.now(self._world.physics_s, self._clock.tick)
+        load = self._load.since(before)
+        if self._priority is not None:
+            self._priority.review(load, self._pacer.period_s)
+        self._warn_of_cause(status.message, load)
         if fault := self._fault():
             status.level, status.message = DiagnosticStatus.WARN, f"{status.message}; {fault}"
         values = {
@@ -189,6 +201,7 @@ class StatusPublisher:
             "lost_s_total": f"{self._pacer.lost_s:.3f}",
             "tick": str(self._clock.tick),
             "time_s": f"{self._clock.time_s:.6f}",
+            "real_time_priority": str(self._priority is not None and self._priority.acts),
             **self._facts(),
         }
         status.values = [KeyValue(key, value) for key, value in values.items()]
@@ -196,12 +209,11 @@ class StatusPublisher:
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         self._diagnostics.publish(message)
 
-    def _warn_of_cause(self, message: str) -> None:
+    def _warn_of_cause(self, message: str, load: Load) -> None:
         """Warns of the cause when the world has been too slow for a while, once for each cause."""
-        before, self._load = self._load, Load.now(self._world.physics_s, self._clock.tick)
         if self._slow_periods < SLOW_PERIODS or WINDOW_ADVICE in self._advice:
             return
-        reason, window = self._load.since(before).reason(self._clock.dt_s), self._world.window
+        reason, window = load.reason(self._clock.dt_s), self._world.window
         if window is not None and (call_s := window.seconds_per_call()) > SLOW_CALL_S:
             reason = f"with its window, PyBullet takes {1e3 * call_s:.1f} ms a call; {WINDOW_ADVICE}"
         advice = reason.rpartition("; ")[2]
