@@ -31,7 +31,7 @@ def ball(name: str = "ball", radius_m: float = 0.1, **more: Any) -> dict[str, An
         "name": name,
         "createVisualShape": shape,
         "createCollisionShape": shape,
-        "changeDynamics": {"linearDamping": 0.0, "angularDamping": 0.0},
+        "changeDynamics": {"linearDamping": 0.0, "angularDamping": 0.0, "rollingFriction": 0.0},
         "baseMass": 1.0,
         **more,
     }

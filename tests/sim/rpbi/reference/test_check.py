@@ -109,3 +109,15 @@ def test_classes_of_a_workspace_that_the_user_has_sourced_are_found(tmp_path):
     assert code == 0 and lines[1].split() == ["their_lab:Thing", "thing"], told
     code, _, told = check("world.yaml", tmp_path, CMAKE_PREFIX_PATH="", PYTHONPATH=str(modules))
     assert code == 1 and "no module 'their_lab'" in told[0]
+
+
+def test_a_camera_that_this_machine_cannot_draw_is_reported(tmp_path):
+    eye = {"name": "eye", "object_tf": {"tf_id": "eye"}}
+    poses = [{"tf_id": "eye"}]
+    write_world(tmp_path, collision=(BOX_FLOOR,), poses=poses, rgbd_sensor={**eye, "hz": 20_000.0})
+    code, _, told = check("world.yaml", tmp_path)
+    (warning,) = [line for line in told if "machine" in line]
+    start = "warning: world.yaml: hz: 20000 is too much for 'eye': this machine draws at most "
+    assert code == 0 and warning.startswith(start) and warning.endswith(" images of 640 x 480 a second")
+    write_world(tmp_path, collision=(BOX_FLOOR,), poses=poses, rgbd_sensor={**eye, "hz": 0.5})
+    assert not [line for line in check("world.yaml", tmp_path)[2] if "machine" in line]

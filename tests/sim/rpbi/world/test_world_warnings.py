@@ -10,7 +10,7 @@ import pytest
 from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
 from rpbi.world import World
-from rpbi.world_warnings import PLANE_ADVICE, world_warnings
+from rpbi.world_warnings import world_warnings
 
 ROOT = Path(__file__).resolve().parents[4]
 SHIPPED = [path for path in sorted(ROOT.glob("src/*/configs/**/*.yaml")) if "\ntimeStep:" in path.read_text()]
@@ -178,11 +178,11 @@ def test_a_ball_on_a_plane_a_box_on_a_table_a_wall_and_weightlessness_are_fine(w
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT / "src")))
-def test_no_shipped_world_has_anything_on_a_plane(path):
+def test_shipped_worlds_have_no_warnings_but_of_frames_of_other_nodes(path):
     world = World.from_file(str(path), connection_mode=pybullet.DIRECT)
-    told = [str(warning) for warning in world_warnings(world) if PLANE_ADVICE in warning.message]
+    found = [str(warning) for warning in world_warnings(world) if "follows it" not in warning.message]
     world.close()
-    assert told == []
+    assert found == []
 
 
 def test_no_page_and_no_template_shows_a_plane_to_copy():
@@ -200,3 +200,120 @@ def test_bodies_in_maximal_coordinates_of_which_pybullet_tells_no_shapes_have_wa
         collision=(FLOOR,), urdfs=({**cube, "loadURDF": {**cube["loadURDF"], "basePosition": [0, 0, 1]}},)
     )
     assert any("cube" in each for each in found)
+
+
+def told(warnings: list[str], part: str) -> list[str]:
+    return [each for each in warnings if part in each]
+
+
+def test_gravity_upwards_and_positions_in_millimetres(warnings_of):
+    far = box("far", basePosition=[500.0, 0.0, 300.0])
+    arm = iiwa(loadURDF={"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0, 150.0, 0]})
+    poses = [{"tf_id": "bench", "position": [0.0, 0.0, 750.0]}]
+    assert warnings_of(dynamic=(far,), robots=(arm,), poses=poses, setGravity={"gravZ": 9.81}) == [
+        "world.yaml: poses[0].position: is 750 m from the origin: positions are in metres",
+        "far.yaml: basePosition: is 583.1 m from the origin: positions are in metres",
+        "iiwa.yaml: loadURDF.basePosition: is 150 m from the origin: positions are in metres",
+        "world.yaml: setGravity.gravZ: 9.81 m/s^2 points upwards, so that bodies rise; on Earth it is -9.81",
+    ]
+
+
+@pytest.mark.parametrize("shape", [{"shapeType": "GEOM_SPHERE", "radius": 0.1}, {"shapeType": "GEOM_CAPSULE"}])
+def test_round_bodies_without_rolling_friction_on_a_level_floor(warnings_of, shape):
+    def round_body(**dynamics):
+        return ball(basePosition=[0.0, 0.0, 2.0], createCollisionShape=shape, changeDynamics=dynamics)
+
+    (only,) = warnings_of(collision=(BOX_FLOOR,), dynamic=(round_body(lateralFriction=0.5),))
+    assert only.startswith("ball.yaml: changeDynamics.rollingFriction: 'ball' rolls on 'floor' without end")
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(round_body(rollingFriction=0.001),)) == []
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(round_body(rollingFriction=0.0),)) == []
+    sloped = {**BOX_FLOOR, "baseOrientation": [0.1, 0.0, 0.0, 0.995]}
+    assert warnings_of(collision=(sloped,), dynamic=(round_body(lateralFriction=0.5),)) == []
+
+
+INERTIA = "<inertia ixx='1' iyy='1' izz='1'/>"
+
+
+def chain(*joints: str, root_kg: float = 1.0, effort: float = 1.0, upper: float = 1.0) -> str:
+    """Returns a URDF of links of 1 kg on joints of these types, one after the other."""
+    links = [f"<link name='l0'><inertial><mass value='{root_kg}'/>{INERTIA}</inertial></link>"]
+    for index, kind in enumerate(joints):
+        links.append(
+            f"<link name='l{index + 1}'><inertial><mass value='1'/>{INERTIA}</inertial></link>"
+            f"<joint name='j{index}' type='{kind}'><parent link='l{index}'/><child link='l{index + 1}'/>"
+            f"<limit lower='-1' upper='{upper}' effort='{effort}' velocity='1'/></joint>"
+        )
+    return f"<robot name='chain'>{''.join(links)}</robot>"
+
+
+def test_an_arm_that_is_not_fixed(tmp_path, warnings_of):
+    def warnings_about(urdf, **load):
+        (tmp_path / "arm.urdf").write_text(urdf)
+        arm = iiwa("arm", loadURDF={"fileName": "arm.urdf", "basePosition": [0, 0, 1], **load})
+        return told(warnings_of(collision=(BOX_FLOOR,), robots=(arm,)), "useFixedBase")
+
+    arm = chain(*["revolute"] * 4)
+    (only,) = warnings_about(arm)
+    assert only.startswith("arm.yaml: loadURDF.useFixedBase: missing, so this arm is not fixed and will fall over")
+    assert warnings_about(arm, useFixedBase=True) == warnings_about(arm, useFixedBase=False) == []
+    assert warnings_about(chain(*["revolute"] * 4, root_kg=0.0)) == [], "PyBullet fixes it"
+    assert warnings_about(chain("revolute", "revolute")) == [], "no arm"
+    legged = iiwa("legged", loadURDF={"fileName": "quadruped/quadruped.urdf", "basePosition": [0, 0, 1]})
+    assert told(warnings_of(robots=(legged,)), "useFixedBase") == []
+
+
+def test_motors_of_effort_0_and_links_of_mass_0(tmp_path, warnings_of):
+    (tmp_path / "arm.urdf").write_text(chain("revolute", "continuous", effort=0.0))
+    arm = iiwa("arm", loadURDF={"fileName": "arm.urdf", "useFixedBase": True})
+    (only,) = warnings_of(robots=(arm,))
+    assert "effort 0 in the URDF, for 'j0', 'j1', means no limit" in only
+    assert warnings_of(robots=({**arm, "enforce_effort_limits": False},)) == []
+    light = chain("revolute", "fixed", "revolute").replace(
+        "<link name='l3'><inertial><mass value='1'/>", "<link name='l3'><inertial><mass value='0'/>"
+    )
+    (tmp_path / "arm.urdf").write_text(light)
+    assert warnings_of(robots=(arm,)) == [
+        "arm.yaml: loadURDF.fileName: all links that these joints move have mass 0: 'j2'"
+    ]
+    lump = "<collision><geometry><box size='0.1 0.1 0.1'/></geometry></collision></link>"
+    (tmp_path / "lump.urdf").write_text(chain(root_kg=0.0).replace("</link>", lump))
+    load = {"fileName": "lump.urdf", "basePosition": [0, 0, 1]}
+    (only,) = warnings_of(collision=(BOX_FLOOR,), urdfs=({"name": "lump", "loadURDF": load},))
+    assert "'lump' has mass 0, so it stays 0.95 m above what is below it" in only
+    for meant in ({"useFixedBase": True}, {"basePosition": [0, 0, 0.05]}):
+        assert warnings_of(collision=(BOX_FLOOR,), urdfs=({"name": "lump", "loadURDF": {**load, **meant}},)) == []
+
+
+@pytest.mark.parametrize(
+    ("degrees", "angles", "part"),
+    [
+        (True, [1.5708, 0.0, -0.7854], "look like radians"),
+        (True, [0.3, -0.41, 0.77], "look like radians"),
+        (True, [2.0, 0.5, -1.0], ""),
+        (True, [90.0, 1.57, -45.0], ""),
+        (False, [0.0, 0.0, 0.0], ""),
+        (False, [1.57, 3.0, 6.28], ""),
+        (False, [90.0, 0.0, 0.0], "look like degrees"),
+    ],
+)
+def test_start_positions_in_the_other_unit(tmp_path, warnings_of, degrees, angles, part):
+    (tmp_path / "arm.urdf").write_text(chain(*["continuous"] * 3, upper=-2.0))
+    start = {f"j{index}": angle for index, angle in enumerate(angles)}
+    more = {"initial_joint_position": start, "initial_revolute_joint_positions_are_deg": degrees}
+    arm = iiwa("arm", loadURDF={"fileName": "arm.urdf", "useFixedBase": True}, **more)
+    found = warnings_of(robots=(arm,))
+    assert len(found) == bool(part) and all(part in each for each in found)
+
+
+def test_other_angles_in_the_wrong_unit(tmp_path, warnings_of):
+    turned = chain("revolute", upper=180.0).replace("<limit", "<origin rpy='0 0 90'/><limit")
+    (tmp_path / "arm.urdf").write_text(turned)
+    arm = iiwa("arm", loadURDF={"fileName": "arm.urdf", "useFixedBase": True})
+    poses = [{"tf_id": "eye", "rpy": [0.0, 0.0, 90.0]}]
+    camera = {"name": "eye", "object_tf": {"tf_id": "eye"}, "intrinsics": {"fov": 1.05}}
+    assert warnings_of(robots=(arm,), poses=poses, rgbd_sensor=camera) == [
+        "world.yaml: poses[0].rpy: [0.0, 0.0, 90.0] looks like degrees: expected [rad]",
+        "world.yaml: rgbd_sensor.intrinsics.fov: 1.05 looks like radians: expected [deg]",
+        "arm.yaml: loadURDF.fileName: joint 'j0': origin.rpy: '0 0 90' looks like degrees: expected [rad]",
+        "arm.yaml: loadURDF.fileName: joint 'j0': its limit of -1 to 180 looks like degrees: expected [rad]",
+    ]

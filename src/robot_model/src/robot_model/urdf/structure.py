@@ -183,10 +183,14 @@ def _text_problem(attribute: Attribute) -> str:
     return ""
 
 
+def numbers_in(text: str) -> list[float]:
+    """Returns the numbers with which words of a text begin, which is how PyBullet reads them."""
+    return [float(match[0]) for word in text.split() if (match := _NUMBER.match(word))]
+
+
 def _number_problem(tag: str, key: str, text: str) -> str:
-    largest, found = _NUMBERS[tag, key], [_NUMBER.match(word) for word in text.split()]
-    numbers = [float(match[0]) for match in found if match]  # PyBullet reads what a word begins with
-    if not found or len(numbers) < len(found):
+    largest, numbers = _NUMBERS[tag, key], numbers_in(text)
+    if not numbers or len(numbers) < len(text.split()):
         return "expected numbers"
     if any(map(math.isnan, numbers)):
         return "expected finite numbers"

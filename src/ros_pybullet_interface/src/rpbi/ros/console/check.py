@@ -8,9 +8,10 @@ from typing import Annotated
 import pybullet
 
 from custom_ros_tools.console.argument import Argument
-from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.errors import InterfaceError, Problem
 from custom_ros_tools.foreign import printable_lines
 from rpbi.bodies import BODY_TYPES
+from rpbi.images import drawing_times
 from rpbi.ros.reference.interface_table import Endpoint, endpoints
 from rpbi.world import World
 from rpbi.world.loading import load_world
@@ -35,11 +36,25 @@ def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
     except MemoryError as error:
         print(f"{path}: out of memory: {error or 'is there a limit, such as ulimit -v?'}", file=sys.stderr)
         return 1
-    for warning in world_warnings(world):
+    for warning in (*world_warnings(world), *_slow_cameras(world)):
         warnings.report(str(warning))
     print(printable_lines("\n".join(_lines(path, world, listed, warnings.counted()))))
     world.close()
     return 0
+
+
+def _slow_cameras(world: World) -> Iterator[Problem]:
+    """Yields a warning if the images of a second take this machine longer, with all cameras together."""
+    times = drawing_times(world)
+    rates = {camera.config.name: camera.config.hz for camera in world.loaded.cameras}
+    busy = {name: time_s * rates[name] for name, time_s in times.items() if name in rates}
+    if world.config.real_time_factor and sum(busy.values()) * world.config.real_time_factor > 1.0:
+        slowest = max(busy, key=lambda name: busy[name])
+        camera = next(camera for camera in world.loaded.cameras if camera.config.name == slowest)
+        size = f"{camera.config.intrinsics.width} x {camera.config.intrinsics.height}"
+        others = f", with {len(busy) - 1} more cameras" if len(busy) > 1 else ""
+        able = f"this machine draws at most {1.0 / times[slowest]:.2g} images of {size} a second{others}"
+        yield Problem(camera.file, "hz", f"{camera.config.hz:g} is too much for '{slowest}': {able}")
 
 
 class _Warnings(logging.Handler):

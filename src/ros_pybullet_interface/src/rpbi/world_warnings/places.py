@@ -1,4 +1,4 @@
-"""Warnings of probable mistakes in a world that can be built."""
+"""Warnings of where bodies and TF frames are: far away, in each other, on planes, on floors where they roll on."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,109 +8,97 @@ import pybullet
 
 from custom_ros_tools.errors import Problem, closest, hint
 from robot_model.geometry import dot, minus, scaled
-from robot_model.urdf.document import UrdfDocument
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
-from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.bodies.shape_object import ShapeObject
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.client import MAXIMAL_COORDINATES
 from rpbi.engine.inputs import PoseInput
-from rpbi.meshes.triangles import volumes
 from rpbi.sensors.link_pose import LinkPoseSensor
-from rpbi.urdf.copies import weighed_by_pybullet
-from rpbi.urdf.joints import Joint
 from rpbi.world import World
 
-CONCAVE_SHARE = 0.05
-"""Share of a mesh's volume that its convex hull may add without a warning."""
+from .parts import file_of, is_still, some
+
+FAR_M = 100.0
+"""Distance from the origin, along an axis, from which a position is probably in millimetres."""
 TOUCHING_M = 1e-3
 """Bodies that overlap by less only touch: PyBullet has margins around meshes."""
-
+HANGING_M = 0.02
+"""Height above what is below from which a body of mass 0 hangs in the air."""
 MAX_FALL_M = 100.0
 """Height above a plane from which a body is expected to fall onto it."""
-MAX_NAMES = 3
-"""Bodies or links that a warning names; it counts the others."""
+LEVEL = 0.9999
+"""Cosine of the largest slope that is level."""
 PLANE_ADVICE = (
     "planes lose contact points of what slides on them, and forces chatter; use a box, such as {shapeType: GEOM_BOX, "
     "halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
 )
+ROLLING_ADVICE = "changeDynamics: {rollingFriction: 0.001} stops it, rollingFriction: 0 states that it may roll"
 
 
-def world_warnings(world: World) -> list[Problem]:
-    """Returns probable mistakes in a world that has made no step yet, by file."""
-    return [
-        *_Frames(world).warnings(),
-        *_gravity(world),
-        *_masses(world),
-        *_hulls(world),
-        *_limits(world),
-        *_topics(world),
-        *_overlaps(world),
-        *_planes(world),
-    ]
+def place_warnings(world: World) -> Iterator[Problem]:
+    """Yields a warning for each body or frame that is probably not where it is meant to be."""
+    yield from _Frames(world).warnings()
+    yield from _far(world)
+    yield from _overlaps(world)
+    yield from _planes(world)
+    yield from _rolling(world)
+    yield from _hanging(world)
 
 
-def _file_of(world: World, name: str) -> str:
-    """Returns the file of a body or camera."""
-    files = {item.config.name: item.file for item in world.loaded.objects}
-    return {**files, **{camera.config.name: camera.file for camera in world.loaded.cameras}}[name]
-
-
-def _gravity(world: World) -> Iterator[Problem]:
-    if any(world.pb.gravity) or "setGravity" in world.config.model_fields_set:
-        return
-    free = [name for name, body in world.bodies.items() if not _is_still(body, -1)]
-    if free:
-        message = f"missing, so there is no gravity, and {', '.join(free)} will not fall; write {{gravZ: -9.81}}, or 0"
-        yield Problem(world.loaded.file, "setGravity", message)
-
-
-def _masses(world: World) -> Iterator[Problem]:
+def _far(world: World) -> Iterator[Problem]:
+    for index, each in enumerate(world.config.poses):
+        if _is_far(each.position):
+            yield Problem(world.loaded.file, f"poses[{index}].position", _far_message(each.position))
     for item in world.loaded.objects:
-        load, body = getattr(item.config, "loadURDF", None), world.bodies[item.config.name]
-        if load is None or body.is_soft or not body.has_physics:
+        body, load = world.bodies[item.config.name], getattr(item.config, "loadURDF", None)
+        given = getattr(item.config if load is None else load, "basePosition", None)
+        if given is not None and not body.is_soft and _is_far(given):
+            yield Problem(item.file, f"{'loadURDF.' if load is not None else ''}basePosition", _far_message(given))
+
+
+def _is_far(position: Sequence[float]) -> bool:
+    return max(map(abs, position)) > FAR_M
+
+
+def _far_message(position: Sequence[float]) -> str:
+    return f"is {math.hypot(*position):.4g} m from the origin: positions are in metres"
+
+
+def _rolling(world: World) -> Iterator[Problem]:
+    """Yields a warning for each ball or capsule that nothing stops on a level floor."""
+    placed = [body for body in world.bodies.values() if _has_place(world, body)]
+    floors = [body for body in placed if is_still(body, -1) and _shape_kinds(body) in _FLAT]
+    for body in placed:
+        dynamics = getattr(getattr(body, "config", None), "changeDynamics", None)
+        is_meant = dynamics is not None and "rollingFriction" in dynamics.model_fields_set
+        kinds = _shape_kinds(body) if isinstance(body, ShapeObject) and not is_meant else set()
+        if not kinds or not kinds <= _ROUND or is_still(body, -1) or body.dynamics_info(-1)[6]:
             continue
-        is_fixed = bool(load.useFixedBase) or getattr(item.config, "planar_base", None) is not None
-        if links := weighed_by_pybullet(UrdfDocument(load.fileName), is_fixed):
-            message = f"without <inertial>, PyBullet gives 1 kg to each of these links: {_some(links)}"
-            yield Problem(item.file, "loadURDF.fileName", message)
+        for floor in floors:
+            if not floor.dynamics_info(-1)[6] and _is_below(world, floor, body, LEVEL):
+                message = f"'{body.name}' rolls on '{floor.name}' without end: {ROLLING_ADVICE}"
+                yield Problem(file_of(world, body.name), "changeDynamics.rollingFriction", message)
+                break
 
 
-def _hulls(world: World) -> Iterator[Problem]:
+def _hanging(world: World) -> Iterator[Problem]:
+    """Yields a warning for each URDF object of mass 0 that hangs in the air, where PyBullet holds it."""
     for item in world.loaded.objects:
-        shape = getattr(item.config, "createCollisionShape", None)
-        if shape is None or shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
+        body, load = world.bodies[item.config.name], getattr(item.config, "loadURDF", None)
+        if load is None or load.useFixedBase or not _has_place(world, body) or body.joint_indices:
             continue
-        is_exact = bool((shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH)
-        if is_exact or getattr(item.config, "convexDecomposition", None) or not (found := volumes(shape.fileName)):
-            continue
-        mesh_m3, hull_m3 = (abs(math.prod(shape.meshScale or (1.0,))) * volume for volume in found)
-        if hull_m3 - mesh_m3 > CONCAVE_SHARE * mesh_m3:
-            added = f"which adds {hull_m3 - mesh_m3:.2g} m^3 to its {mesh_m3:.2g} m^3"
-            message = f"the concave mesh collides as its convex hull, {added}; see convexDecomposition"
-            yield Problem(item.file, "createCollisionShape.fileName", message)
+        if body.dynamics_info(-1)[0] == 0.0 and world.pb.gravity[2] < 0.0:
+            lower, upper = body.pb.getAABB(body.body_id, -1)
+            foot = 0.5 * (lower[0] + upper[0]), 0.5 * (lower[1] + upper[1]), lower[2] - TOUCHING_M
+            ((below, _, fraction, *_),) = world.pb.rayTest(foot, minus(foot, (0.0, 0.0, MAX_FALL_M)))
+            if below >= 0 and (gap_m := fraction * MAX_FALL_M) > HANGING_M:
+                message = f"'{body.name}' has mass 0, so it stays {gap_m:.2g} m above what is below it"
+                yield Problem(item.file, "loadURDF.fileName", f"{message}; useFixedBase: true states that it is fixed")
 
 
-def _limits(world: World) -> Iterator[Problem]:
-    for name, body in world.bodies.items():
-        if body.is_soft:
-            continue
-        joints = [joint for joint in Joint.all_of(body.pb, body.body_id) if joint.is_driven]
-        states = body.pb.getJointStates(body.body_id, [joint.index for joint in joints]) if joints else ()
-        for joint, (position, *_) in zip(joints, states):
-            if not joint.allows(position):
-                key = f"initial_joint_position.{joint.name}" if isinstance(body, JointedBody) else "loadURDF.fileName"
-                message = f"at the start, {joint.limit_violation(position)}"
-                yield Problem(_file_of(world, name), key, message)
-
-
-def _topics(world: World) -> Iterator[Problem]:
-    for item in world.loaded.objects:
-        topic = item.config.initial_joint_state_topic if isinstance(item.config, RobotConfig) else None
-        if topic:
-            message = f"the world only starts if joint states come on {topic}"
-            yield Problem(item.file, "initial_joint_state_topic", message)
+_FLAT = ({pybullet.GEOM_PLANE}, {pybullet.GEOM_BOX})
+_ROUND = {pybullet.GEOM_SPHERE, pybullet.GEOM_CAPSULE}
 
 
 def _overlaps(world: World) -> Iterator[Problem]:
@@ -122,7 +110,7 @@ def _overlaps(world: World) -> Iterator[Problem]:
         if depths and (deepest := max(depths.items(), key=lambda item: item[1]))[1] > TOUCHING_M:
             (link, other_link), depth = deepest
             parts = f"{_named(one, link)} and {_named(other, other_link)} overlap by {depth:.2g} m"
-            yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+            yield Problem(file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
 
 
 def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
@@ -143,14 +131,9 @@ def _planes(world: World) -> Iterator[Problem]:
             continue
         names = [f"'{body.name}'" for body in placed if _needs_points(body) and _is_below(world, plane, body)]
         if names:
-            rest = f"{_some(names)} rest{'s' if len(names) == 1 else ''} on this plane"
+            rest = f"{some(names)} rest{'s' if len(names) == 1 else ''} on this plane"
             key = "createCollisionShape.shapeType" if isinstance(plane, ShapeObject) else "loadURDF.fileName"
-            yield Problem(_file_of(world, plane.name), key, f"{rest}: {PLANE_ADVICE}")
-
-
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
-    return ", ".join(names[:MAX_NAMES]) + more
+            yield Problem(file_of(world, plane.name), key, f"{rest}: {PLANE_ADVICE}")
 
 
 def _shape_kinds(body: Body) -> set[int]:
@@ -163,17 +146,21 @@ def _shape_kinds(body: Body) -> set[int]:
 
 def _needs_points(body: Body) -> bool:
     """Returns whether a body can fall and slide and stands on more than one contact point, as all but a ball do."""
-    return not _is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
+    return not is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
 
 
-def _is_below(world: World, plane: Body, body: Body) -> bool:
-    """Returns whether a plane carries a body against gravity, now or once it has fallen."""
+def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool:
+    """Returns whether a plane carries a body against gravity, now or once it has fallen.
+
+    Args:
+        level: Least cosine of the slope.
+    """
     found = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
     if not found:
         return False
     nearest = min(found, key=lambda point: point[8])
     lowest, below, normal, gap = nearest[5:9]
-    if dot(normal, world.pb.gravity) >= 0.0:
+    if dot(normal, world.pb.gravity) >= -level * math.hypot(*world.pb.gravity):
         return False
     if gap <= TOUCHING_M:
         return True
@@ -192,22 +179,7 @@ def _named(body: Body, link: int) -> str:
 
 
 def _are_still(one: Body, other: Body, link: int, other_link: int) -> bool:
-    return _is_still(one, link) and _is_still(other, other_link)
-
-
-def _is_still(body: Body, link: int) -> bool:
-    """Returns whether a link is static: a fixed base, and all links fixed to it."""
-    if body.is_soft:
-        return False
-    if not body.has_physics:
-        return True
-    while link >= 0:
-        info = body.pb.getJointInfo(body.body_id, link)
-        if info[2] != pybullet.JOINT_FIXED:
-            return False
-        link = info[16]
-    load = getattr(getattr(body, "config", None), "loadURDF", None)
-    return bool(load is not None and load.useFixedBase) or body.dynamics_info(-1)[0] == 0.0
+    return is_still(one, link) and is_still(other, other_link)
 
 
 class _Frames:
@@ -232,7 +204,7 @@ class _Frames:
             name = slot.split("/")[0]
             if (missing := self._missing(followed.tf_id)) is not None:
                 key = "tracked_tf.tf_id" if followed.is_tracked else "object_tf.tf_id"
-                yield Problem(_file_of(self._world, name), key, f"'{name}' follows it: {missing}")
+                yield Problem(file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
         """Returns the body whose frame it is by its name, if that can publish any."""
