@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from roslaunch import RLException
 from roslaunch.config import load_config_default
 
 LAUNCH_FILES = sorted((Path(__file__).parents[3] / "src/rpbi_examples/launch").glob("*.launch"))
@@ -47,6 +48,22 @@ def test_a_scene_of_ones_own_has_a_world_anywhere():
     assert values["/ros_pybullet_interface/config_file"] == "{my_lab}/lift.yaml"
     assert values["/scene/scene"] == "my_lab.lift:Lift"
     assert any("lift.rviz" in node.args for node in loaded.nodes if node.package == "rviz")
+
+
+def test_a_real_robot_of_ones_own_needs_a_folder_and_a_urdf(tmp_path):
+    real_robot = LAUNCH_FILES[0].parent / "include/real_robot.launch"
+    for file in (real_robot.parents[2] / "configs/real_robot/kuka_lwr").iterdir():
+        (tmp_path / file.name).write_text(file.read_text().replace("period_s: 0.009", "period_s: 0.0031"))
+    given = ["robot:=my_arm", "stand_in:=true", f"config_folder:={tmp_path}"]
+    loaded = load(real_robot, *given, "description:={rpbi_examples}/robots/ur5e.urdf")
+    values = {name: each.value for name, each in loaded.params.items()}
+    assert '<robot name="ur5e">' in values["/real_robot/guard/robot_description"]
+    assert values["/real_robot/guard/period_s"] == 0.0031
+    assert values["/stand_in/ros_pybullet_interface/config_file"] == f"{tmp_path}/world.yaml"
+    (remapped,) = (dict(node.remap_args) for node in loaded.nodes if node.name == "guard")
+    assert "/rpbi/my_arm/joint_states" in remapped.values()
+    with pytest.raises(RLException, match="description:=URDF is missing"):
+        load(real_robot, *given)
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)

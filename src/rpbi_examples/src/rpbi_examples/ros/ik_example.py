@@ -23,7 +23,7 @@ from rpbi_examples.motions import FigureEight
 from .joint_targets import wait_until_ready
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
-"""Start of the search [rad]; other joints at 0."""
+"""Start of the search [rad], unless `~home` names another; other joints at 0."""
 APPROACH_S = 5.0
 """Time for the way to the figure [s]."""
 WAYPOINTS = 16
@@ -52,7 +52,7 @@ def _run() -> None:
 
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
     """Switches setup, solver and perhaps the target on, when the arm is where the target is."""
-    problem = IKProblem(has_target=True, target=_pose(target), start=_state(HOME))
+    problem = IKProblem(has_target=True, target=_pose(target), start=_home())
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
     call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
     toggles = (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", rospy.get_param("~target_toggle", ""))
@@ -65,12 +65,12 @@ def _draw_a_round(robot: str, start: np.ndarray) -> None:
     """Plans the way to the figure and once around it, and has the robot's trajectory controller follow."""
     figure = FigureEight()
     times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)
-    problem = IKProblem(start=_state(HOME))
+    problem = IKProblem(start=_home())
     for time_s in times_s:
         shifted = start @ TfInterface.pos_quat_to_matrix(figure.position(time_s))
         problem.waypoints.append(Waypoint(rospy.Duration.from_sec(APPROACH_S + time_s), _pose(shifted)))
     answer = call_service(f"ik/solver/{WHOLE_TRAJECTORIES}/solve", SolveIK, problem)
-    call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, _state(HOME), APPROACH_S)
+    call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, _home(), APPROACH_S)
     command = rospy.Publisher(
         f"rpbi/{robot}/joint_trajectory_controller/command", JointTrajectory, queue_size=1, latch=True
     )
@@ -80,7 +80,8 @@ def _draw_a_round(robot: str, start: np.ndarray) -> None:
     call_service("toggle_figure_eight", SetBool, True)
 
 
-def _state(positions: dict[str, float]) -> JointState:
+def _home() -> JointState:
+    positions: dict[str, float] = rospy.get_param("~home", HOME)
     return JointState(name=list(positions), position=list(positions.values()))
 
 
