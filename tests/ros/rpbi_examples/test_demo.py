@@ -43,18 +43,17 @@ def test_it_writes_all_that_it_promises(demo):
     assert names <= {path.name for path in out.iterdir()}, run.stderr
 
 
-def test_slowness_is_told_and_only_what_is_required_fails(demo):
+def test_slowness_is_reported_and_is_no_failure(demo):
     """How many images a busy machine draws is not for a test to say; that too few have their line is."""
     out, run = demo
     summary = json.loads((out / "summary.json").read_text())
     too_few = {topic for topic, row in summary["topics"].items() if not row["enough"]}
-    failed = too_few & {"/rpbi/kuka_lwr/joint_states", "/tf"}
     too_slow = summary["figures"]["real_time_factor"] < 0.95
-    assert run.returncode == (1 if failed or too_slow else 0), run.stderr
-    assert set(re.findall(r"^FAILED: (/\S+)", run.stderr, re.MULTILINE)) == failed
+    assert run.returncode == 0 and "FAILED" not in run.stderr, run.stderr
+    assert ("SLOW: physics ran at" in run.stderr) == too_slow
     images = {topic for topic in too_few if "/camera/" in topic}
     assert len(re.findall(r"^SLOW: images came at ", run.stderr, re.MULTILINE)) == bool(images)
-    assert all(f"{topic} came at " in run.stderr for topic in too_few - failed - images)
+    assert all(f"{topic} came at " in run.stderr for topic in too_few - images)
     assert len(summary["topics"]) == 10
     assert all(row["messages"] > 0 for row in summary["topics"].values())
     assert summary["figures"]["draw_rate_hz"] > 0

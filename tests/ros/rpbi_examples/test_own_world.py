@@ -98,6 +98,9 @@ def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder)
         markers = ros.listen(f"/{name}/rpbi/markers", MarkerArray).wait_for(1)[0].markers
         frames = {marker.ns: marker.header.frame_id for marker in markers}
         assert frames == {frame: f"{name}/rpbi/{frame}" for frame in ("table", "cup")} | {"floor": f"{name}/rpbi/world"}
+    running = "running: ./rpbi list, move, view --ns left"
+    wait_until(lambda: running in ros.output(left), "the launch names the commands for it")
+    assert ros.output(left).count("running: ./rpbi") == 1
     # rospy warns of connections that are closed at once, as those of these listeners may be; machines may be busy
     warnings = [line for line in ros.output(left).splitlines() if "[WARN]" in line]
     assert [line for line in warnings if "Inbound TCP/IP" not in line and "too slow" not in line] == []

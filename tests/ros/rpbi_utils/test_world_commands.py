@@ -116,6 +116,21 @@ def test_joints_and_links_move_in_a_given_time(ros, say):
     assert say("move arm --stop") == (1, "move: no motion is running")
 
 
+def test_positions_beyond_a_limit_and_targets_of_another_mode_are_refused(ros, say):
+    within = "joint 'lbr_iiwa_joint_2' must be within -2.0944 to 2.0944 rad, got"
+    for command in ("move", "send"):
+        assert say(f"{command} arm lbr_iiwa_joint_2:=30") == (1, f"{command}: {within} 30; 30deg?")
+        assert say(f"{command} arm lbr_iiwa_joint_2:=150deg") == (1, f"{command}: {within} 2.61799")
+        assert say(f"{command} arm lbr_iiwa_joint_2:=3000") == (1, f"{command}: {within} 3000")
+    switch = "switch it first: rosservice call /lab/rpbi/arm/set_control_mode VELOCITY_CONTROL"
+    assert say("send arm lbr_iiwa_joint_2:=0.1 --velocity") == (
+        1,
+        f"send: 'arm' is under POSITION_CONTROL, which takes positions, not velocities; {switch}",
+    )
+    code, text = say("send arm lbr_iiwa_joint_2:=0.1 --effort")
+    assert code == 1 and text.endswith("set_control_mode TORQUE_CONTROL")
+
+
 def test_targets_and_velocities_are_sent(ros):
     states = ros.listen("/lab/rpbi/arm/joint_states", JointState)
     done = in_process("send", "arm", "lbr_iiwa_joint_1:=-0.4", "--ns", "lab")

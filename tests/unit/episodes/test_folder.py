@@ -91,8 +91,25 @@ def test_the_table_has_lowest_rate_longest_gap_and_losses(tmp_path: Path) -> Non
     episode.published = {"/a/joint_states": 93, "/b/joint_states": 40}
     header, row = table_of([episode]).splitlines()
     assert header.split("  ")[0] == "episode"
-    assert row.split() == ["0", "success", "0.0", "130", "50", "Hz", "30", "ms", "complete,", "3", "messages", "lost"]
+    assert row.split() == [
+        "0",
+        "success",
+        "0.0",
+        "0.9",
+        "130",
+        "50",
+        "Hz",
+        "30",
+        "ms",
+        "complete,",
+        "3",
+        "messages",
+        "lost",
+    ]
     assert "/a/joint_states: 90 messages, 3 lost, 100 Hz, longest gap 20 ms" in details_of(episode)
+    assert ", 0.0 s, 0.9 s simulated\n" in details_of(episode)
+    episode.topics = {}
+    assert table_of([episode]).splitlines()[1].split()[3] == "-"
 
 
 URDF = '<robot name="r"><link name="l"><visual><geometry><mesh filename="part.stl"/></geometry></visual></link></robot>'

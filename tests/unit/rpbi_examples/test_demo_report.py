@@ -48,7 +48,7 @@ def summary_of(real_time_factor=1.0, **messages):
 
 
 def slow(summary):
-    return slow_lines(summary, IMAGES, REQUIRED, "world.yaml")
+    return slow_lines(summary, IMAGES, "world.yaml")
 
 
 def test_what_reaches_its_rate_needs_no_word():
@@ -73,21 +73,17 @@ def test_a_clock_that_skips_ticks_is_no_failure_but_a_line():
 
 
 @pytest.mark.parametrize("topic", REQUIRED)
-def test_joint_states_or_tf_below_their_rate_are_a_failure_and_no_slowness(topic):
+def test_joint_states_or_tf_below_their_rate_are_slow_and_fail_only_if_none_came(topic):
     summary = summary_of(**{topic.strip("/"): 900})
-    assert failures(summary, REQUIRED) == [f"{topic} came at less than 95% of its rate"]
-    assert slow(summary) == []
+    assert failures(summary, REQUIRED) == []
+    assert [line.partition(":")[0] for line in slow(summary)] == [f"{topic} came at 90.0 instead of 100 Hz"]
+    assert failures(summary_of(**{topic.strip("/"): 0}), REQUIRED) == [f"{topic} had no message"]
 
 
-def test_physics_below_real_time_is_a_failure():
-    assert failures(summary_of(real_time_factor=0.94), REQUIRED) == [
-        "physics ran at 94% of real time, with a load of 13.1 on 2 cores"
-    ]
-
-
-def test_where_all_topics_are_required_few_images_are_a_failure():
-    summary = summary_of(image=39)
-    assert failures(summary, summary["topics"]) == ["/image came at less than 95% of its rate"]
+def test_physics_below_real_time_is_slow_and_no_failure():
+    summary = summary_of(real_time_factor=0.94)
+    assert slow(summary) == ["physics ran at 94% of real time, with a load of 13.1 on 2 cores"]
+    assert failures(summary, REQUIRED) == []
 
 
 def test_tracking_error_compares_with_the_target_that_held_and_by_joint_name():

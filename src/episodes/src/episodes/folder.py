@@ -32,6 +32,8 @@ BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
 """Files of an episode: the recording, its description, and commands that the topic no longer sends."""
 FILES, DISCARDED = "files", "discarded"
 SET_BACK = "set_back_s"
+STAMPED = ("joint_states", "base_state", "contacts", "ft_sensor")
+"""Last words of topics whose messages have the world's time."""
 SEAL = "sha256"
 """Key of a topic with the SHA-256 of its messages."""
 UNREADABLE = "cannot be read"
@@ -98,6 +100,16 @@ class Episode:
     def set_back_s(self) -> float:
         """Largest time by which the clock of a topic was set back [s]; 0 if none was."""
         return max((float(each.get(SET_BACK, 0.0)) for each in self.topics.values()), default=0.0)
+
+    @property
+    def simulated_s(self) -> float | None:
+        """Length by the stamps of joint states or other samples of bodies [s]; None without two of any."""
+        spans = [
+            (each["messages"] - 1) / each["rate_hz"]
+            for topic, each in self.topics.items()
+            if topic.rpartition("/")[2] in STAMPED and each["rate_hz"] > 0.0
+        ]
+        return max(spans, default=None)
 
     def joint_rhythm(self) -> tuple[float, float] | None:
         """Returns the lowest rate [Hz] and longest gap [s] of joint states; None without any."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from .folder import SET_BACK, Episode
 
-_HEADER = ("episode", "label", "seconds", "messages", "joint states", "longest gap", "state")
+_HEADER = ("episode", "label", "seconds", "simulated", "messages", "joint states", "longest gap", "state")
 
 
 def table_of(episodes: Iterable[Episode]) -> str:
@@ -26,11 +26,17 @@ def _row(episode: Episode) -> tuple[str, ...]:
         str(episode.number),
         episode.label or "-",
         f"{episode.seconds:.1f}",
+        _simulated(episode),
         str(episode.messages),
         rate,
         gap,
         state,
     )
+
+
+def _simulated(episode: Episode) -> str:
+    """Returns the seconds of the world's time that an episode has."""
+    return "-" if episode.simulated_s is None else f"{episode.simulated_s:.1f}"
 
 
 def clock_note(set_back_s: float) -> str:
@@ -41,7 +47,10 @@ def clock_note(set_back_s: float) -> str:
 def details_of(episode: Episode) -> str:
     """Returns all that is stored of an episode, but for the list of its files."""
     lines = [f"{episode.name}: {episode.state}{f', {episode.note}' if episode.note else ''}"]
-    lines += [f"label    {episode.label or '-'}", f"started  {episode.started}, {episode.seconds:.1f} s"]
+    lines += [
+        f"label    {episode.label or '-'}",
+        f"started  {episode.started}, {episode.seconds:.1f} s, {_simulated(episode)} s simulated",
+    ]
     lines += [f"seeds    {episode.seeds or '-'}", f"git      {episode.git or '-'}"]
     lines += ["versions " + ", ".join(f"{name} {text}" for name, text in episode.versions.items())]
     lines += [f"files    {len(episode.files)}"]

@@ -145,18 +145,18 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
 
 
 def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
-    """Returns a line for each required topic with too low a rate, and for physics that was too slow."""
-    factor = summary["figures"]["real_time_factor"]
-    lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
-    return lines + [f"{topic} came at less than {ENOUGH:.0%} of its rate" for topic in _too_few(summary, required)]
+    """Returns a line for each required topic without any message."""
+    topics = summary["topics"].items()
+    return [f"{topic} had no message" for topic, row in topics if topic in required and not row["messages"]]
 
 
-def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Collection[str], world: str) -> list[str]:
-    """Returns the topics that were slow because the machine is slow or busy, with the cause and a remedy.
+def slow_lines(summary: Mapping[str, Any], images: Collection[str], world: str) -> list[str]:
+    """Returns what was slow because the machine is slow or busy, with the cause and a remedy.
 
-    Images share a line; for required topics this is no excuse. `world` is the main YAML file.
+    Images share a line. `world` is the main YAML file.
     """
-    topics, lines = summary["topics"], []
+    topics, factor = summary["topics"], summary["figures"]["real_time_factor"]
+    lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
     slow_images = _too_few(summary, images)
     if slow_images:
         slowest = min((topics[topic] for topic in slow_images), key=lambda row: row["rate_hz"])
@@ -165,7 +165,7 @@ def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Co
             f"{summary['figures']['draw_rate_hz']:.1f} Hz, and cameras give way to all other programs. "
             f"End other programs, or lower hz, width or height of rgbd_sensor in {world}"
         )
-    others = _too_few(summary, topics.keys() - set(images) - set(required))
+    others = _too_few(summary, topics.keys() - set(images))
     if others:
         rates = ", ".join(f"{topic} came at {_rate(topics[topic])}" for topic in others)
         lines.append(f"{rates}: {_load(summary)}, publishers wait for a processor. End other programs")

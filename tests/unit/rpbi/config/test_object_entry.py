@@ -25,6 +25,15 @@ def test_changes_replace_values_and_merge_mappings_and_alter_neither():
     assert entry["file"] == "a.yaml"
 
 
+def test_null_removes_a_key():
+    data = {"name": "a", "controllers": {"push": {"type": "force"}, "hold": {"type": "force"}}}
+    kept = parse_object_entry({"file": "a.yaml", "controllers": {"push": None}}).apply_overrides(data)
+    assert kept == {"name": "a", "controllers": {"hold": {"type": "force"}}}
+    assert parse_object_entry({"file": "a.yaml", "controllers": None, "hz": None}).apply_overrides(data) == {
+        "name": "a"
+    }
+
+
 @pytest.mark.parametrize("entry", [3, None, "", {}, {"name": "b"}, {"file": 3}, ["a.yaml"]])
 def test_an_entry_without_a_file_is_refused(entry):
     with pytest.raises(ValueError, match="expected a file name, or a mapping with 'file'"):

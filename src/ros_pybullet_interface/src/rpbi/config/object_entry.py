@@ -17,7 +17,8 @@ class ObjectEntry(NamedTuple):
 
     Attributes:
         file: The file as the user wrote it.
-        overrides: Keys and values that replace those of the file; mappings are merged key by key.
+        overrides: Keys and values that replace those of the file; mappings are merged key by key, and null removes a
+            key.
     """
 
     file: str
@@ -46,7 +47,9 @@ def _merged(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, 
     result = copy.deepcopy(dict(data))
     for key, value in overrides.items():
         old = result.get(key)
-        if isinstance(old, Mapping) and isinstance(value, Mapping):
+        if value is None:
+            result.pop(key, None)
+        elif isinstance(old, Mapping) and isinstance(value, Mapping):
             result[key] = _merged(old, value)
         else:
             result[key] = copy.deepcopy(value)

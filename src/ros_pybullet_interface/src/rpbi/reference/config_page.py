@@ -21,7 +21,8 @@ Every YAML file of a world and every key in it. For worlds see [worlds.md](world
 - camelCase keys are arguments of the PyBullet function of the same name.
 - Constants are given by name or by PyBullet's number, true and false as 1 and 0 too, whole numbers wherever a number is
   expected. YAML reads `1e-3` as text: write `1.0e-3`.
-- An entry of a list of files is a file name, or a mapping with `file` and the keys that differ.
+- An entry of a list of files is a file name, or a mapping with `file` and the keys that differ. `null` removes a
+  key of the file, such as `controllers: null`.
 - Files are looked for beside the file that names them, in `setAdditionalSearchPath` and in PyBullet's data;
   `{package}/path` and `package://package/path` work everywhere.
 - Editors complete, explain and check these keys, see [worlds.md](worlds.md#in-an-editor)."""

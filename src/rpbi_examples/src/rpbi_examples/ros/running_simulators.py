@@ -1,7 +1,7 @@
 """Simulators that run on a ROS master already when a launch file is to be run."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,8 @@ MAX_END_S = 60.0
 """Longest time for the end of a simulator and its launch [s]; beyond it an error is reported."""
 _CALLER = "/rpbi_launch"
 _PACKAGE = "ros_pybullet_interface"
+_LIST = "rpbi/list_objects"
+"""A service that every simulator has, and nobody else."""
 _POLL_S = 0.1
 
 
@@ -83,6 +85,14 @@ def running_simulators(file: str, master: str) -> list[RunningNode]:
     config = roslaunch.config.load_config_default([file], None, assign_machines=False)
     names = {rosgraph.names.ns_join(node.namespace, node.name) for node in config.nodes if node.package == _PACKAGE}
     return _running(registered & names, master)
+
+
+def simulator_namespace(nodes: Set[str], master: str) -> str | None:
+    """Returns the namespace of the first simulator among some nodes, such as `left`; None before it is up."""
+    for service, servers in sorted(_state(master)[2]):
+        if service.endswith(f"/{_LIST}") and not nodes.isdisjoint(servers):
+            return service.removesuffix(_LIST).strip("/")
+    return None
 
 
 def clocks(master: str) -> list[RunningNode]:

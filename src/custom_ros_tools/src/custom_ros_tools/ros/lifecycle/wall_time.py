@@ -1,11 +1,16 @@
 """Timers, rates and throttled warnings by the wall clock, which goes on when simulated time stands still."""
 
+import re
 import threading
 import time
 import traceback
 from collections.abc import Callable
 
 import rospy
+
+MAX_KINDS = 20
+"""Largest number of kinds of warnings of a subject that are told apart."""
+_NUMBER = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 
 class WallRate:
@@ -66,21 +71,30 @@ class WallTimer:
 
 
 class ThrottledWarning:
-    """Warns about each subject at most once in a period of wall time [s], and counts suppressed warnings."""
+    """Warns of each new kind of fault of a subject at once, else at most once in a period of wall time [s].
+
+    It counts the warnings that it suppresses. Messages are of one kind if they differ in numbers alone; beyond
+    `MAX_KINDS` kinds of a subject, none counts as new.
+    """
 
     def __init__(self, period_s: float = 5.0) -> None:
         self._period_s = period_s
         self._lock = threading.Lock()
         self._last: dict[str, tuple[float, int]] = {}
+        self._kinds: dict[str, set[str]] = {}
 
     def __call__(self, subject: str, message: str) -> None:
         """Warns `SUBJECT: MESSAGE`, unless it did so within the period."""
-        now_s = time.monotonic()
+        now_s, kind = time.monotonic(), _NUMBER.sub("#", message)
         with self._lock:
+            kinds = self._kinds.setdefault(subject, set())
+            is_new = kind not in kinds and len(kinds) < MAX_KINDS
             last_s, kept_back = self._last.get(subject, (-self._period_s, 0))
-            if now_s - last_s < self._period_s:
+            if not is_new and now_s - last_s < self._period_s:
                 self._last[subject] = (last_s, kept_back + 1)
                 return
             self._last[subject] = (now_s, 0)
+            if is_new:
+                kinds.add(kind)
         more = f" ({kept_back} more like it since the last warning)" if kept_back else ""
         rospy.logwarn("%s: %s%s", subject, message, more)

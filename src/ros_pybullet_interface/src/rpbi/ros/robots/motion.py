@@ -61,11 +61,15 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
     """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
 
+    An empty text switches nothing; the answer is the present mode.
+
     Raises:
         ValueError: If the text is none of these.
     """
-    mode = CONTROL_MODES.parse(request.data)
     before = MODE_NAMES[context.body.motors.mode]
+    if not request.data:
+        return Answer(True, before)
+    mode = CONTROL_MODES.parse(request.data)
     context.act("switch_mode", mode)
     return Answer(True, f"{MODE_NAMES[mode]}, was {before}")
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+import threading
+import time
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+import rosgraph
 import roslaunch
+from rosgraph.network import parse_http_host_and_port
 from roslaunch.arg_dump import get_args
 from roslaunch.parent import ROSLaunchParent
 from roslaunch.pmon import ProcessListener
@@ -23,13 +27,19 @@ from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.foreign import printable_lines
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from robot_model.asset_files import find_file
-from rpbi_examples.ros.running_simulators import clocks, master_of, running_simulators
+from rpbi_examples.ros.running_simulators import (
+    clocks,
+    master_of,
+    running_simulators,
+    simulator_namespace,
+)
 
 WORLDS = (".yaml", ".yml")
 WORLD = "world"
 """Launch file that runs a world of the user's."""
 PRINTS = ("--files", "--args", "--nodes", "--find-node", "--dump-params", "--ros-args")
 """Options of `roslaunch` with which it prints something and starts nothing."""
+ANNOUNCE_PERIOD_S = 0.5
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
 
@@ -117,7 +127,26 @@ class _Parent(ROSLaunchParent, ProcessListener):
     def __init__(self, parents: list[_Parent], *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, process_listeners=[self], **options)
         self.has_failed = False
+        self._usual_master = rosgraph.get_master_uri()
         parents.append(self)
+
+    def start(self, *arguments: Any, **options: Any) -> None:
+        """Starts the nodes, and a thread that says so once a simulator is up."""
+        super().start(*arguments, **options)
+        threading.Thread(target=self._announce, daemon=True).start()
+
+    def _announce(self) -> None:
+        """Prints the commands for a running world as soon as one of the nodes answers them."""
+        nodes = {rosgraph.names.ns_join(node.namespace, node.name) for node in self.config.nodes}
+        while self.pm is not None and not self.pm.is_shutdown:
+            if (namespace := simulator_namespace(nodes, self.config.master.uri)) is not None:
+                option = f" --ns {namespace}" if namespace else ""
+                uri = self.config.master.uri
+                ports = {parse_http_host_and_port(each)[1] for each in (uri, self._usual_master)}
+                master = f", with ROS_MASTER_URI={uri}" if len(ports) > 1 else ""
+                print(f"running: ./rpbi list, move, view{option}{master}", flush=True)
+                return
+            time.sleep(ANNOUNCE_PERIOD_S)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
         """Notes the end of a process by itself; its name is that of the node, and a number."""

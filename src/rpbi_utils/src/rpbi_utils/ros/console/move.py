@@ -60,7 +60,7 @@ def move(
         return str(simulator.call(start, ResetJointState, JointState(), duration_s).message)
     if any(":=" in word for word in goal):
         service = simulator.require(body, "move_to_joint_state", "a robot")
-        values = joint_values(simulator, body, goal)
+        values = joint_values(simulator, body, goal, are_positions=True)
         state = JointState(name=[*values], position=[*values.values()])
         return str(simulator.call(service, ResetJointState, state, duration_s).message)
     if len(goal) not in (3, 6):

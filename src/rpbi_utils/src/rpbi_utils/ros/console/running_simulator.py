@@ -1,5 +1,6 @@
 """A simulator that runs: what is in it, how its services are called, and arguments of the commands for it."""
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -8,6 +9,8 @@ import rospy
 
 from custom_ros_tools.console.argument import Argument, number
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from robot_model.limits import LIMIT_ROUNDING
+from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ListObjects, RobotInfo
 
 LIST = "rpbi/list_objects"
@@ -90,14 +93,23 @@ class RunningSimulator:
         return wanted
 
 
-def joint_values(simulator: RunningSimulator, robot: str, words: Sequence[str]) -> dict[str, float]:
+def joint_values(
+    simulator: RunningSimulator, robot: str, words: Sequence[str], are_positions: bool
+) -> dict[str, float]:
     """Returns values by joint, from words like `JOINT:=VALUE`.
 
+    Args:
+        simulator: The simulator.
+        robot: Name of the robot.
+        words: The words.
+        are_positions: Whether values are positions, which are checked against the limits of the joints.
+
     Raises:
-        InterfaceError: If a word is no such value, or there is none.
+        InterfaceError: If a word is no such value, or beyond a limit, or there is none.
         UnknownNameError: If the robot lacks a joint.
     """
-    known = simulator.call(simulator.require(robot, "robot_info", "a robot"), RobotInfo).current_joint_state.name
+    info = simulator.call(simulator.require(robot, "robot_info", "a robot"), RobotInfo)
+    known, joints = info.current_joint_state.name, {joint.jointName: joint for joint in info.joint_info}
     values = {}
     for word in words:
         joint, is_value, value = word.partition(":=")
@@ -106,6 +118,19 @@ def joint_values(simulator: RunningSimulator, robot: str, words: Sequence[str]) 
         if joint not in known:
             raise UnknownNameError("joint", joint, known)
         values[joint] = number(value)
+        if are_positions and joint in joints:
+            _check_limit(joints[joint], value)
     if not values:
         raise InterfaceError(f"expected JOINT:=VALUE ...; the joints of '{robot}' are {', '.join(known)}")
     return values
+
+
+def _check_limit(joint: JointInfo, word: str) -> None:
+    """Raises an InterfaceError for a position beyond the limits of a joint, degrees that lack their unit included."""
+    lower, upper, position = joint.jointLowerLimit, joint.jointUpperLimit, number(word)
+    if not lower < upper or lower - LIMIT_ROUNDING <= position <= upper + LIMIT_ROUNDING:
+        return
+    is_degrees = joint.is_revolute and not word.endswith("deg") and lower <= math.radians(position) <= upper
+    question = f"; {word.strip()}deg?" if is_degrees else ""
+    limits = f"{lower:.6g} to {upper:.6g} {'rad' if joint.is_revolute else 'm'}"
+    raise InterfaceError(f"joint '{joint.jointName}' must be within {limits}, got {position:.6g}{question}")

@@ -5,6 +5,7 @@ import warnings
 from typing import Annotated, Any
 
 import rospy
+from cob_srvs.srv import SetString
 from geometry_msgs.msg import Twist, Vector3, Wrench
 from sensor_msgs.msg import JointState
 
@@ -18,6 +19,7 @@ SEND_HZ = 50.0
 CONNECT_S = 5.0
 """Time that the simulator has to connect to the topic [s]; after it the command fails."""
 Numbers = list[float] | None
+_PLURALS = {"position": "positions", "velocity": "velocities", "effort": "efforts"}
 
 
 def send(
@@ -64,7 +66,8 @@ def send(
         _publish(simulator, topic, Twist(Vector3(vx, vy, 0.0), Vector3(z=turn)), duration_s, Twist())
         return f"drove for {duration_s:g} s"
     topic = simulator.require(body, "joint_states/target", "a robot")
-    values = joint_values(simulator, body, targets)
+    _check_mode(simulator, body, "velocity" if velocity else "effort" if effort else "position")
+    values = joint_values(simulator, body, targets, are_positions=not (velocity or effort))
     names = [*values]
     if velocity or effort:
         field = "velocity" if velocity else "effort"
@@ -73,6 +76,22 @@ def send(
         return f"sent for {duration_s:g} s"
     _publish(simulator, topic, JointState(name=names, position=[*values.values()]))
     return "sent"
+
+
+def _check_mode(simulator: RunningSimulator, robot: str, quantity: str) -> None:
+    """Raises an InterfaceError if a robot's control mode takes no targets of that quantity."""
+    if simulator.objects().get(robot) == "visual_robot":
+        mode = "POSITION_CONTROL"
+    else:
+        mode = simulator.call(f"rpbi/{robot}/set_control_mode", SetString, "").message
+    takes = {"VELOCITY_CONTROL": "velocity", "TORQUE_CONTROL": "effort"}.get(mode, "position")
+    if takes != quantity:
+        right = {"velocity": "VELOCITY_CONTROL", "effort": "TORQUE_CONTROL"}.get(quantity, "POSITION_CONTROL")
+        service = simulator.full_name(f"rpbi/{robot}/set_control_mode")
+        switch = f"; switch it first: rosservice call {service} {right}"
+        raise InterfaceError(
+            f"'{robot}' is under {mode}, which takes {_PLURALS[takes]}, not {_PLURALS[quantity]}{switch}"
+        )
 
 
 def _publish(simulator: RunningSimulator, topic: str, message: Any, duration_s: float = 0.0, last: Any = None) -> None:
