@@ -1,16 +1,19 @@
-"""The solvers `tasks` and `trajectory`, held to the conformance suite."""
+"""The solvers `tasks`, `exotica` and `trajectory`, held to the conformance suite."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import pybullet_data
 
 from ik_ros.conformance import SolverConformance
 from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 
 IIWA = str(Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf")
+LWR = str(Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf")
 PANDA = str(Path(pybullet_data.getDataPath()) / "franka_panda/panda.urdf")
 
 
@@ -49,3 +52,18 @@ class TestTrajectoryWithIiwa(SolverConformance):
     least_share = 0.9
     reachable_problems = 20
     random_problems = 30
+
+
+class TestExoticaWithLwr(SolverConformance):
+    solver_name = "exotica"
+    options = {"xml_filename": "{rpbi_examples}/configs/kuka_lwr_ik_example/exotica.xml"}
+    reachable_problems = 100
+    random_problems = 50
+
+    @cached_property
+    def robot(self) -> RobotModel:
+        return RobotModel(LWR)
+
+    def forward(self, positions: Sequence[float]) -> Pose:
+        at = dict(zip(self.solver.joint_names, positions))
+        return self.robot.pose([at.get(name, 0.0) for name in self.robot.joint_names], "end_effector_ball")

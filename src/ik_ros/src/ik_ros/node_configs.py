@@ -74,6 +74,15 @@ class SetupParameters(StartParameters, TargetParameters):
         return self
 
 
+class ExoticaSetupParameters(StartParameters, TargetParameters):
+    """Inputs of problems for `exotica`, as in the authors' release."""
+
+    sync_tf_to_exotica_object: ListOf[Text] = Field(
+        (), description="Frames of the scene that follow TF: `TF_PARENT TF_CHILD SCENE_PARENT SCENE_FRAME` each."
+    )
+    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions in a problem.")
+
+
 class SolverNodeParameters(StartParameters):
     """Private parameters of the node itself; all others are the solver's."""
 

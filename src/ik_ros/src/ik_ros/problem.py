@@ -25,6 +25,19 @@ class Waypoint:
 
 
 @dataclass(frozen=True)
+class AttachedFrame:
+    """A frame of a scene.
+
+    Attributes:
+        parent: What it is attached to: a link or another frame; empty for the root.
+        pose: Its pose there; position [m], unit quaternion x, y, z, w.
+    """
+
+    parent: str
+    pose: Pose
+
+
+@dataclass(frozen=True)
 class IKProblem:
     """A problem for a solver; fields that it does not need stay empty.
 
@@ -37,6 +50,7 @@ class IKProblem:
         previous: Previous solutions, newest last; solvers that can stay near them.
         goals: Values of the goals of tasks by the name of the task, for solvers that have tasks.
         waypoints: Waypoints of the link, by time, for solvers of trajectories.
+        frames: Frames of the scene by name, for solvers that have a scene; the others stay where they are.
         seed: Seed of everything random: a deterministic solver returns equal answers for equal problems.
 
     Raises:
@@ -50,6 +64,7 @@ class IKProblem:
     previous: tuple[JointPositions, ...] = ()
     goals: Mapping[str, Sequence[float]] = field(default_factory=dict)
     waypoints: tuple[Waypoint, ...] = ()
+    frames: Mapping[str, AttachedFrame] = field(default_factory=dict)
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -60,6 +75,11 @@ class IKProblem:
             for i, one in enumerate(self.waypoints)
         )
         object.__setattr__(self, "waypoints", waypoints)
+        frames = {
+            name: AttachedFrame(frame.parent, _pose(f"frames: {name}", frame.pose))
+            for name, frame in self.frames.items()
+        }
+        object.__setattr__(self, "frames", frames)
         for name in ("position_tolerance", "rotation_tolerance"):
             values = _numbers(name, getattr(self, name), 3)
             if min(values) < 0.0:

@@ -129,6 +129,22 @@ class PinocchioRobot:
         """
         return int(self.model.getFrameId(_known("link", name, self.links), pin.BODY))
 
+    def add_frame(self, name: str, link: str, pose: Pose) -> None:
+        """Adds a frame at a link, which tasks can name as they name a link.
+
+        Raises:
+            UnknownNameError: If the link is not known.
+            ValueError: If there is a link of that name.
+        """
+        if name in self.links:
+            raise ValueError(f"there is a link or frame '{name}' already")
+        link_id = self.link_id(link)
+        frame = self.model.frames[link_id]
+        placement = frame.placement * to_se3(pose)
+        self.model.addFrame(pin.Frame(name, frame.parent, link_id, placement, pin.BODY))
+        self.data = self.model.createData()
+        self.links += (name,)
+
     def add_shape(self, config: ShapeConfig) -> None:
         """Adds a shape.
 

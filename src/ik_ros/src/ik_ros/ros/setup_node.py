@@ -15,9 +15,7 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.node_configs import RobotIKConfig, SetupParameters, TargetParameters
 from ik_ros.problem import IKProblem, JointPositions
@@ -25,61 +23,17 @@ from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
+from .exotica_setup import ExoticaSetup
 from .messages import positions_in, problem_message
+from .problem_publisher import PREVIOUS_TOPICS, QUEUE_SIZE, START_TOPICS, publish_problems
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
-from .solver_watch import SolverWatch
 from .tf import FreshTf
 
-QUEUE_SIZE = 10
-START_TOPICS = ("qinit", "start_state", "currentPosition")
-"""Names that the release's solvers have for the same."""
 START_PATIENCE_S = 2.0
 """Time without a start after which the node reports that problems wait for one [s]."""
-PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
 """Keys of `~config` that are no fields of the robot's own problems."""
-
-
-def publish_problems(
-    topics: str,
-    message_type: type,
-    hz: float,
-    start_on_init: bool,
-    problem: Callable[[], rospy.Message | None],
-    has_solver_node: bool = True,
-) -> None:
-    """Publishes problems on the topic `ik`, from now on and while it is switched on.
-
-    Args:
-        topics: Prefix of the service `toggle`, which switches it.
-        message_type: Type of the problems.
-        hz: The rate, in wall time [Hz].
-        start_on_init: Whether it is on from the start.
-        problem: Returns the next one; without one it returns None, or raises an `InterfaceError` or `ValueError` with
-            the reason.
-        has_solver_node: Whether a node is to answer on `ik/solution`, which is watched then.
-    """
-    is_on, warn = threading.Event(), ThrottledWarning()
-    publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-    watch = SolverWatch(publisher) if has_solver_node else None
-
-    def publish() -> None:
-        if not is_on.is_set():
-            return
-        try:
-            if (message := problem()) is not None:
-                publisher.publish(message)
-                if watch is not None:
-                    watch.note_problem()
-        except (InterfaceError, ValueError) as error:
-            warn("no problem is published", str(error))
-
-    setup = Toggle("setup", is_on.set, is_on.clear)
-    if start_on_init:
-        setup.on()
-    ToggleService(f"{topics}/toggle", setup.on, setup.off)
-    WallTimer(hz, publish)
 
 
 class SetupNode:
@@ -238,6 +192,10 @@ def main() -> None:
 
     def make(name: str) -> object:
         trust_only_what_was_named()
-        return RobotIKSetup() if name == "pybullet" and rospy.has_param("~config") else SetupNode(name)
+        if name == "pybullet" and rospy.has_param("~config"):
+            return RobotIKSetup()
+        if name == "exotica" and not rospy.has_param("~child_frame_id"):
+            return ExoticaSetup()
+        return SetupNode(name)
 
     run_for_solver("setup", make)

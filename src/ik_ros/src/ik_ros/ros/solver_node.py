@@ -1,7 +1,10 @@
 """`ik_solver_node.py SOLVER`: problems of inverse kinematics in, joint targets out."""
 
+from __future__ import annotations
+
 import threading
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, cast
 
 import genpy
 import rospy
@@ -14,14 +17,17 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
+from ik_ros.msg import EXOTicaProblem, TracIKProblem
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
-from ik_ros.msg import TracIKProblem
 from ik_ros.node_configs import SolverNodeParameters
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.problem_stream import JointRateLimiter, ProblemStream
 from ik_ros.solvers import SOLVERS
 from ik_ros.srv import (
+    EXOTica,
+    EXOTicaRequest,
+    EXOTicaResponse,
     JointNames,
     JointNamesResponse,
     SolveIK,
@@ -32,16 +38,20 @@ from ik_ros.srv import (
     TracIKResponse,
 )
 
+from .exotica import problem_in_exotica, serve_info
 from .messages import pose_message, problem_in, problem_in_trac_ik, trajectory_message
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import BaseFrame
+
+if TYPE_CHECKING:
+    from ik_ros.solvers.exotica import ExoticaSolver
 
 QUEUE_SIZE = 10
 PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
 }
-"""Message types of the topic `ik`, and their readers."""
+"""Message types of the topic `ik` of every solver, and their readers."""
 
 
 class SolverNode:
@@ -77,8 +87,13 @@ class SolverNode:
         services = topics_of("solver", name)
         ToggleService(f"{services}/toggle", solving.on, solving.off)
         rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
+        self._readers = PROBLEMS
         by_type = {"solve_ik": (SolveIK, self._serve), "solve_trac_ik": (TracIK, self._serve_trac_ik)}
         by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the release
+        if name == "exotica":
+            self._readers = {**PROBLEMS, EXOTicaProblem._type: (EXOTicaProblem, problem_in_exotica)}
+            by_type["solve"] = EXOTica, self._serve_exotica
+            serve_info(cast("ExoticaSolver", self._solver))
         for service, (service_type, serve) in by_type.items():
             rospy.Service(f"{services}/{service}", service_type, serve)
 
@@ -105,10 +120,10 @@ class SolverNode:
 
     def _on_message(self, raw: rospy.AnyMsg, stream: ProblemStream) -> None:
         type_name = raw._connection_header["type"]
-        if type_name not in PROBLEMS:
-            self._warn(self._topic, f"expected {' or '.join(PROBLEMS)}, got {type_name}; refused")
+        if type_name not in self._readers:
+            self._warn(self._topic, f"expected {' or '.join(self._readers)}, got {type_name}; refused")
             return
-        message_type, read = PROBLEMS[type_name]
+        message_type, read = self._readers[type_name]
         message = message_type().deserialize(raw._buff)
         header, target = message.header, None
         try:
@@ -162,9 +177,10 @@ class SolverNode:
         )
 
     def _serve_trac_ik(self, request: TracIKRequest) -> TracIKResponse:
-        solution = self._solve_alone(problem_in_trac_ik, request.problem)
-        joints = JointState(name=solution.joint_names, position=solution.positions)
-        return TracIKResponse(solution.success, solution.message, joints)
+        return TracIKResponse(*_in_short(self._solve_alone(problem_in_trac_ik, request.problem)))
+
+    def _serve_exotica(self, request: EXOTicaRequest) -> EXOTicaResponse:
+        return EXOTicaResponse(*_in_short(self._solve_alone(problem_in_exotica, request.problem)))
 
     def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
         """Returns the answer of the solver itself, with neither start nor targets of the problems on the topic."""
@@ -174,6 +190,11 @@ class SolverNode:
                 return self._solver.solve(self._base.with_poses_in_it(problem, message.header.frame_id))
         except (InterfaceError, ValueError) as error:
             return IKSolution(False, str(error), (), ())
+
+
+def _in_short(solution: IKSolution) -> tuple[bool, str, JointState]:
+    """Returns an answer in the three fields of the release's services."""
+    return solution.success, solution.message, JointState(name=solution.joint_names, position=solution.positions)
 
 
 def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:

@@ -12,6 +12,7 @@ SOLVERS: PluginTable[Solver] = PluginTable(
         "trac_ik": "ik_ros.solvers.trac_ik:TracIkSolver",
         "global": "ik_ros.solvers.global_search:GlobalSolver",
         "tasks": "ik_ros.solvers.tasks:TasksSolver",
+        "exotica": "ik_ros.solvers.exotica:ExoticaSolver",
         "trajectory": "ik_ros.solvers.trajectory:TrajectorySolver",
     },
 )

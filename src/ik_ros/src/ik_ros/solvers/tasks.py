@@ -159,7 +159,8 @@ class TasksSolver(Solver):
             merits.append(tried.merit)
             if self._is_at_its_end(candidates, merits, tried.step):
                 break
-        return min(reversed(candidates), key=lambda candidate: candidate.rank)  # of equal ones the last
+        best = min(range(len(candidates)), key=lambda i: (candidates[i].rank, merits[i], -i))  # of equal ones the last
+        return candidates[best]
 
     def _is_at_its_end(self, candidates: Sequence[Candidate], merits: Sequence[float], step: float) -> bool:
         """Returns whether there is nothing more to be had from one start."""

@@ -39,6 +39,22 @@ def _of_its_type(value: Any, info: ValidationInfo) -> Any:
 AnyTask = Annotated[TaskConfig, BeforeValidator(_of_its_type)]
 
 
+class FrameOnLinkConfig(ConfigModel):
+    """A frame at a link, such as the tip of a tool.
+
+    Attributes:
+        name: What tasks call it.
+        link: The link.
+        position: Position in the link [m].
+        orientation: Orientation in it, quaternion x, y, z, w.
+    """
+
+    name: Text
+    link: Text
+    position: Position = (0.0, 0.0, 0.0)
+    orientation: Quat = (0.0, 0.0, 0.0, 1.0)
+
+
 class Formulation(ConfigModel):
     """Options of the solver `tasks`.
 
@@ -51,6 +67,7 @@ class Formulation(ConfigModel):
         base_orientation: Its orientation then, quaternion x, y, z, w.
         joints: The joints to find positions for; without any, all that move. The others stay where the problem starts.
         start: Where joints start that a problem's start leaves out [rad or m]; else in the middle of their limits.
+        frames: Frames at links, which tasks can name as they name links.
         shapes: Shapes of links and obstacles in tasks of type `distance`.
         costs: Tasks to minimise.
         constraints: Tasks that have to hold.
@@ -67,6 +84,7 @@ class Formulation(ConfigModel):
     base_orientation: Quat = (0.0, 0.0, 0.0, 1.0)
     joints: ListOf[Text] = ()
     start: dict[str, float] = Field(default_factory=dict)
+    frames: ListOf[FrameOnLinkConfig] = ()
     shapes: ListOf[ShapeConfig] = ()
     costs: ListOf[AnyTask] = ()
     constraints: ListOf[AnyTask] = ()
@@ -167,6 +185,9 @@ def _robot(formulation: Formulation) -> PinocchioRobot:
     for name in formulation.start:
         if name not in robot.all_joints:
             raise KeyedError("start", str(UnknownNameError("joint", name, robot.all_joints)))
+    for i, frame in enumerate(formulation.frames):
+        with keyed_errors(f"frames[{i}]"):
+            robot.add_frame(frame.name, frame.link, Pose(frame.position, frame.orientation))
     for i, shape in enumerate(formulation.shapes):
         if shape.name in [other.name for other in formulation.shapes[:i]]:
             raise KeyedError(f"shapes[{i}].name", f"there is another shape '{shape.name}'")

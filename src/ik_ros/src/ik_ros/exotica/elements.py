@@ -1,0 +1,199 @@
+"""The elements of an EXOTica problem as models: their fields, types and defaults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, ClassVar, TypeVar
+
+from pydantic import BeforeValidator, Field, ValidationInfo
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import ConfigModel, InnerProblemsError, Text
+from robot_model.asset_files import ExistingFile
+from robot_model.geometry import Pose, normalized
+
+from .records import XmlRecord
+from .rotations import rotation_of
+
+Element = TypeVar("Element", bound="ElementConfig")
+MAX_NUMBERS = 10_000
+
+
+def _numbers(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    words = value.split()
+    if len(words) > MAX_NUMBERS:
+        raise ValueError(f"expected at most {MAX_NUMBERS} numbers, got {len(words)}")
+    try:
+        return tuple(float(word) for word in words)
+    except ValueError:
+        raise ValueError(f"expected numbers with spaces between them, got {value[:60]!r}") from None
+
+
+def _number(value: Any) -> Any:
+    numbers = _numbers(value)
+    if isinstance(numbers, tuple) and len(numbers) != 1:
+        raise ValueError(f"expected one number, got {len(numbers)}")
+    return numbers[0] if isinstance(numbers, tuple) else numbers
+
+
+def _whole(value: Any) -> Any:
+    number = _number(value)
+    return int(number) if isinstance(number, float) and number.is_integer() else number
+
+
+def _flag(value: Any) -> Any:
+    return {"true": True, "1": True, "false": False, "0": False}.get(str(value).strip().lower(), value)
+
+
+def pose_of(numbers: tuple[float, ...]) -> Pose:
+    """Returns the pose that 3 (position), 6 (and roll, pitch, yaw) or 7 numbers (and a quaternion) stand for.
+
+    Raises:
+        ValueError: If there are others.
+    """
+    if len(numbers) not in (3, 6, 7) or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"expected 3, 6 or 7 finite numbers, got {list(numbers)}")
+    x, y, z, *turn = numbers
+    if not turn:
+        return Pose((x, y, z))
+    return Pose((x, y, z), normalized(rotation_of("RPY" if len(turn) == 3 else "Quaternion", turn)))
+
+
+def _pose(value: Any) -> Any:
+    return pose_of(_numbers(value)) if isinstance(value, str) else value
+
+
+Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
+Number = Annotated[float, BeforeValidator(_number)]
+Whole = Annotated[int, BeforeValidator(_whole)]
+Flag = Annotated[bool, BeforeValidator(_flag)]
+PoseNumbers = Annotated[Pose, BeforeValidator(_pose)]
+
+
+class ElementConfig(ConfigModel):
+    """An element with fields.
+
+    Attributes:
+        IGNORED: Fields of EXOTica that have no effect here.
+    """
+
+    IGNORED: ClassVar[frozenset[str]] = frozenset(("Debug",))
+    Name: str = ""
+
+
+def element_of(model: type[Element], record: XmlRecord, file: str) -> Element:
+    """Returns the element of a record.
+
+    Raises:
+        ConfigError: If a field is wrong; keys are relative to the element.
+    """
+    fields = {key: value for key, value in record.fields.items() if key not in model.IGNORED}
+    return model.parse(fields, file)
+
+
+def list_of(models: Callable[[], Mapping[str, type[ElementConfig]]], kind: str) -> BeforeValidator:
+    """Returns the validator of a field that has records in it.
+
+    Args:
+        models: Returns the models by tag; a record of another tag is rejected by its name.
+        kind: Noun for one of the records, in messages.
+    """
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        if value == "":
+            return ()
+        if not isinstance(value, list) or not all(isinstance(each, XmlRecord) for each in value):
+            return value if isinstance(value, tuple) else _refuse(kind, value)
+        elements: list[ElementConfig] = []
+        problems: list[Problem] = []
+        for record in value:
+            label = str(record.fields.get("Name", "")) or record.kind
+            if record.kind not in models():
+                problems.append(Problem("", label, str(UnknownNameError(kind, record.kind, models()))))
+                continue
+            try:
+                elements.append(element_of(models()[record.kind], record, (info.context or {}).get("file", "")))
+            except ConfigError as error:
+                problems += [Problem("", f"{label}.{each.key}".rstrip("."), each.message) for each in error.problems]
+        if problems:
+            raise InnerProblemsError(problems)
+        return tuple(elements)
+
+    return BeforeValidator(check)
+
+
+def _refuse(kind: str, value: Any) -> Any:
+    raise ValueError(f"expected elements, each a {kind}, got {str(value)[:60]!r}")
+
+
+class MapFrame(ElementConfig):
+    """A frame of a task map: `Link` with its offset, in `Base` with its own."""
+
+    Link: Text
+    LinkOffset: PoseNumbers = Pose()
+    Base: str = ""
+    BaseOffset: PoseNumbers = Pose()
+
+
+class LinkConfig(ElementConfig):
+    """A frame of the scene that is not of the robot."""
+
+    IGNORED = frozenset(("Debug", "Mass", "CenterOfMass", "Shape"))
+    Name: Text
+    Transform: PoseNumbers = Pose()
+    Parent: str = ""
+
+
+class SceneConfig(ElementConfig):
+    """The robot, and what is around it; collisions are not checked."""
+
+    IGNORED = frozenset(
+        (
+            "Debug",
+            "RobotDescription",
+            "SetRobotDescriptionRosParams",
+            "CollisionScene",
+            "AlwaysUpdateCollisionScene",
+            "DoNotInstantiateCollisionScene",
+            "RobotLinksToExcludeFromCollisionScene",
+            "WorldLinksToExcludeFromCollisionScene",
+        )
+    )
+    JointGroup: Text
+    URDF: ExistingFile
+    SRDF: ExistingFile
+    Links: Annotated[tuple[LinkConfig, ...], list_of(lambda: {"Link": LinkConfig}, "link of a scene")] = ()
+
+
+class CostConfig(ElementConfig):
+    """How much a task map counts in the costs, and its goal."""
+
+    Task: Text
+    Rho: Numbers = ()
+    Goal: Numbers = ()
+
+
+class SolverConfig(ElementConfig):
+    """The solver `IKSolver`."""
+
+    IGNORED = frozenset(
+        (
+            "Debug",
+            "MaxStep",
+            "Tolerance",
+            "Convergence",
+            "C",
+            "Alpha",
+            "RegularizationRate",
+            "MinimumRegularization",
+            "MaximumRegularization",
+            "ThresholdRegularizationIncrease",
+            "ThresholdRegularizationDecrease",
+            "StepToleranceConvergenceThreshold",
+            "GradientToleranceConvergenceThreshold",
+        )
+    )
+    MaxIterations: Annotated[Whole, Field(gt=0, le=100_000)] = 100
