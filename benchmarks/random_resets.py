@@ -23,8 +23,8 @@ LIVES, LIFE = 2, (20, 250)
 TICKS, EVERY = 250, 50
 """Ticks of the life that is compared, and between two hashes."""
 MAY_SLEEP, SLEEPS = "ACTIVATION_STATE_ENABLE_SLEEPING", "ACTIVATION_STATE_ENABLE_SLEEPING|ACTIVATION_STATE_SLEEP"
-SLEEPY = 0.15
-"""Share of worlds with bodies that may sleep, which are loaded again."""
+ALONE, SLEEPY = 0.9, 0.05
+"""Shares of worlds with one free body, and with bodies that may sleep; worlds with more, or sleep, are loaded again."""
 JOINTS = tuple(f"lbr_iiwa_joint_{number}" for number in range(1, 8))
 
 
@@ -65,7 +65,7 @@ def _compare(seed: int) -> tuple[bool, bool]:
 
 def _build(folder: Path, draw: random.Random) -> World:
     things, may_sleep = [], draw.random() < SLEEPY
-    for turn in range(draw.randint(2, 9)):
+    for turn in range(1 if draw.random() < ALONE else draw.randint(2, 9)):
         make = draw.choice((ball, box))
         lies = draw.random() < 0.5
         place = [draw.uniform(0.2, 0.7), draw.uniform(-0.5, 0.5), 0.1 if lies else 0.1 + 0.21 * turn]
@@ -73,11 +73,17 @@ def _build(folder: Path, draw: random.Random) -> World:
         if may_sleep and draw.random() < 0.5:
             dynamics["activationState"] = draw.choice((MAY_SLEEP, SLEEPS))
         things.append(make(f"thing{turn}", basePosition=place, changeDynamics=dynamics))
+    walls = tuple(
+        box(f"wall{turn}", basePosition=[draw.uniform(0.2, 0.8), draw.uniform(-0.5, 0.5), draw.uniform(-0.05, 0.2)])
+        for turn in range(draw.randrange(5))
+    )
+    for wall in walls:
+        del wall["baseMass"]
     joints = {name: draw.uniform(-60.0, 60.0) for name in JOINTS}
     return World.from_file(
         write_world(
             folder,
-            collision=(draw.choice((FLOOR, BOX_FLOOR)),),
+            collision=(draw.choice((FLOOR, BOX_FLOOR)), *walls),
             dynamic=tuple(things),
             robots=(iiwa(initial_joint_position=joints, target_interpolation=draw.choice(("hold", "smooth"))),),
             timeStep=draw.choice((0.001, 0.002, 0.005)),
@@ -91,7 +97,7 @@ def _live(world: World, seed: float, ticks: int) -> list[Any]:
     draw = random.Random(seed)
     hashes = []
     names = [name for name in world.bodies if name.startswith("thing")]
-    for name in draw.sample(names, draw.randrange(3)):
+    for name in draw.sample(names, draw.randrange(min(len(names), 2) + 1)):
         world.change_dynamics(name, {"mass": draw.uniform(0.2, 3.0), "lateralFriction": draw.uniform(0.1, 1.0)})
     for tick in range(ticks):
         if draw.random() < 0.05:

@@ -78,8 +78,12 @@ def test_a_state_that_was_saved_after_such_a_reset_is_restored(world):
 
 def test_bodies_with_a_state_of_their_own_are_loaded_again(tmp_path):
     sensor = {"enabled_joint_force_torque_sensors": [{"joint": "swing", "hz": 100}]}
-    rigid = ball(useMaximalCoordinates=True)
-    for path in (gym_world.write(tmp_path, **sensor), write_world(tmp_path, dynamic=(rigid,))):
+    several = ball("first"), ball("second", basePosition=[0.0, 0.0, 1.0])
+    paths = [gym_world.write(tmp_path, **sensor)]
+    for number, things in enumerate(((ball(useMaximalCoordinates=True),), several)):
+        (folder := tmp_path / str(number)).mkdir()
+        paths.append(write_world(folder, dynamic=things))
+    for path in paths:
         world = World.from_file(path)
         world.reset(rebuild=False)
         before = list(world.bodies.values())
