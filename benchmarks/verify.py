@@ -7,11 +7,13 @@ import os
 import re
 import sys
 import tempfile
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from bench_worlds import arm_world
 from result import Result, Target
 from session import Session
 
@@ -43,6 +45,11 @@ SCENES = {
     "a person's stick": Scene(("teleop.launch", "device:=joystick"), "/toggle_teleop_tf", "stick", 3.0),
 }
 EPISODES, QUICK_EPISODES = 250, 3
+HOURS_S, QUICK_HOURS_S = 7200.0, 120.0
+"""Length of the episode with keyframes, in simulated time [s]."""
+HZ, KEYFRAME_S = 50.0, 60.0
+"""Steps a second of its world, and period of its keyframes [s]."""
+BOX = "{rpbi_examples}/configs/basic_example_kuka_lwr/box.yaml"
 SHORTEST_S = 0.6
 """Length of the shortest episode, in wall time [s]."""
 CHANGED = 20
@@ -61,7 +68,8 @@ def run(quick: bool) -> list[Result]:
             ]
         for recording in recordings:
             recording.result()
-        return [result for name in SCENES for result in _verified(name, folders[name])]
+        results = [result for name in SCENES for result in _verified(name, folders[name])]
+        return [*results, *_hours(EpisodeFolder(Path(root) / "hours"), QUICK_HOURS_S if quick else HOURS_S)]
 
 
 def _verified(name: str, folder: EpisodeFolder) -> list[Result]:
@@ -77,6 +85,27 @@ def _verified(name: str, folder: EpisodeFolder) -> list[Result]:
         Result("verify", f"{name}: the same, of {len(numbers)}", same, "", None, Target(len(numbers), True)),
         Result("verify", changed, named, "", None, Target(affected, True)),
     ]
+
+
+def _hours(folder: EpisodeFolder, seconds: float) -> list[Result]:
+    """Records one long episode with keyframes as fast as it goes, and times its verification."""
+    with Session() as ros:
+        main = {"real_time_factor": 0, "keyframe_every_s": KEYFRAME_S, "dynamic_objects": [BOX]}
+        ros.simulator(arm_world(ros.folder, HZ, HZ / 10.0, False, **main))
+        ros.set_parameters("/record", {"folder": str(folder.path), "reset": True, "disk_reserve_mb": 100.0})
+        ros.node(["rosrun", "episodes", "record_node.py"], "/record/start")
+        ros.result_of(ros.program("record_hours", seconds), timeout_s=seconds)
+    what = f"an episode of {seconds:g} s with a keyframe each {KEYFRAME_S:g} s"
+    results = []
+    for jobs in (1, 2):
+        begin_s = time.perf_counter()
+        (verdict,) = verify_all(folder, folder.numbers(), jobs, ())
+        taken_s = time.perf_counter() - begin_s
+        results += [
+            Result("verify", f"{what}, {jobs} processes: wall time", taken_s, "s"),
+            Result("verify", f"{what}, {jobs} processes: the same", int(verdict.is_same), "", None, Target(1, True)),
+        ]
+    return results
 
 
 def _record(scene: Scene, folder: EpisodeFolder, count: int) -> None:

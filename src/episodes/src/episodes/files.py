@@ -235,6 +235,15 @@ def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
                 yield f"{each['path']} differs from its copy in the episode"
 
 
+def stored_names(files: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, str]:
+    """Returns the paths of the copies that `with_stored_files` lays out, by those of the files.
+
+    Raises:
+        ConfigError: If the name of a file leaves the folder.
+    """
+    return {each["path"]: str(path_below(folder, each["path"])) for each in files if each["sha256"]}
+
+
 def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], store: Path, folder: Path) -> str:
     """Returns a world's description that reads the copies instead of the files themselves.
 
@@ -270,9 +279,7 @@ def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], stor
                 urdf = path_below(folder, each["path"])
                 text = urdf.read_text(encoding="utf-8", errors="surrogateescape")
                 urdf.write_text(_with_meshes(text, meshes), encoding="utf-8", errors="surrogateescape")
-    moved = {
-        json.dumps(each["path"]): json.dumps(str(path_below(folder, each["path"]))) for each in files if each["sha256"]
-    }
+    moved = {json.dumps(path): json.dumps(here) for path, here in stored_names(files, folder).items()}
     for holder in (data, *data["objects"]):
         holder["config"] = _JSON_TEXT.sub(lambda match: moved.get(match[0], match[0]), holder["config"])
     data["files"] = {path: digest for path, digest in data["files"].items() if path in data["descriptions"]}

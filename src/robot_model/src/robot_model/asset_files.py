@@ -124,11 +124,18 @@ def resolve_package(name: str) -> Path:
 
 
 def _assets() -> Path:
-    folders = (Path(entry) / "cmeel.prefix" / "share" / ASSETS for entry in sys.path)
+    try:
+        return _assets_below(tuple(sys.path))
+    except MissingDependency as missing:
+        raise ValueError(str(missing)) from missing
+
+
+@lru_cache(maxsize=1)
+def _assets_below(entries: tuple[str, ...]) -> Path:
+    folders = (Path(entry) / "cmeel.prefix" / "share" / ASSETS for entry in entries)
     found = next((folder for folder in folders if folder.is_dir()), None)
     if found is None:
-        missing = MissingDependency(ASSETS, "./rpbi setup assets")
-        raise ValueError(str(missing)) from missing
+        raise MissingDependency(ASSETS, "./rpbi setup assets")
     return found
 
 

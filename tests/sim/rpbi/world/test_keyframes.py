@@ -13,6 +13,7 @@ import pytest
 import scripted_session
 import sleeping_session
 import streaming_session
+from gripper import gripper
 from soft_meshes import DEFORMABLE, GROUND, block
 from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
@@ -184,6 +185,33 @@ def session(tmp_path):
     return recording
 
 
+def test_looking_at_bodies_changes_no_keyframe(heap):
+    state = heap.save()
+    heap.keyframe()
+    other = World.from_state(state)
+    for body in other.bodies.values():
+        body.base_pose()
+    assert other.bodies["iiwa"].kinematics
+    other.keyframe(heap.save().keyframe)
+    other.close()
+
+
+def test_a_keyframe_is_that_of_the_same_files_elsewhere(tmp_path):
+    texts = []
+    for name in ("here", "there"):
+        (folder := tmp_path / name).mkdir()
+        world = World.from_file(write_world(folder, robots=(gripper(folder),)))
+        hash_later(world, 20)
+        texts.append(world.save(keyframe=True).keyframe)
+        world.reset()
+        if name == "there":
+            names = {str(file).replace("/there/", "/here/"): str(file) for file in folder.glob("*.urdf")}
+            moved = keyframes.renamed(texts[0], names)
+            assert names and keyframes.difference(texts[0], texts[1]) and not keyframes.difference(moved, texts[1])
+            world.enter_keyframe(moved)
+        world.close()
+
+
 @pytest.mark.parametrize("jobs", [1, 2, 3])
 def test_parts_of_a_recording_agree_in_any_number_of_processes(session, jobs):
     groups = groups_of(session.parts(), jobs)
@@ -284,7 +312,7 @@ def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):
 @pytest.mark.parametrize(
     ("written", "forged", "reason"),
     [
-        ('"format":1', '"format":9', "format 9, this version reads 1"),
+        ('"format":2', '"format":9', "format 9, this version reads 2"),
         ("{", "{", "keyframe: "),
         ("rpbi.world.keyframes.motion:BodyMotion", "subprocess:Popen", "makes no sense"),
         ("rpbi.control.motors:Motors", "rpbi.engine.client:Client", "does not come while a world runs"),

@@ -16,7 +16,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.foreign import printable
 from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
-from episodes.files import changed_files, newer_files, with_stored_files
+from episodes.files import changed_files, newer_files, stored_names, with_stored_files
 from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
 from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import RecordedPart, Recording, Replay, ReplayResult
@@ -142,6 +142,7 @@ def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs:
             any_size=limits.any_size,
             earlier=file_in(place, EARLIER),
             relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
+            names=stored_names(episode.files, Path(files)),
         )
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)

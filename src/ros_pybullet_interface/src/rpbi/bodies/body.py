@@ -47,6 +47,8 @@ class Body:
     example: ClassVar[Mapping[str, Any]] = {}
     """Keys of a YAML, without its name, that asks for all that a body of this type can have in ROS, and follows the TF
     frame `FRAME` if it can follow one. The reference pages are written from it."""
+    not_in_keyframes: ClassVar[tuple[str, ...]] = ("_inertial", "_base")
+    """Attributes that are no state but caches, which somebody who looks at the body fills."""
     object_tf: ObjectTf | None = None
     """The TF frame that its base follows, if it follows one."""
 

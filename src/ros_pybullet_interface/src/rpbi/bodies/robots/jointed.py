@@ -40,6 +40,7 @@ class JointedBody(Body):
 
     Config = RobotConfig
     section = "robots"
+    not_in_keyframes = (*Body.not_in_keyframes, "kinematics")
     force_torque_sensors: tuple[ForceTorqueSensor, ...] = ()
     base_joints: ClassVar[int] = 0
     """Number of joints that `prepare_urdf` adds between the world and the root link."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import re
 import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -25,7 +26,7 @@ from .building import FreshClient
 from .graph import GraphReader, GraphWriter
 from .motion import BodyMotion, asleep, put_to_sleep
 
-FORMAT = 1
+FORMAT = 2
 """Version of the text's layout."""
 MAX_BYTES = 1 << 26
 """Largest size of an unpacked keyframe [bytes]."""
@@ -34,6 +35,8 @@ MAX_VALUES = 5_000_000
 _FIXED = (Client, Clock, ContactReader, Joint, JointModel, Kinematics, RobotDynamics)
 """Types of objects that a world has in the same way whenever it is built."""
 _SENSORS = "sensors"
+_JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
+"""A text in JSON."""
 
 
 class Keyframe:
@@ -110,6 +113,16 @@ def _objects(world: Any, contents: WorldContents) -> dict[str, Any]:
     writer = GraphWriter((*_FIXED, type(world)), anchors)
     written = ((name, anchor) for name, anchor in anchors.items() if anchor is not contents.bodies)
     return {name: writer.attributes(anchor, name.removeprefix("bodies/")) for name, anchor in written}
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """Returns the text of a keyframe with other names of files, by their own.
+
+    Raises:
+        ValueError: If the text is no keyframe.
+    """
+    written = {json.dumps(before): json.dumps(after) for before, after in names.items()}
+    return _packed(_JSON_TEXT.sub(lambda match: written.get(match[0], match[0]), _unpacked(text)))
 
 
 def difference(first: str, second: str) -> str:

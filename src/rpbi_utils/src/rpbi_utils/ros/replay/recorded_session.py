@@ -1,7 +1,8 @@
 """Reads the recorded session of a simulator from a bag."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import genpy
@@ -9,8 +10,11 @@ from std_msgs.msg import String
 
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.replay.session import Checkpoint, Recording
+from rpbi.world.keyframes.keyframe import renamed
 from rpbi.world.saved.command_log import RecordedCommand
+from rpbi.world.saved.commands import KEYFRAME
 from rpbi.world.saved.description import WorldDescription
+from rpbi.world.saved.values import from_text, to_text
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader
 
@@ -33,6 +37,7 @@ def read_recording(
     *,
     earlier: Path | None = None,
     relocate: Callable[[str], str] = lambda description: description,
+    names: Mapping[str, str] = MappingProxyType({}),
     needs_states: bool = True,
 ) -> Recording:
     """Returns the session of one simulator that a bag holds.
@@ -43,6 +48,7 @@ def read_recording(
         any_size: Whether to read a bag that exceeds the limit on unpacked bytes, see `BagReader`.
         earlier: A bag of `rpbi/commands` before the recording, if there is one.
         relocate: Returns the world's description with other names of its files.
+        names: These names, for the files in keyframes, by their own.
         needs_states: Whether states to compare have to be in the bag, as for a replay.
 
     Raises:
@@ -75,9 +81,18 @@ def read_recording(
     try:
         if earlier is not None:
             _read_commands(earlier, f"{prefix}rpbi/commands", any_size, commands)
+        if names:
+            _rename(commands, names)
         return Recording(WorldDescription(relocate(descriptions[0])), commands, checkpoints)
     except ValueError as error:
         raise BagError(path, str(error)) from None
+
+
+def _rename(commands: _Commands, names: Mapping[str, str]) -> None:
+    for life in commands.values():
+        for index, each in life.items():
+            if each.what == KEYFRAME:
+                life[index] = each._replace(data=to_text(renamed(str(from_text(each.data)), names)))
 
 
 def require_few_ticks(path: Path, recording: Recording, max_ticks: int) -> int:
