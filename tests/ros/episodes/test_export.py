@@ -17,7 +17,7 @@ from pyarrow import parquet
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Float64
-from written_episodes import CAMERA, JOINTS, STATES, WRENCH, write_episode
+from written_episodes import CAMERA, JOINTS, STATES, TARGETS, WRENCH, write_episode
 
 from episodes import EpisodeFolder, episodes_to_dataframes
 from episodes.datasets.formats import lerobot
@@ -78,12 +78,18 @@ def test_rows_are_resampled_and_have_true_stamps_and_errors(rows, demos):
     assert 0.01 < errors[:, names.index("observation.images.camera_colour")].max() < 0.04
 
 
-def test_actions_are_the_newest_targets_and_before_them_the_measured_positions(rows, demos):
+@pytest.mark.parametrize("timing", ["next", "previous"])
+def test_actions_are_the_newest_targets_and_before_them_the_measured_positions(timing, rows, demos, tmp_path, run):
+    """The default, next, has the target that was in force at the end of the row, which LeRobot records."""
     columns, _ = rows
+    if timing == "previous":
+        assert run("export", demos.path, "--out", tmp_path / "out", "--images", "--action", timing)[0] == 0
+        table = parquet.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")
+        columns = {key: np.array(table.column(key).to_pylist()) for key in table.column_names}
     own = first_of(columns, 0)
-    times = columns["source.stamp"][own] @ np.array([1.0, 1e-9])
-    targets = bag_to_dataframes(demos.folder_of(0) / "episode.bag", "/rpbi/arm/joint_states/target")
-    (targets,) = targets.values()
+    rows_ns = columns["source.stamp"][own] @ np.array([10**9, 1])
+    times = rows_ns + round(1e9 / 30) - 1 if timing == "next" else rows_ns
+    targets = bag_to_dataframes(demos.folder_of(0) / "episode.bag", TARGETS, nanoseconds=True)[TARGETS]
     actions, states = columns["action"][own], columns["observation.state"][own]
     before = times < targets.index[0]
     assert before.any() and not before.all()
@@ -142,6 +148,8 @@ def test_robomimic_has_scaled_actions_rewards_and_a_mask(rows, exported):
             assert demo["rewards"][-1] == (index != 1) and demo["dones"][-1] == 1
             assert demo["obs/images_camera_colour"].shape == (len(actions), 84, 84, 3)
         assert [each.decode() for each in file["mask/success"]] == ["demo_0", "demo_2"]
+        train, valid = ({each.decode() for each in file[f"mask/{name}"]} for name in ("train", "valid"))
+        assert len(valid) == 1 and train | valid == {"demo_0", "demo_1", "demo_2"} and not train & valid
         assert json.loads(file["data"].attrs["env_args"])["env_name"] == "ros_pybullet_interface"
 
 

@@ -28,8 +28,8 @@ def time_of(stamp_ns: int) -> genpy.Time:
     return genpy.Time(stamp_ns // 10**9, stamp_ns % 10**9)
 
 
-def rows_of(begin: int, fps: int) -> list[int]:
-    return [begin + (2 * k * 10**9 + fps) // (2 * fps) for k in range(COUNT)]
+def rows_of(begin: int, fps: int, count: int = COUNT) -> list[int]:
+    return [begin + (2 * k * 10**9 + fps) // (2 * fps) for k in range(count)]
 
 
 def write_random_episode(folder: EpisodeFolder, seed: int, fps: int, begin: int) -> None:
@@ -55,11 +55,15 @@ def write_random_episode(folder: EpisodeFolder, seed: int, fps: int, begin: int)
 
 
 @pytest.mark.parametrize("fps", [25, 30, 60])
-def test_rows_have_the_newest_samples_at_or_before_their_time(tmp_path, run, fps):
+@pytest.mark.parametrize("timing", ["next", "previous"])
+def test_rows_have_the_newest_images_and_actions_of_their_time(tmp_path, run, fps, timing):
+    """Images, and previous actions, are at or before the row; next ones are before the next row."""
     folder = EpisodeFolder(tmp_path / "demos")
     for seed in range(4):
         write_random_episode(folder, seed, fps, BEGINS[seed % 2])
-    code, text = run("export", folder.path, "--fps", fps, "--out", tmp_path / "out", "--option", "crf=5")
+    code, text = run(
+        "export", folder.path, "--fps", fps, "--out", tmp_path / "out", "--action", timing, "--option", "crf=5"
+    )
     assert code == 0, text
     table = parquet.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")
     rows = {key: np.array(table.column(key).to_pylist()) for key in table.column_names}
@@ -74,12 +78,16 @@ def test_rows_have_the_newest_samples_at_or_before_their_time(tmp_path, run, fps
                 number = round(message.position[0]) if topic == TARGETS else message.data[0] // 5
                 sent[topic].append((message.header.stamp.to_nsec(), number))
         newest = {}
+        ends = [begin - 1 for begin in rows_of(BEGINS[index % 2], fps, COUNT + 1)[1:]]
         for topic, samples in sent.items():
             samples.sort()
             stamps = [stamp for stamp, _ in samples]
             ties += len({*stamps} & {*times})
-            newest[topic] = [samples[bisect.bisect_right(stamps, row) - 1] for row in times]
+            at = ends if (topic, timing) == (TARGETS, "next") else times
+            newest[topic] = [samples[bisect.bisect_right(stamps, until) - 1] for until in at]
         assert rows["action"][own].ravel().tolist() == [number for _, number in newest[TARGETS]]
+        errors = [abs(row - stamp) / 1e9 for row, (stamp, _) in zip(times, newest[TARGETS])]
+        assert rows["source.time_error"][own][:, -2] == pytest.approx(errors, abs=1e-9, rel=1e-6)
         ages = [(row - stamp) / 1e9 for row, (stamp, _) in zip(times, newest[CAMERA])]
         assert rows["source.time_error"][own][:, -1] == pytest.approx(ages, abs=1e-9, rel=1e-6)
         film = read_video(tmp_path / f"out/videos/observation.images.camera_colour/chunk-000/file-{index:03}.mp4")

@@ -32,6 +32,7 @@ def write_episode(
     has_targets: bool = True,
     set_back_s: float = 0.0,
     of_record: bool = True,
+    reset_s: float = math.inf,
 ) -> int:
     """Writes an episode and returns its number.
 
@@ -44,6 +45,7 @@ def write_episode(
         has_targets: Whether there are targets.
         set_back_s: Time by which the clock is set back in the middle [s].
         of_record: Whether the clock of the recorder is set back, too.
+        reset_s: Time at which the world is reset [s].
     """
     episode, part = folder.begin(seeds="7")
     with rosbag.Bag(str(part / BAG), "w", compression="lz4") as bag:
@@ -64,7 +66,12 @@ def write_episode(
                 for number, topic in enumerate(cameras):
                     bag.write(topic, _image(stamp, time_s + phase, number), recorded)
             if tick % 50 == 0:
-                state = SimulationState(tick=tick + 1, commands=tick // 10, state_hash=f"{hash((tick, phase)):x}")
+                state = SimulationState(
+                    resets=int(time_s > reset_s),
+                    tick=tick + 1,
+                    commands=tick // 10,
+                    state_hash=f"{hash((tick, phase)):x}",
+                )
                 state.header.stamp = stamp
                 bag.write("/rpbi/state", state, recorded)
     episode.state, episode.label, episode.seconds = "complete", label, seconds

@@ -40,6 +40,7 @@ class RobomimicConfig(ConfigModel):
     image_height: int = Field(84, ge=1, description="Rows of pixels of images, which are scaled.")
     image_width: int = Field(84, ge=1, description="Columns of pixels.")
     success: str = Field(SUCCESS, description="Label of episodes whose last row has the reward 1.")
+    valid: float = Field(0.1, ge=0.0, lt=1.0, description="Share of episodes in the filter `valid`.")
 
 
 class Robomimic(DatasetFormat):
@@ -123,6 +124,7 @@ class Robomimic(DatasetFormat):
         )
         names = {observation_key(each.key): list(each.names) for each in self._schema.features if each.key != ACTION}
         self._data.attrs["observation_names"] = json.dumps(names)
+        self._write_split(list(self._data))
         if self._success:
             self._file["mask/success"] = np.array(self._success, dtype="S")
         self._file.close()
@@ -139,6 +141,14 @@ class Robomimic(DatasetFormat):
         demo["dones"] = last.astype(np.int64)
         demo.attrs["num_samples"] = count
         demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
+
+    def _write_split(self, names: list[str]) -> None:
+        """Writes the filters `train` and `valid`, which share the episodes at random, always in the same way."""
+        count = max(1, round(self.config.valid * len(names))) if self.config.valid and len(names) > 1 else 0
+        chosen = {names[i] for i in np.random.default_rng(0).permutation(len(names))[:count]}
+        for name, of_filter in (("train", sorted({*names} - chosen)), ("valid", sorted(chosen))):
+            if of_filter:
+                self._file[f"mask/{name}"] = np.array(of_filter, dtype="S")
 
     def _images(self, camera: CameraFeature, episode: ExportedEpisode) -> tuple[Array, Array]:
         size = (self.config.image_width, self.config.image_height)

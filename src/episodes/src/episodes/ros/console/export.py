@@ -1,5 +1,6 @@
 """The command `export`."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +12,11 @@ from custom_ros_tools.foreign import printable
 from episodes.datasets.formats import FORMATS
 from episodes.folder import EpisodeFolder
 from episodes.ros.export.folder import Wish, export_folder
-from episodes.ros.export.signals import Choice
+from episodes.ros.export.signals import NEXT, PREVIOUS, Choice
+
+POSE, DELTAS = "pose", "deltas"
+WORDS = (NEXT, PREVIOUS, POSE, DELTAS)
+"""Words of `--action`; all else are topics."""
 
 
 def export(
@@ -23,8 +28,12 @@ def export(
     task: Annotated[str, Argument("TEXT")] = "",
     label: Annotated[Sequence[str], Argument("LABEL ...")] = (),
     state: Annotated[Sequence[str] | None, Argument("TOPIC ...")] = None,
-    action: Annotated[Sequence[str] | None, Argument("TOPIC ...")] = None,
+    action: Annotated[Sequence[str], Argument("WORD|TOPIC ...")] = (),
     images: Annotated[Sequence[str] | None, Argument("[TOPIC ...]")] = None,
+    features: Annotated[Sequence[str] | None, Argument("[NAME ...]")] = None,
+    end_effector: Annotated[str, Argument("ROBOT/LINK")] = "",
+    gripper: Annotated[Sequence[str], Argument("JOINT ...")] = (),
+    max_time_error: Annotated[float, Argument("S", parse=number)] = math.inf,
     option: Annotated[Sequence[str], Argument("KEY=VALUE ...")] = (),
     disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
     any_size: Annotated[bool, Argument("")] = False,
@@ -38,7 +47,9 @@ def export(
 
     Usage:
         ./rpbi export DIR [--to FORMAT] [--out DIR] [--fps N] [--task TEXT] [--label LABEL ...]
-                      [--state TOPIC ...] [--action TOPIC ...] [--images [TOPIC ...]]
+                      [--state TOPIC ...] [--action [next|previous] [pose] [deltas] [TOPIC ...]]
+                      [--images [TOPIC ...]] [--features [NAME ...]] [--end-effector ROBOT/LINK]
+                      [--gripper JOINT ...] [--max-time-error S]
                       [--option KEY=VALUE ...] [--disk-reserve-mb MB] [--any-size]
 
     Args:
@@ -49,8 +60,14 @@ def export(
         task: the task in words; the name of DIR without it
         label: only episodes with one of these labels
         state: topics of observation.state; the positions of all joints without it
-        action: topics of action; the targets of all joints without it
+        action: next, the newest command before the next row, as in LeRobot, is the default; previous: before the row;
+            pose: that of the end effector at the next row, not commands; deltas: changes, not values;
+            TOPIC ...: commands other than the targets of all joints
         images: topics of images; all cameras without it, none without a topic
+        features: observations beside the state, such as velocity 'pose.*' contact_force.box; all without it
+        end_effector: also observes the pose of this link, which has to be on TF
+        gripper: joints that are an observation of their own, and come last in action
+        max_time_error: episodes with an observation further from its row are left out
         option: options of the format, such as preset=slow
         disk_reserve_mb: free space of the disk that is never used; 200 without it
         any_size: also bags that unfold to more than 1 GiB and 255 times their size
@@ -59,8 +76,24 @@ def export(
         raise UsageError(f"--fps: expected at least 1, got {fps}")
     found = FORMATS.configured(to, "--to")
     made: Any = found
-    choice = Choice(*(None if each is None else tuple(each) for each in (state, action, images)))
-    wish = Wish(fps, task or folder.absolute().name, tuple(label), choice, disk_reserve_mb, any_size)
+    words, topics = set(action) & {*WORDS}, tuple(each for each in action if each not in WORDS)
+    if len(words & {NEXT, PREVIOUS}) == 2 or words >= {PREVIOUS, POSE}:
+        raise UsageError(f"--action: expected next or previous, and pose only with next, got {' '.join(action)}")
+    if POSE in words and not end_effector:
+        raise UsageError("--action pose: expected --end-effector ROBOT/LINK, too")
+    choice = Choice(
+        state=None if state is None else tuple(state),
+        action=topics or None,
+        images=None if images is None else tuple(images),
+        features=None if features is None else tuple(features),
+        end_effector=end_effector,
+        gripper=tuple(gripper),
+        timing=PREVIOUS if PREVIOUS in words else NEXT,
+        is_pose=POSE in words,
+        is_delta=DELTAS in words,
+    )
+    name = task or folder.absolute().name
+    wish = Wish(fps, name, tuple(label), choice, disk_reserve_mb, any_size, max_time_error)
     target = out or folder.absolute().with_name(f"{folder.absolute().name}_{to.rpartition(':')[2]}")
     format_ = made(made.Config.parse(_options(option), "--option"))
     result = export_folder(EpisodeFolder(folder), target, to, format_, wish, lambda line: print(line, flush=True))

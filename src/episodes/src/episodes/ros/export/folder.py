@@ -37,9 +37,10 @@ class Wish(NamedTuple):
         fps: Rows a second.
         task: The task in words.
         labels: Labels of the episodes to export; empty for all.
-        choice: Topics of features.
+        choice: Content of rows.
         disk_reserve_mb: Free space of the disk that is never used [MB].
         any_size: Whether bags may exceed the limits of `BagReader`.
+        max_time_error_s: Largest time between a row and the nearest message of an observation [s].
     """
 
     fps: int
@@ -48,6 +49,7 @@ class Wish(NamedTuple):
     choice: Choice = Choice()
     disk_reserve_mb: float = 200.0
     any_size: bool = False
+    max_time_error_s: float = float("inf")
 
 
 @dataclass
@@ -129,7 +131,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
             if wish.labels and episode.label not in wish.labels:
                 continue
             _require_complete(folder, episode)
-            source = SourceEpisode(folder, episode, wish.choice, wish.task, wish.any_size)
+            source = SourceEpisode(folder, episode, wish.choice, wish.task, wish.any_size, wish.max_time_error_s)
             if format_.has_rows:
                 source.signals, source.cameras  # noqa: B018 (reads the bag)
                 _forget(source)
@@ -238,6 +240,8 @@ def _take_back(part: Path, format_: DatasetFormat, index: int) -> None:
 
 def _line(source: SourceEpisode, index: int, facts: dict[str, object]) -> str:
     note = f" ({sum(source.episode.lost.values())} messages lost in the recording)" if source.episode.lost else ""
+    if "cut" in facts and source.cut is not None:
+        note += f" (from its last reset on, at {source.cut.stamp_ns / 1e9:.9g} s)"
     size = f"{facts['frames']} frames" if "frames" in facts else "all messages"
     return f"episode {source.episode.number}: {size}, as {index}{note}"
 
@@ -266,4 +270,5 @@ def _facts(folder: EpisodeFolder, name: str, wish: Wish, plan: _Plan, result: Re
         "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras},
         "topics": {each.feature.key: sorted({table for table, _ in each.columns}) for each in plan.signals},
         "methods": {each.feature.key: each.method for each in plan.signals},
+        "action": {"pose": wish.choice.is_pose, "deltas": wish.choice.is_delta} if schema.fps else None,
     }

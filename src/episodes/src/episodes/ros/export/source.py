@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from custom_ros_tools.errors import ConfigError
 from episodes.datasets.format import (
+    ACTION,
     QUATERNION,
     STAMP,
     TIME_ERROR,
@@ -39,7 +40,29 @@ from rpbi_utils.ros.bags.bag_reader import BagMessage, BagReader
 from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
 from rpbi_utils.ros.bags.topic_report import message_time_ns
 
-from .signals import Choice, Signal, by_frame, derive, image_topics, is_used, wanted_topics
+from .actions import action_values, derive_actions
+from .signals import (
+    Choice,
+    Signal,
+    by_frame,
+    derive,
+    end_effector_columns,
+    image_topics,
+    is_used,
+    wanted_topics,
+)
+
+
+class Cut(NamedTuple):
+    """The beginning of the rows of an episode after resets of its world.
+
+    Attributes:
+        resets: Number of resets within the episode.
+        stamp_ns: Stamp of the first state after the last one [ns].
+    """
+
+    resets: int
+    stamp_ns: int
 
 
 class SourceEpisode(ExportedEpisode):
@@ -48,17 +71,24 @@ class SourceEpisode(ExportedEpisode):
     Args:
         folder: The folder.
         episode: The episode.
-        choice: Topics that the user names.
+        choice: Content of rows that the user chooses.
         task: The task in words.
         any_size: Whether its bag may exceed the limits of `BagReader`.
+        max_time_error_s: Largest time between a row and the nearest message of an observation [s].
     """
 
     def __init__(
-        self, folder: EpisodeFolder, episode: Episode, choice: Choice, task: str, any_size: bool = False
+        self,
+        folder: EpisodeFolder,
+        episode: Episode,
+        choice: Choice,
+        task: str,
+        any_size: bool = False,
+        max_time_error_s: float = np.inf,
     ) -> None:
         self.folder, self.episode, self.task, self.label = folder, episode, task, episode.label
         self.bag: Path = folder.folder_of(episode.number) / BAG
-        self._choice, self._any_size = choice, any_size
+        self._choice, self._any_size, self._max_time_error_s = choice, any_size, max_time_error_s
         self._schema = Schema(0, ())
         self._signals: tuple[Signal, ...] = ()
 
@@ -72,9 +102,25 @@ class SourceEpisode(ExportedEpisode):
 
         Raises:
             BagError: If the bag cannot be read.
-            UnknownNameError: If there is no topic that the user named.
+            UnknownNameError: If there is no topic, feature, frame or joint that the user named.
+            ValueError: If actions cannot be differences.
         """
-        return tuple(derive(self._tables, self._types, self.episode.namespace, self._fixed_joints(), self._choice))
+        choice, namespace, fixed = self._choice, self.episode.namespace, self._fixed_joints()
+        pose = end_effector_columns(self._tables, namespace, choice.end_effector) if choice.is_pose else ()
+        observations = derive(self._tables, self._types, namespace, fixed, choice)
+        return (*observations, *derive_actions(self._tables, self._types, fixed, choice, pose))
+
+    @cached_property
+    def cut(self) -> Cut | None:
+        """The last reset of the world within it, where its rows begin; None without one."""
+        topic = self._state_topic
+        if topic not in self._types:
+            return None
+        states = bag_to_dataframes(self.bag, topic, any_size=self._any_size, nanoseconds=True)[topic]
+        resets = states["resets"].to_numpy() if "resets" in states else np.empty(0)
+        if not len(resets) or resets[0] == resets[-1]:
+            return None
+        return Cut(int(resets[-1] - resets[0]), int(states.index[np.argmax(resets == resets[-1])]))
 
     @cached_property
     def cameras(self) -> tuple[CameraFeature, ...]:
@@ -163,6 +209,7 @@ class SourceEpisode(ExportedEpisode):
             if not np.isfinite(values[key]).all():
                 raise DatasetError(self.bag, f"'{key}' has values that are not finite")
         errors |= {key: (self.times - stamps) / 1e9 for key, stamps in image_stamps.items()}
+        self._require_near(errors)
         values[STAMP] = stamps_of(self.times)
         values[TIME_ERROR] = np.stack(list(errors.values()), axis=1).astype(np.float32)
         return values
@@ -178,10 +225,27 @@ class SourceEpisode(ExportedEpisode):
             "source": source,
             "task": self.task,
             "state_hashes": {"chain": chain, "last": chain[-1]["link"] if chain else ""},
+            **(
+                {"cut": {"resets": self.cut.resets, "stamp_ns": self.cut.stamp_ns}}
+                if self._signals and self.cut
+                else {}
+            ),
         }
+
+    def _require_near(self, errors: Mapping[str, Array]) -> None:
+        for key, error in errors.items():
+            row = int(np.argmax(error))
+            if key != ACTION and error[row] > self._max_time_error_s:
+                at = f"{error[row]:.3g} s from the row at {to_seconds(self.times[row])} s"
+                raise DatasetError(self.bag, f"'{key}': the nearest message is {at}, more than --max-time-error")
 
     def _resampled(self, signal: Signal) -> tuple[Array, Array]:
         """Returns the values of a feature, shape (n, columns), and its time error in each row, shape (n,) [s]."""
+        if signal.feature.key == ACTION:
+            end = self.times[0] + (2 * len(self.times) * PER_SECOND + self._schema.fps) // (2 * self._schema.fps)
+            matrix, error = action_values(signal, self._tables, self.times, np.append(self.times[1:], end))
+            _make_continuous(matrix, signal.feature)
+            return matrix.astype(signal.feature.dtype), error
         by_table: dict[str, list[str]] = {}
         for table, name in signal.columns:
             by_table.setdefault(table, []).append(name)
@@ -193,18 +257,9 @@ class SourceEpisode(ExportedEpisode):
         error = np.zeros(len(self.times))
         for table in found.values():
             error = np.fmax(error, table[RESAMPLING_ERROR].to_numpy(float))
-        if signal.held:
-            columns = [self._held(column, source) for column, source in zip(columns, signal.held)]
         matrix = np.stack(columns, axis=1)
         _make_continuous(matrix, signal.feature)
         return matrix.astype(signal.feature.dtype), error.astype(np.float32)
-
-    def _held(self, column: Array, source: Any) -> Array:
-        """Replaces what is missing before the first command by the measured position, or by 0."""
-        if source.table == "":
-            return np.where(np.isnan(column), 0.0, column)
-        measured = resample_exactly(self._tables[source.table][[source.name]], self.times, "linear")[source.name]
-        return np.where(np.isnan(column), measured.to_numpy(float), column)
 
     def _continuous_tables(self) -> list[str]:
         """Returns the names of the tables that rows begin and end with."""
@@ -217,7 +272,9 @@ class SourceEpisode(ExportedEpisode):
         tables = bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
-        return by_frame(tables)
+        if (cut := self.cut) is not None:
+            tables = {topic: table[table.index >= cut.stamp_ns] for topic, table in tables.items()}
+        return by_frame({topic: table for topic, table in tables.items() if len(table)})
 
     @cached_property
     def _types(self) -> dict[str, str]:
@@ -255,14 +312,20 @@ class SourceEpisode(ExportedEpisode):
                 stamp = message_time_ns(message)
                 self._require_steady(topic, SetBack(latest / 1e9, (latest - stamp) / 1e9))
                 latest = max(latest, stamp)
+                if self.cut is not None and stamp < self.cut.stamp_ns:
+                    continue
                 heapq.heappush(waiting, (stamp, number, message))
                 while latest - waiting[0][0] > MAX_BACK_S * PER_SECOND:
                     yield _image(*heapq.heappop(waiting))
             while waiting:
                 yield _image(*heapq.heappop(waiting))
 
+    @property
+    def _state_topic(self) -> str:
+        return f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
+
     def _states(self) -> Iterator[dict[str, Any]]:
-        topic = f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
+        topic = self._state_topic
         if topic not in self._types:
             return
         table = bag_to_dataframes(self.bag, topic, any_size=self._any_size)[topic]
