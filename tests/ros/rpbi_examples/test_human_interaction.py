@@ -6,6 +6,7 @@ import csv
 import re
 
 import pytest
+import rospy
 from PIL import Image
 from ros_system import wait_until
 
@@ -21,6 +22,7 @@ def test_one_press_and_release(ros, tmp_path):
     process = ros.start(["roslaunch", "rpbi_examples", "human_interaction.launch", *arguments])
     wait_until(lambda: process.poll() is not None, "it ends by itself")
     output = ros.output(process)
+    assert rospy.get_param("/ik_ros/interface") == "pybullet", "as the paper's section 3.1 has it"
     found = MEAN.search(output)
     assert found, output
     if "REQUIRED process" in output and "too slow: real-time factor" in output:

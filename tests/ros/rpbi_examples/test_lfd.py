@@ -5,6 +5,7 @@ Whole sessions by keys are in `tests/gui/rpbi_examples/test_lfd.py`, scripted on
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -35,6 +36,19 @@ def test_a_goal_out_of_reach_is_named(ros, tmp_path):
     assert "Traceback" not in output
     assert process.returncode == 1
     assert not (tmp_path / "summary.json").exists()
+
+
+def test_a_demonstration_is_learned_by_exotica_and_the_dmp_services(ros, tmp_path):
+    """A scripted person shows the push; the box is at its goal after an execution from a random start."""
+    choice = ("ik:=exotica", "dmp:=server", "goal:=-0.73 0", "real_time_factor:=0.5")
+    arguments = ("operator:=scripted", "headless:=true", "seed:=5", f"out:={tmp_path}", *choice)
+    process = ros.start([RPBI, "launch", "lfd", *arguments])
+    wait_until(lambda: process.poll() is not None, "it ends by itself", 400.0)
+    output = ros.output(process)
+    assert process.returncode == 0, output
+    assert "started with pid" in output and "dmp_server" in output
+    (executed,) = json.loads((tmp_path / "summary.json").read_text())["executions"]
+    assert executed["at_goal"] and executed["box_error_m"] < 0.03
 
 
 class Gamepad:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.transforms import Array
-from motion_primitives import Demonstration, MotionPlan, Primitive, make_primitive
+from motion_primitives import Demonstration, MotionPlan, make_primitive
 
 NAMES = ("x", "y")
 MOVED_M = 0.002
@@ -73,17 +74,40 @@ class PushPlan(NamedTuple):
         return place, velocity if 0.0 <= time_s < self.duration_s else np.zeros(2)
 
 
+class LearnedMotion(Protocol):
+    """A motion that was learned from a demonstration."""
+
+    def plan(self, start: Array | None = None) -> MotionPlan:
+        """Returns the motion from a start, by default that of the demonstration [m]."""
+
+
+Learn = Callable[[Array, Array], LearnedMotion]
+"""Learns a motion from m times [s] and m places of the shape (m, 2) [m]."""
+
+
+def learn_dmp(times: Array, places: Array) -> LearnedMotion:
+    """Returns a primitive of the type `dmp` of `motion_primitives`; see `Learn`."""
+    shown = Demonstration.of(times, places, names=NAMES)
+    bases = min(max(MIN_BASES, round(BASES_PER_S * shown.duration_s)), MAX_BASES)
+    options = {"bases": bases, "alpha": ALPHA_PER_S * max(shown.duration_s, 1.0)}
+    return make_primitive("dmp", options).learn(shown)
+
+
 class PushSkill:
     """Two primitives, of the demonstration before the tip reaches the box and from there on.
 
     A push only does the same again if it touches the box where it was shown. The approach therefore has any start, and
     ends just before the demonstrated contact; the push begins there, whatever the start was.
 
+    Args:
+        shown: The demonstration.
+        learn: Learns each of the two.
+
     Raises:
         InterfaceError: If the demonstration does not suffice.
     """
 
-    def __init__(self, shown: ShownPush) -> None:
+    def __init__(self, shown: ShownPush, learn: Learn = learn_dmp) -> None:
         if shown.contact_s is None:
             raise InterfaceError("the box was not touched: there is nothing to learn")
         contact_s, shown = shown.contact_s, shown.moving()
@@ -94,8 +118,8 @@ class PushSkill:
             raise InterfaceError(
                 f"the tip was at the box from the start: begin at least {GAP_M * 100:g} cm away from it"
             )
-        self._approach = _learned(shown.times[: split + 1], shown.places[: split + 1])
-        self._push = _learned(shown.times[split:], shown.places[split:])
+        self._approach = learn(shown.times[: split + 1], shown.places[: split + 1])
+        self._push = learn(shown.times[split:], shown.places[split:])
 
     def plan(self, start: Array) -> PushPlan:
         """Returns the motion from a start [m]: the approach, and the push as it was shown."""
@@ -107,10 +131,3 @@ class PushSkill:
             for rows in ([each.positions for each in parts], [each.velocities for each in parts])
         )
         return PushPlan(times, places, velocities, approach.duration_s)
-
-
-def _learned(times: Array, places: Array) -> Primitive:
-    shown = Demonstration.of(times, places, names=NAMES)
-    bases = min(max(MIN_BASES, round(BASES_PER_S * shown.duration_s)), MAX_BASES)
-    options = {"bases": bases, "alpha": ALPHA_PER_S * max(shown.duration_s, 1.0)}
-    return make_primitive("dmp", options).learn(shown)

@@ -76,7 +76,8 @@ class Watch:
                 "robot_safety/start_subscriber", Trigger
             )  # otherwise the press is over before it subscribes
         wait_until_ready()
-        for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
+        solver = rospy.get_param("~ik", "pybullet")
+        for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", "haptics/toggle"):
             call_service(toggle, SetBool, True)
         rospy.loginfo("the handle moves the arm up and down; press it on the box")
         WallTimer(SAMPLE_HZ, self._sample)

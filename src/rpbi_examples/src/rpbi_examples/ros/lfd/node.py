@@ -25,14 +25,17 @@ from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from custom_ros_tools.transforms import Array
 from rpbi_examples.lfd.person import HALF_SIDE_M, TIP_RADIUS_M
 from rpbi_examples.lfd.report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_summary
-from rpbi_examples.lfd.skill import PushSkill
+from rpbi_examples.lfd.skill import Learn, PushSkill, learn_dmp
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.ros.human_interaction import interrupt_roslaunch
 
 from .arm import ORIGIN, TARGET, TIP, Arm, planar
 from .box import GOAL, PushedBox
+from .dmp_services import ServerMotion
 from .recording import begin_episode, discard_episode, finish_episode
 
+LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
+"""What learns and plans, by the argument `dmp` of the launch file."""
 DEMONSTRATING = "demonstrating"
 AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
 """State after a step that failed, by the state before."""
@@ -53,6 +56,10 @@ class Lesson:
         self._out = Path(rospy.get_param("~out", "lfd"))
         self._rounds, self._seed = rospy.get_param("~rounds", 0), rospy.get_param("~seed", 0)
         self._plots = rospy.get_param("~plot", False)
+        dmp = rospy.get_param("~dmp", "own")
+        if dmp not in LEARN:
+            raise InterfaceError(f"~dmp: expected {' or '.join(LEARN)}, got {dmp}")
+        self._learn = LEARN[dmp]
         self._random = np.random.default_rng(self._seed)
         self._shown: list[Run] = []
         self._executed: list[Run] = []
@@ -188,7 +195,7 @@ class Lesson:
             return
         if self._demonstration is None:
             raise InterfaceError("there is no demonstration yet: press 2 to start one")
-        self._skill = PushSkill(self._demonstration.path())
+        self._skill = PushSkill(self._demonstration.path(), self._learn)
         rospy.loginfo("learned from demonstration %d; press 3 again to execute", self._demonstration.episode)
         self._become("learned")
 
