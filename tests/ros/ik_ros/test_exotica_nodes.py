@@ -7,6 +7,7 @@ import os
 import shutil
 from pathlib import Path
 
+import pytest
 import rospy
 import yaml
 from exotica_files import ARM, POSE_MAP, SRDF, VELOCITY_MAP, write_problem
@@ -17,7 +18,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
+from custom_ros_tools.errors import ConfigError
 from ik_ros.msg import EXOTicaProblem, EXOTicaSyncTf, IKSolution
+from ik_ros.ros.exotica_setup import synced_frames
 from ik_ros.srv import EXOTica, EXOTicaInfo, JointNames, JointNamesRequest
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "support/programs"
@@ -55,8 +58,9 @@ def test_services_and_problems_of_the_release(ros, tmp_path):
         answer = solve(problem)
         assert not answer.success and message in answer.message
 
+    with pytest.raises(ConfigError, match="sync_tf_to_exotica_object.*expected four names.*'base goal'"):
+        synced_frames(["base goal"])
     solutions, targets = ros.listen("ik/solution", IKSolution), ros.listen("joint_states/target", JointState)
-    rospy.set_param("/ik_setup_node/sync_tf_to_exotica_object", ["base goal '' Target"])
     with static_transform("base", "goal", Pose(Point(p.x, p.y, p.z), Quaternion(q.x, q.y, q.z, q.w))):
         more = {"start_on_init": True, "sync_tf_to_exotica_object": ["base goal '' Target"]}
         start_node(ros, "ik_setup_node.py", "exotica", "ik/setup/exotica/toggle", **more)

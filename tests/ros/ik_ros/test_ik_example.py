@@ -19,6 +19,7 @@ if os.environ.get("IK_EXAMPLE_SOLVERS") == "all":
         "trac_ik",
         "pybullet",
         "global",
+        "exotica",
     )  # some 15 s each; they differ from kdl in nothing that the launch file does
 LEADING = "kdl"
 """The one with `real_robot:=true`."""

@@ -185,6 +185,8 @@ def test_groups_of_the_srdf_choose_the_joints(tmp_path):
         ({"costs": '<Task Task="Pose" Rho="much"/>'}, "Rho.*expected numbers"),
         ({"costs": '<Task Task="Pose" Rho="0"/>'}, "expected a cost whose Rho is not 0"),
         ({"costs": '<Task Task="Pose" Goal="1"/>'}, "Goal.*expected 6 numbers, got 1"),
+        ({"maps": POSE_MAP.replace("<Frame ", '<Frame Link="lwr_arm_7_link"/>' * 200 + "<Frame ")}, "at most 200"),
+        ({"costs": '<Task Task="Pose" Rho="inf"/>'}, "Rho"),
         ({"more": "<StartState>0 0</StartState>"}, "StartState.*expected 7 positions"),
         ({"kind": "SamplingProblem"}, "'SamplingProblem'.*UnconstrainedEndPoseProblem"),
         ({"solver": '<OMPLSolver Name="S"/>'}, "'OMPLSolver'.*IKSolver"),

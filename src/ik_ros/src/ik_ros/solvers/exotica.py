@@ -22,6 +22,7 @@ from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 from .tasks import TasksSolver
 
 LEAST_ITERATIONS = 100
+MAX_TASKS = 200
 
 
 class ExoticaConfig(ConfigModel):
@@ -159,6 +160,8 @@ class ExoticaSolver(Solver):
         rhos = [part.rho for cost in self._costs.values() for part in cost.parts.values() if part.rho]
         if not rhos:
             raise KeyedError("Cost", "expected a cost whose Rho is not 0")
+        if len(rhos) > MAX_TASKS:
+            raise KeyedError("Cost", f"expected at most {MAX_TASKS} frames and maps, got {len(rhos)}")
         of_links = [
             part.rho
             for name, cost in self._costs.items()
