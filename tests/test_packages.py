@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -107,3 +108,10 @@ def test_packages_of_the_release_are_built_over_ours(tool: str, tmp_path: Path) 
     assert done.returncode == 0, done.stdout + done.stderr
     found = [Path(line).resolve() for line in done.stdout.splitlines()[-2:]]
     assert found == [tmp_path / "src/rpbi_examples", ROOT / "src/compatibility/ik_ros_examples"]
+
+
+def test_pip_is_refused_with_what_to_do_instead(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--dry-run"]
+    for target in ([str(ROOT)], ["-e", str(ROOT)]):
+        done = subprocess.run([*command, *target], cwd=tmp_path, capture_output=True, text=True, timeout=300.0)
+        assert done.returncode == 1 and "./rpbi setup " in done.stdout + done.stderr, done.stdout + done.stderr
