@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from typing import Annotated
@@ -143,3 +144,32 @@ def test_a_command_whose_output_is_closed_ends_quietly(lines):
         process.stdin.close()
         assert process.stderr.read() == b""
     assert process.returncode == 141
+
+
+IMPORTS = """
+import os, signal
+from custom_ros_tools.ros.node import late_imports, run_command
+
+def library():
+    try:  # as trimesh does
+        os.kill(os.getpid(), signal.SIGINT)
+    except BaseException as error:
+        print("swallowed")
+
+def command():
+    WITH
+        library()
+    print("goes on")
+
+run_command("builtins:print", lambda _: command())
+"""
+
+
+@pytest.mark.parametrize("block", ["with late_imports():", "if True:"])
+def test_ctrl_c_ends_a_command_that_imports_a_library_which_swallows_it(block):
+    command = [sys.executable, "-c", IMPORTS.replace("WITH", block)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+    if "late" in block:
+        assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    else:
+        assert done.stdout == "swallowed\ngoes on\n"

@@ -208,7 +208,12 @@ def test_torque_control_lets_an_arm_fall_and_moves_are_refused_in_it(ros, states
     wait_until(lambda: abs(now(states)[JOINTS[1]] - before) > 0.05, "it falls")
 
 
-@pytest.mark.parametrize("text", ["", "POSITION", "position_control"])
+def test_an_empty_mode_asks_for_the_present_one(ros, node):
+    answer = ros.call("/rpbi/iiwa/set_control_mode", SetString, "")
+    assert (answer.success, answer.message) == (True, "POSITION_CONTROL")
+
+
+@pytest.mark.parametrize("text", ["POSITION", "position_control"])
 def test_an_unknown_mode_is_refused_with_those_there_are(ros, node, text):
     answer = ros.call("/rpbi/iiwa/set_control_mode", SetString, text)
     assert not answer.success

@@ -163,6 +163,20 @@ def test_a_small_way_needs_no_large_motion(iiwa_arm):
     assert np.abs(np.subtract(solution.positions, ELBOW)).max() < 0.1
 
 
+def test_the_answer_is_in_the_branch_of_its_start(arm):
+    (kinematics, link, _), random = arm, np.random.default_rng(3)
+    lower, upper = np.maximum(kinematics.limits.lower, -np.pi), np.minimum(kinematics.limits.upper, np.pi)
+    further = []
+    for _ in range(50):
+        start = random.uniform(lower, upper)
+        goal = np.clip(start + random.uniform(-0.8, 0.8, len(start)), lower, upper)
+        pose = kinematics.forward(goal.tolist(), link)
+        found = kinematics.solve(IKProblem(link, pose.position, pose.quat_xyzw, currentPosition=start.tolist()))
+        assert found.success
+        further.append(np.abs(found.positions - start).max() > max(np.abs(goal - start).max(), 1.0))
+    assert sum(further) <= 1
+
+
 def test_a_robot_that_is_there_stays(iiwa_arm):
     here = iiwa_arm.forward(ELBOW, "lbr_iiwa_link_7")
     solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", *here, currentPosition=ELBOW))

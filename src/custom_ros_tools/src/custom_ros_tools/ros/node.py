@@ -5,7 +5,9 @@ import pkgutil
 import resource
 import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from custom_ros_tools.console.output import is_output_closed
@@ -64,6 +66,23 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
     finally:
         if heeds:  # while Python is ending, too
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextmanager
+def late_imports() -> Iterator[None]:
+    """Has Ctrl-C end the process at once while a command imports libraries in its function.
+
+    Some libraries catch a KeyboardInterrupt in their imports, and go on or fail with a traceback.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 def _prepare_for_numpy() -> None:

@@ -31,6 +31,12 @@ SEED = 0
 """Seed of the random starts."""
 MUCH_NEARER = 0.8
 """Share of the present error below which a posture is preferred to the present one, out of reach."""
+FAR = 1.0
+"""Motion of a joint [rad or m] from which a solution may be in another branch, with the elbow on the other side."""
+STARTS_NEARBY = 16
+"""Number of starts near the present positions from which a nearer solution is searched."""
+SPREAD = 0.4
+"""Standard deviation of these starts [rad or m]."""
 LEAST_WEIGHT = 1e-3
 """Least damping and least range of a joint, as a part of the largest."""
 
@@ -69,6 +75,7 @@ class Search:
         q, residual = self._solution()
         if residual.size > 1.0 and self._current:
             return self._nearest(q)
+        q, residual = self._in_branch(q, residual)
         if len(self._rest):
             ranges = self._of_chain(self._problem.jointRanges)
             ranges = np.where(ranges > 0.0, ranges, TURN)  # PyBullet's -1 of joints without limits
@@ -76,6 +83,28 @@ class Search:
             most = max(residual.size, self._threshold)
             q = towards_posture(self._chain, self._target, self._limits, self._rest, weights, q, most)
             residual = self._chain.residual(self._target, q)
+        return q, residual
+
+    def _in_branch(self, q: np.ndarray, residual: Residual) -> tuple[np.ndarray, Residual]:
+        """Returns the nearest solution to the rest posture, else to the present positions.
+
+        One that is further away may have the elbow on the other side, so positions nearby, which are always the same,
+        are starts too.
+        """
+        present = np.array(self._current)
+        near = self._rest if len(self._rest) else present
+        random, most = np.random.default_rng(SEED), max(residual.size, self._threshold)
+        distance = np.abs(q - near).max(initial=0.0)
+        for _ in range(STARTS_NEARBY):
+            if distance <= FAR:
+                break
+            start = (near + random.normal(0.0, SPREAD, len(q))).tolist()
+            inside, _ = self._limits.wrap_to_limits(start, self._current)
+            for found, off in self._descent(self._fast_step, np.array(inside)):
+                if off.size <= most:
+                    if (other := np.abs(found - near).max(initial=0.0)) < distance:
+                        q, residual, distance = found, off, other
+                    break
         return q, residual
 
     def _solution(self) -> tuple[np.ndarray, Residual]:

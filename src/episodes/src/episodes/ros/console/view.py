@@ -10,6 +10,7 @@ from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.plugins import trust_only
+from custom_ros_tools.ros.node import late_imports
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
 
@@ -35,8 +36,9 @@ def view(
         trust: Python packages that the recording may import, for types of your own
         any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
     """
-    from episodes.ros.view import scene_of_bag, scene_of_episode  # needs an extra
-    from episodes.view.page import page_of
+    with late_imports():
+        from episodes.ros.view import scene_of_bag, scene_of_episode  # needs an extra
+        from episodes.view.page import page_of
 
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who made the recording")
     is_folder = recording.is_dir()
