@@ -22,6 +22,7 @@ from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
+from rpbi.world.forks import shadow as shadows
 from rpbi.world.keyframes import keyframe as keyframes
 from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.keyframes.graph import GraphReader
@@ -288,6 +289,22 @@ def test_no_keyframe_is_made_while_a_state_is_restored(heap):
     for _ in heap.restoring(state):
         maker.poll()
     assert not heap.save().keyframe
+
+
+def test_the_process_that_forks_goes_on_at_later_keyframes(heap, monkeypatch):
+    monkeypatch.setattr(shadows, "MAX_COPIED_MB", 0.0)  # so that it is a program
+    processes = set()
+    for target in (0.4, 0.6, 0.2):
+        heap.keyframe()
+        heap.put("iiwa/target", {"lbr_iiwa_joint_2": target})
+        hash_later(heap, 20)
+        (prediction,) = heap.predict([[]], AHEAD)
+        processes.add(heap._shadow._process.pid)
+        assert prediction.state_hash == hash_later(heap)
+    assert len(processes) == 1
+    heap.reset()
+    (prediction,) = heap.predict([[]], AHEAD)
+    assert prediction.state_hash == hash_later(heap)
 
 
 def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):

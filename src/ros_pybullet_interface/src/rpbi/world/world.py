@@ -619,7 +619,6 @@ class World:
     def _move(self, fresh: FreshClient) -> None:
         self._keyframe = move(self, self._contents, self._pushed, fresh)
         self._keyframe_tick = self.clock.tick
-        self._end_shadow()
         self._start = None  # PyBullet had it in the other client
         self._note("", "keyframe", self._keyframe)
         self.commands.forget()
@@ -737,6 +736,11 @@ class World:
             InterfaceError: If the state cannot be saved.
         """
         self.apply_inputs()
+        if self._shadow is not None and self._shadow.commands < self.commands.first:  # there was a keyframe
+            if self._shadow.is_copy:
+                self._end_shadow()
+            else:
+                self._shadow.restore(self.save(), self.commands.count)
         if self._shadow is None:
             self._shadow = Shadow.of(self, self.save())
 
@@ -791,9 +795,9 @@ class World:
     def _followed(self) -> Iterator[Shadow]:
         """Yields the process that follows this world, at the present state; an error ends it."""
         self._require_recorded()
-        self.prepare_forks()
-        assert self._shadow is not None
         try:
+            self.prepare_forks()
+            assert self._shadow is not None
             new = self.commands.records(self._shadow.commands)
             self._shadow.follow(new, self.clock.tick, self.state_hash())
             yield self._shadow

@@ -111,11 +111,20 @@ class Predictor:
             return follows, new, world.clock.tick, world.state_hash(), world.clock.stamp_ns
 
         follows, new, tick, state_hash, stamp_ns = self._ask(news)
-        if not follows:  # the world was reset, or has made a keyframe: another process begins there
-            self._end()
+        if not follows:  # the world was reset, or has made a keyframe
+            self._restore(shadow)
             return self._follow(cancels)
         shadow.follow(new, tick, state_hash)
         return shadow, tick, stamp_ns
+
+    def _restore(self, shadow: Shadow) -> None:
+        """Has the process that follows go to the last keyframe, or ends it if the world was reset."""
+        world = self._simulation.world
+        state, commands, resets = self._ask(lambda: (world.save(), world.commands.count, world.resets))
+        if resets == self._resets:
+            shadow.restore(state, commands)
+        else:
+            self._end()
 
     def _end(self) -> None:
         if self._shadow is not None:

@@ -15,6 +15,7 @@ from typing import Any
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.state import WorldState
 
 from .prediction import Candidate, Prediction, PredictionJob, predict
 
@@ -55,6 +56,11 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
                 f"tick {tick}: expected the state {state_hash}, got {found}; something not recorded acts"
             )
 
+    def restore(state: WorldState) -> None:
+        if fault is not None:
+            raise fault
+        world.restore(state, trust=None, max_ticks=state.tick)
+
     def fork() -> None:
         with Connection(recv_handle(connection)) as own:
             os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
@@ -69,7 +75,7 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
     def predictions(candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
         return list(_predict_all(world, candidates, job, jobs))
 
-    _answer(connection, {"follow": follow, "fork": fork, "predict": predictions})
+    _answer(connection, {"restore": restore, "follow": follow, "fork": fork, "predict": predictions})
 
 
 def _advance(world: Any, commands: Sequence[RecordedCommand], tick: int) -> None:

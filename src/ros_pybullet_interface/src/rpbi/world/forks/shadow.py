@@ -33,6 +33,20 @@ class Remote:
 
     def __init__(self, connection: Connection, subject: str) -> None:
         self._connection, self._subject = connection, subject
+        self._unanswered = 0
+        """Number of requests that were sent by `begin`."""
+
+    def begin(self, name: str, *arguments: Any) -> None:
+        """Sends a request without waiting; the next `ask` waits for its answer first, and raises if that is an error.
+
+        Raises:
+            InterfaceError: If the other end has ended.
+        """
+        try:
+            self._connection.send((name, arguments))
+        except OSError as error:
+            raise self._ended(error) from None
+        self._unanswered += 1
 
     def ask(self, name: str, *arguments: Any, handle: int | None = None) -> Any:
         """Returns the answer to a request, which may come with a file handle.
@@ -40,6 +54,9 @@ class Remote:
         Raises:
             InterfaceError: If the other end refuses, or has ended.
         """
+        while self._unanswered:
+            self._unanswered -= 1
+            self.answer()
         try:
             self._connection.send((name, arguments))
             if handle is not None:
@@ -201,6 +218,24 @@ class Shadow:
         with suppress(OSError):  # the first call reports that it has ended
             ours.send(state)
         return cls(ours, process, commands)
+
+    def restore(self, state: WorldState, commands: int) -> None:
+        """Has it go to a later keyframe, and on to the state, as commands on the way were dropped; does not wait.
+
+        Args:
+            state: Present state of the world.
+            commands: Number of commands of the world so far.
+
+        Raises:
+            InterfaceError: If it has ended.
+        """
+        self._remote.begin("restore", state)
+        self.commands = commands
+
+    @property
+    def is_copy(self) -> bool:
+        """Whether it is a copy of this process, of which another one is made faster than it restores a state."""
+        return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
         """Brings it to the present tick of the world, before it forks or predicts.
