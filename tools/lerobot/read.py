@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/episodes/src"))
 from episodes.datasets.coarse_images import coarse, image_faults
 from episodes.datasets.provenance import changes, read_episode, read_export, read_images

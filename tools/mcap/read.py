@@ -12,6 +12,7 @@ import rosbag
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/episodes/src"))
 from episodes.datasets.provenance import read_episode, read_export
 

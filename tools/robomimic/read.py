@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src/episodes/src"))
 from episodes.datasets.provenance import changes, frame_changes, frame_checksums, read_episode, read_export
 
