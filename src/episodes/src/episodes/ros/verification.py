@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import tempfile
@@ -18,7 +19,7 @@ from custom_ros_tools.plugins import trust_only
 from episodes.errors import EpisodeError
 from episodes.files import changed_files, newer_files, stored_names, with_stored_files
 from episodes.folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
-from rpbi.replay.parallel import groups_of, in_forks, merged
+from rpbi.replay.parallel import TooSlowError, groups_of, in_forks, limit_cpu_time, merged
 from rpbi.replay.session import RecordedPart, Recording, Replay, ReplayResult
 from rpbi_utils.ros.replay.recorded_session import MAX_TICKS, read_recording, require_few_ticks
 
@@ -28,16 +29,22 @@ from .comparison import Compared, Comparison
 _PROGRAM = "import sys; from episodes.ros.verification import main; main(sys.argv[1:])"
 
 
+MAX_CPU_S = 3600
+"""Processor time of an episode, by default [s]."""
+
+
 class ReplayLimits(NamedTuple):
     """Limits on a recording, as those of `replay`.
 
     Attributes:
         max_ticks: Largest number of ticks.
         any_size: Whether its bag may exceed the limits of `BagReader`.
+        cpu_s: Processor time of each process that simulates it [s].
     """
 
     max_ticks: int = MAX_TICKS
     any_size: bool = False
+    cpu_s: int = MAX_CPU_S
 
 
 USUAL_LIMITS = ReplayLimits()
@@ -87,6 +94,8 @@ def _verify_in_process(
     try:
         return Verdict(*json.loads(done.stdout.splitlines()[-1]))
     except (IndexError, ValueError, TypeError):
+        if done.returncode == -signal.SIGXCPU:
+            return Verdict(number, False, str(TooSlowError(limits.cpu_s)))
         words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         return Verdict(number, False, f"the simulation ended early: {words}")
 
@@ -99,7 +108,9 @@ def main(words: Sequence[str]) -> None:
     """
     path, number, limits, jobs, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
-    verdict = verify(EpisodeFolder(path), int(number), ReplayLimits(*json.loads(limits)), int(jobs))
+    given = ReplayLimits(*json.loads(limits))
+    limit_cpu_time(given.cpu_s)
+    verdict = verify(EpisodeFolder(path), int(number), given, int(jobs))
     print(f"\n{json.dumps(verdict)}", flush=True)
 
 
@@ -146,7 +157,7 @@ def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs:
         )
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)
-        results, comparisons = zip(*in_forks(compare, groups_of(recording.parts(), jobs)))
+        results, comparisons = zip(*in_forks(compare, groups_of(recording.parts(), jobs), limits.cpu_s))
     result, compared = merged(results), Compared.merged(comparisons)
     faults, notes = _message_faults(bag, episode, compared, limits.any_size)
     words = [*recording.description.warnings, *faults, _words(result, compared, bool(faults))]

@@ -1,8 +1,11 @@
-"""Parts of a recording, replayed by several processes at once."""
+"""Recordings read by other processes: parts of one by several at once, or all of it with limited processor time."""
 
 from __future__ import annotations
 
+import resource
+import signal
 from collections.abc import Callable, Sequence
+from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -22,26 +25,69 @@ def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[Recorde
 
 
 def in_forks(
-    work: Callable[[Sequence[RecordedPart]], Result], groups: Sequence[Sequence[RecordedPart]]
+    work: Callable[[Sequence[RecordedPart]], Result], groups: Sequence[Sequence[RecordedPart]], cpu_s: int | None = None
 ) -> list[Result]:
     """Returns the results of a function for groups, each in a fork of this process if there are several.
 
+    Args:
+        work: The function.
+        groups: The groups.
+        cpu_s: Processor time that each fork may use [s]; None for any.
+
     Raises:
         InterfaceError: If the function raises one, or a process ends early.
+        TooSlowError: If a fork needs more time.
     """
     if len(groups) == 1:
         return [work(groups[0])]
+    return _results([partial(work, group) for group in groups], cpu_s)
+
+
+def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
+    """Returns the result of a function, called in a fork of this process.
+
+    Args:
+        work: The function.
+        cpu_s: Processor time that it may use [s].
+
+    Raises:
+        InterfaceError: If the function raises one, or the process ends early.
+        TooSlowError: If it needs more time.
+    """
+    return _results([work], cpu_s)[0]
+
+
+def limit_cpu_time(cpu_s: int) -> None:
+    """Has this process end by SIGXCPU when it has used so much more processor time [s]."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
+
+
+class TooSlowError(InterfaceError):
+    """A process needs more processor time than it may use; its argument is that time [s]."""
+
+    def __str__(self) -> str:
+        return (
+            f"expected at most {self.args[0]:,} s of processor time, needs more; --max-cpu S, if you know who made it"
+        )
+
+
+def _results(calls: Sequence[Callable[[], Result]], cpu_s: int | None) -> list[Result]:
     context = get_context("fork")  # which has the recording already
     running = []
-    for group in groups:
+    for call in calls:
         ours, theirs = context.Pipe(duplex=False)
-        process = context.Process(target=_send, args=(theirs, work, group), daemon=True)
+        process = context.Process(target=_send, args=(theirs, call, cpu_s), daemon=True)
         process.start()
         theirs.close()
         running.append((process, ours))
     answers = [_received(ours) for _, ours in running]
     for process, _ in running:
         process.join()
+    if any(process.exitcode == -signal.SIGXCPU for process, _ in running):
+        raise TooSlowError(cpu_s)
     for fault, _ in answers:
         if fault:
             raise InterfaceError(fault)
@@ -58,9 +104,11 @@ def merged(results: Sequence[ReplayResult]) -> ReplayResult:
     )
 
 
-def _send(connection: Connection, work: Callable[[Sequence[RecordedPart]], Any], group: Sequence[RecordedPart]) -> None:
+def _send(connection: Connection, call: Callable[[], Any], cpu_s: int | None) -> None:
+    if cpu_s is not None:
+        limit_cpu_time(cpu_s)
     try:
-        answer = "", work(group)
+        answer = "", call()
     except Exception as error:  # a recording may have anything in it
         answer = str(error) if isinstance(error, InterfaceError) else f"{type(error).__name__}: {error}", None
     connection.send(answer)

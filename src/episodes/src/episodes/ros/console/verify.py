@@ -7,7 +7,7 @@ from typing import Annotated
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.foreign import printable
 from episodes.folder import EpisodeFolder
-from episodes.ros.verification import ReplayLimits, verify_all
+from episodes.ros.verification import MAX_CPU_S, ReplayLimits, verify_all
 from rpbi_utils.ros.replay.recorded_session import MAX_TICKS
 
 MAX_LINE = 10_000
@@ -20,6 +20,7 @@ def verify(
     jobs: Annotated[int, Argument("N", parse=int)] = 1,
     trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
     max_ticks: Annotated[int, Argument("N", parse=int)] = MAX_TICKS,
+    max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
     """Simulates recorded episodes again and compares their states, with the files that are stored with them.
@@ -32,14 +33,16 @@ def verify(
         jobs: episodes at once, each in a process of its own; 1 without it
         trust: Python packages that the episodes may import, for types of your own
         max_ticks: episodes of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
+        max_cpu: episodes that need more seconds of processor time are ended; 3,600 without it
         any_size: also bags that unfold to more than 1 GiB and 255 times their size
     """
-    if jobs < 1:
-        raise UsageError(f"--jobs: expected at least 1, got {jobs}")
+    for flag, value in (("--jobs", jobs), ("--max-cpu", max_cpu)):
+        if value < 1:
+            raise UsageError(f"{flag}: expected at least 1, got {value}")
     episodes = EpisodeFolder(folder)
     numbers = episodes.numbers()
     same = 0
-    for verdict in verify_all(episodes, numbers, jobs, trust, ReplayLimits(max_ticks, any_size)):
+    for verdict in verify_all(episodes, numbers, jobs, trust, ReplayLimits(max_ticks, any_size, max_cpu)):
         label = f" ({verdict.label})" if verdict.label else ""
         line = "; ".join([f"episode {verdict.number}{label}: {verdict.text}", *verdict.notes])
         print(printable(line, MAX_LINE), flush=True)

@@ -13,6 +13,10 @@ from custom_ros_tools.plugins import trust_only
 from custom_ros_tools.ros.node import late_imports
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
+from rpbi.replay.parallel import TooSlowError, in_limited_fork
+
+MAX_CPU_S = 600
+"""Processor time for a page, by default [s]."""
 
 
 def view(
@@ -22,6 +26,7 @@ def view(
     out: Annotated[Path | None, Argument("FILE.html", parse=Path, files="*.html")] = None,
     ns: Annotated[str, Argument("NAMESPACE")] = "/",
     trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+    max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> str:
     """Writes an episode as one HTML file: its world in 3-D with a time line, forces as arrows and as plots.
@@ -34,6 +39,7 @@ def view(
         out: episode_N.html, or BAG.html for BAG.bag, without it
         ns: of the simulator that was recorded, for a bag
         trust: Python packages that the recording may import, for types of your own
+        max_cpu: a recording that needs more seconds of processor time is refused; 600 without it
         any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
     """
     with late_imports():
@@ -44,16 +50,27 @@ def view(
     is_folder = recording.is_dir()
     if is_folder == (number is None):
         raise UsageError(f"expected a folder and the number of an episode, or a bag, got {recording}")
+    if max_cpu < 1:
+        raise UsageError(f"--max-cpu: expected at least 1, got {max_cpu}")
+
+    def draw() -> tuple[str, float, list[str]]:
+        """Returns the page, the seconds that it shows, and its notes."""
+        try:
+            if number is not None:
+                scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
+            else:
+                scene = scene_of_bag(recording, ns, any_size=any_size)
+            page, scene = page_of(scene)
+        except InterfaceError:
+            raise
+        except Exception as error:  # a bag may have anything in it
+            raise EpisodeError(recording, f"cannot be shown: {type(error).__name__}: {error}") from error
+        return page, float(scene.times[-1]), scene.all_notes
+
     try:
-        if number is not None:
-            scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
-        else:
-            scene = scene_of_bag(recording, ns, any_size=any_size)
-        page, scene = page_of(scene)
-    except (InterfaceError, OSError):
-        raise
-    except Exception as error:  # a bag may have anything in it
-        raise EpisodeError(recording, f"cannot be shown: {type(error).__name__}: {error}") from error
+        page, seconds, notes = in_limited_fork(draw, max_cpu)
+    except TooSlowError as error:
+        raise EpisodeError(recording, str(error)) from error
     target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -61,5 +78,5 @@ def view(
             part.write_text(page, encoding="utf-8")
     except OSError as error:
         raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
-    lines = [f"note: {note}" for note in scene.all_notes]
-    return "\n".join([f"{target}: {scene.times[-1]:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])
+    lines = [f"note: {note}" for note in notes]
+    return "\n".join([f"{target}: {seconds:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])
