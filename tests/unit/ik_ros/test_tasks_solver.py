@@ -80,6 +80,18 @@ def test_poses_of_an_arm_of_seven_joints_are_found(key):
     assert solved >= 198
 
 
+def test_frames_on_links_reach_as_links_do():
+    tip = Pose((0.0, 0.1, 0.2), (1.0, 0.0, 0.0, 0.0))
+    tool = {"name": "tool", "link": IIWA_TIP, "position": tip.position, "orientation": tip.quat_xyzw}
+    reach = {"name": "reach", "type": "frame_pose", "frame": "tool"}
+    solver = make_solver("tasks", {"urdf_filename": "kuka_iiwa/model.urdf", "frames": [tool], "costs": [reach]})
+    target = Pose((0.4, 0.2, 0.4), (0.0, 1.0, 0.0, 0.0))
+    solution = solver.solve(IKProblem(target=target))
+    assert solution.success, solution.message
+    off = (pose_of(solver, IIWA_TIP, solution.positions) @ tip).inverse() @ target
+    assert max(map(abs, (*off.position, *off.quat_xyzw[:3]))) < 1e-3
+
+
 def test_targets_out_of_reach_fail_with_words_and_the_best_within_limits():
     solution = iiwa(restarts=3).solve(IKProblem(target=Pose((3.0, 0.0, 0.0))))
     assert not solution.success
@@ -282,6 +294,8 @@ def test_targets_need_a_task_that_they_are_for(urdf):
         ("{costs: [{name: a, type: closeness}], start: {left_9: 0.0}}", "start: unknown joint 'left_9'"),
         ("{costs: [{name: a, type: closeness}], main_task: a}", "main_task: unknown task about a link 'a'"),
         ("{shapes: [{name: s, link: arm, sphere: 1}], costs: [{name: a, type: closeness}]}", r"shapes\[0\].link: unk"),
+        ("{frames: [{name: f, link: arm}], costs: [{name: a, type: closeness}]}", r"frames\[0\].link: unknown link"),
+        ("{frames: [{name: body, link: body}], costs: [{name: a, type: closeness}]}", r"frames\[0\].name: there is a"),
         ("{costs: [{name: a, type: closeness}], shapes: [{name: s}]}", r"shapes\[0\]: expected one of sphere, box"),
         ("costs: [{name: a, type: distance, pairs: [[b, c]]}]", r"costs\[0\].pairs\[0\]: unknown shape 'b'"),
         ("costs: [{name: a, type: 'nobody.knows:It'}]", r"costs\[0\].type: no module 'nobody'"),

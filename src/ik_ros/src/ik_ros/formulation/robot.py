@@ -134,10 +134,7 @@ class PinocchioRobot:
 
         Raises:
             UnknownNameError: If the link is not known.
-            ValueError: If there is a link of that name.
         """
-        if name in self.links:
-            raise ValueError(f"there is a link or frame '{name}' already")
         link_id = self.link_id(link)
         frame = self.model.frames[link_id]
         placement = frame.placement * to_se3(pose)

@@ -186,7 +186,9 @@ def _robot(formulation: Formulation) -> PinocchioRobot:
         if name not in robot.all_joints:
             raise KeyedError("start", str(UnknownNameError("joint", name, robot.all_joints)))
     for i, frame in enumerate(formulation.frames):
-        with keyed_errors(f"frames[{i}]"):
+        if frame.name in robot.links:
+            raise KeyedError(f"frames[{i}].name", f"there is a link or another frame '{frame.name}'")
+        with keyed_errors(f"frames[{i}].link"):
             robot.add_frame(frame.name, frame.link, Pose(frame.position, frame.orientation))
     for i, shape in enumerate(formulation.shapes):
         if shape.name in [other.name for other in formulation.shapes[:i]]:
