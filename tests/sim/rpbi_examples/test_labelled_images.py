@@ -14,11 +14,14 @@ import yaml
 from PIL import Image
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from worlds import BOX_FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from rpbi.render.camera import Intrinsics
 from rpbi.world import World
 from rpbi_examples.ros.console.label_images import label_images
+from rpbi_utils.labelled_images.arrangement import CLEAR_M, Arrangement
 from rpbi_utils.labelled_images.bop import BopFolder
 from rpbi_utils.labelled_images.dataset import write_labelled_images
 
@@ -294,3 +297,18 @@ def test_wrong_numbers_are_refused(tmp_path):
     with pytest.raises(ValueError, match="got 1 and -1"):
         write_labelled_images(CLUTTER, tmp_path / "set", 1, seed=-1)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_camera_keeps_away_from_robots(tmp_path):
+    boxes = tuple(box(f"box_{index}", basePosition=[0.6, 0.3 * index, 0.1]) for index in range(3))
+    arm = iiwa(initial_joint_position={"lbr_iiwa_joint_2": 60.0, "lbr_iiwa_joint_4": -60.0})
+    world = World.from_file(write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=boxes, robots=(arm,)))
+    arrangement, random = Arrangement(world), np.random.default_rng(5)
+    body, intrinsics = world.bodies["iiwa"], Intrinsics(width_px=64, height_px=48, near_m=0.01, far_m=10.0)
+    links = [world.pb.getAABB(body.body_id, link) for link in (-1, *body.joint_indices)]
+    for _ in range(100):
+        eye = np.array(arrangement.view(random, intrinsics).position)
+        assert min(np.linalg.norm(eye - np.clip(eye, *each)) for each in links) >= CLEAR_M
+    eye = np.mean(links[5], axis=0)
+    assert not arrangement._is_clear(eye, arrangement.middle)
+    world.close()

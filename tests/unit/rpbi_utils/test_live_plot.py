@@ -10,7 +10,7 @@ import pytest
 
 from rpbi_utils.bags.message_type import MessageType
 from rpbi_utils.live_plot.fields import FieldError, FieldReader, split_name
-from rpbi_utils.live_plot.plot import MAX_SAMPLES, LivePlot, thinned, ticks
+from rpbi_utils.live_plot.plot import MAX_SAMPLES, Line, LivePlot, thinned, ticks
 
 TOPICS = {"/arm/joint_states", "/arm/joint_states/target", "/armature"}
 LEFT, RIGHT = ["left", "right"], [1.0, 2.0]
@@ -159,3 +159,20 @@ def test_ticks_are_round_numbers(low: float, high: float, count: int, expected: 
     found, decimals = ticks(low, high, count)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert decimals == digits
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("/rpbi/arm/joint_states/position[0]", "rad or m"),
+        ("/rpbi/arm/joint_states/velocity/elbow", "rad/s or m/s"),
+        ("/rpbi/arm/joint_states/effort/force", "N m or N"),
+        ("/rpbi/arm/hand/ft_sensor/wrench/torque/x", "N m"),
+        ("/rpbi/box/base_state/pose/pose/position/z", "m"),
+        ("/rpbi/box/base_state/twist/twist/angular/z", "rad/s"),
+        ("/rpbi/box/contacts/contacts[0]/normal_force", "N"),
+        ("/probe/later", ""),
+    ],
+)
+def test_units_follow_from_the_fields(name, unit):
+    assert Line(name, np.empty(0), np.empty(0), "").unit == unit

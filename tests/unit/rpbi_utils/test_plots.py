@@ -34,7 +34,8 @@ def figures() -> dict[str, Figure]:
     )
     moving = dict(zip(TRANSLATION, (np.arange(5.0), np.zeros(5), np.ones(5)), strict=True))
     still = dict(zip(TRANSLATION, np.ones((3, 5)), strict=True))
-    tf = pd.concat([_table(parent="w", child="a/b", **moving), _table(parent="w", child="still", **still)])
+    frames = {"a/b": moving, "a/c": moving, "still": still, "lone": moving}
+    tf = pd.concat([_table(parent="w", child=child, **columns) for child, columns in frames.items()])
     tables = {
         "/arm/joint_states": _table(0.002, **{"position/j": np.arange(5.0), "position/fixed": 0.0, "effort/j": np.nan}),
         "/ft": _table(**{f"wrench/{name}": values for name, values in force.items()}),
@@ -46,10 +47,17 @@ def figures() -> dict[str, Figure]:
 
 
 def test_each_kind_of_table_has_its_figures(figures: dict[str, Figure]) -> None:
-    assert list(figures) == ["arm.joint_states", "ft", "contacts", "tf.a.b", "rates", "latencies"]
-    assert _lines(figures["arm.joint_states"]) == {"position [rad, m]": {"j": [0, 1, 2, 3, 4]}}
+    assert list(figures) == ["arm.joint_states", "ft", "contacts", "tf.a", "tf.lone", "rates", "latencies"]
+    assert _lines(figures["arm.joint_states"]) == {"position [rad or m]": {"j": [0, 1, 2, 3, 4]}}
     assert _lines(figures["ft"])["torque [N m]"] == {"x": [0] * 5, "y": [1] * 5, "z": [2] * 5}
-    assert _lines(figures["tf.a.b"]) == {"a/b in w [m]": {"x": [0, 1, 2, 3, 4], "y": [0] * 5, "z": [1] * 5}}
+    x, y, z = [0, 1, 2, 3, 4], [0] * 5, [1] * 5
+    assert _lines(figures["tf.a"]) == {
+        "x in w [m]": {"b": x, "c": x},
+        "y in w [m]": {"b": y, "c": y},
+        "z in w [m]": {"b": z, "c": z},
+    }
+    assert _lines(figures["tf.lone"])["z in w [m]"] == {"lone": z}
+    assert all("[" in axes.get_ylabel() for figure in figures.values() for axes in figure.axes)
 
 
 def test_times_without_contact_have_no_force(figures: dict[str, Figure]) -> None:
@@ -62,9 +70,9 @@ def test_time_starts_at_the_first_row(figures: dict[str, Figure]) -> None:
 
 
 def test_rates_and_latencies_are_those_of_the_topics(figures: dict[str, Figure]) -> None:
-    assert list(_lines(figures["rates"])["[ms]"]) == ["/arm/joint_states", "/ft", "/contacts", "/tf"]
-    np.testing.assert_allclose(_lines(figures["rates"])["[ms]"]["/ft"], [100] * 4)
-    latencies = _lines(figures["latencies"])["[ms]"]
+    assert list(_lines(figures["rates"])["time [ms]"]) == ["/arm/joint_states", "/ft", "/contacts", "/tf"]
+    np.testing.assert_allclose(_lines(figures["rates"])["time [ms]"]["/ft"], [100] * 4)
+    latencies = _lines(figures["latencies"])["delay [ms]"]
     assert list(latencies) == ["/arm/joint_states"]
     np.testing.assert_allclose(latencies["/arm/joint_states"], [2] * 5, atol=1e-6)
 

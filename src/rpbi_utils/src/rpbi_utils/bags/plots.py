@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,13 +21,19 @@ MAX_LINES = 20
 MAX_POINTS = 20_000
 """Largest number of points of a line; of more, evenly spaced ones are drawn."""
 _AXES = "xyz"
+_QUANTITIES = {
+    "position": "position [rad or m]",
+    "velocity": "velocity [rad/s or m/s]",
+    "effort": "effort [N m or N]",
+}
 
 
 def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Figure]) -> Iterator[tuple[str, Figure]]:
     """Yields figures of a bag's tables, each with a file name without ending.
 
-    Joint states have positions, velocities and efforts; wrenches forces and torques; transforms the paths of their
-    frames; contacts the normal forces by pair of bodies. The last figures are the times between messages of all
+    Each group of values has one figure, with a panel for each quantity. Joint states have positions, velocities and
+    efforts; wrenches forces and torques; transforms the paths of all frames of a body; contacts the normal forces by
+    pair of bodies. The last figures are the times between messages of all
     topics, and the delays from stamps to the time of recording.
 
     Args:
@@ -42,10 +48,10 @@ def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Fi
         for suffix, panels in panels_of(table):
             yield f"{stems[topic]}{suffix}", _figure(new_figure, topic, panels)
     if relative:
-        yield "rates", _figure(new_figure, "time between messages", {"[ms]": _intervals(relative)}, scale="log")
+        yield "rates", _figure(new_figure, "time between messages", {"time [ms]": _intervals(relative)}, scale="log")
     delays = _delays(filled, start_s)
     if delays:
-        yield "latencies", _figure(new_figure, "time of recording less stamp", {"[ms]": delays})
+        yield "latencies", _figure(new_figure, "time of recording less stamp", {"delay [ms]": delays})
 
 
 Lines = Mapping[str, pd.Series]
@@ -59,10 +65,7 @@ def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
         every = forces.reindex(table.index.unique(), fill_value=0.0)
         yield "", {"normal force [N]": {f"by {body}": every[body] for body in every}}
         return
-    joints = {
-        label: _by_last_name(table.filter(regex=f"^{field}/"))
-        for field, label in (("position", "position [rad, m]"), ("velocity", "velocity"), ("effort", "effort [N m, N]"))
-    }
+    joints = {label: _by_last_name(table.filter(regex=f"^{field}/")) for field, label in _QUANTITIES.items()}
     if any(joints.values()):
         yield "", {label: lines for label, lines in joints.items() if lines}
     force = _vector(table, ("wrench/force", "force"))
@@ -70,10 +73,24 @@ def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
     if force and torque:
         yield "", {"force [N]": force, "torque [N m]": torque}
     if {"child", "parent", *TRANSLATION} <= set(table.columns):
+        bodies: dict[tuple[str, str], dict[str, Lines]] = {}
         for (parent, child), rows in table.groupby(["parent", "child"], sort=True):
             if len(rows) > 1 and (np.ptp(rows[TRANSLATION].to_numpy(), axis=0) > 0).any():
-                name = file_stems([child])[child]
-                yield f".{name}", {f"{child} in {parent} [m]": _vector(rows, ("translation",))}
+                bodies.setdefault((parent, child.rpartition("/")[0] or child), {})[child] = _vector(
+                    rows, ("translation",)
+                )
+        stems = file_stems(f"{body} in {parent}" if _is_twice(body, bodies) else body for parent, body in bodies)
+        for stem, ((parent, body), paths) in zip(stems.values(), bodies.items(), strict=True):
+            names = {child: child.removeprefix(f"{body}/") for child in paths}
+            panels = {
+                f"{axis} in {parent} [m]": {names[child]: path[axis] for child, path in paths.items()} for axis in _AXES
+            }
+            yield f".{stem}", panels
+
+
+def _is_twice(body: str, bodies: Iterable[tuple[str, str]]) -> bool:
+    """Returns whether frames of a body have more than one parent."""
+    return sum(other == body for _, other in bodies) > 1
 
 
 def _by_last_name(table: pd.DataFrame) -> Lines:

@@ -34,6 +34,10 @@ ELEVATION_DEG = (25.0, 75.0)
 """Least and largest elevation of the camera."""
 DISTANCE = (0.6, 1.2)
 """Least and largest distance of the camera, as a share of that from which the area fills the image."""
+CLEAR_M = 0.1
+"""Least distance of the camera from the boxes around the links of robots [m]."""
+MAX_VIEWS = 100
+"""Largest number of views that are drawn until no robot is in the way."""
 SHIFT = 0.25
 """Largest shift of the point that the camera looks at, as a share of the area's radius."""
 
@@ -103,7 +107,21 @@ class Arrangement:
         )
 
     def view(self, random: np.random.Generator, intrinsics: Intrinsics) -> Pose:
-        """Returns a random pose of the optical frame of a camera, above the objects and looking at them."""
+        """Returns a random pose of the optical frame of a camera, above the objects and looking at them.
+
+        No robot is within `CLEAR_M` of the camera, or between the camera and the point that it looks at.
+
+        Raises:
+            InterfaceError: If robots are in the way of each of `MAX_VIEWS` views.
+        """
+        for _ in range(MAX_VIEWS):
+            eye, target = self._line_of_sight(random, intrinsics)
+            if self._is_clear(eye, target):
+                return Pose(*looking_at(eye.tolist(), target.tolist()))
+        raise InterfaceError(f"robots are in the way of the camera in each of {MAX_VIEWS} views of the objects")
+
+    def _line_of_sight(self, random: np.random.Generator, intrinsics: Intrinsics) -> tuple[Array, Array]:
+        """Returns a random place of a camera, and the point that it looks at [m]."""
         sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # so that all directions are as likely
         azimuth = random.uniform(-math.pi, math.pi)
         cosine = math.sqrt(1.0 - sine**2)
@@ -112,7 +130,18 @@ class Arrangement:
         opening = math.tan(math.radians(intrinsics.fov_deg) / 2.0) * min(1.0, width / height)
         target = self.middle + np.array([*random.uniform(-SHIFT, SHIFT, 2), 0.0]) * self._radius
         distance = random.uniform(*DISTANCE) * self._radius / opening
-        return Pose(*looking_at((target + distance * direction).tolist(), target.tolist()))
+        return target + distance * direction, target
+
+    def _is_clear(self, eye: Array, target: Array) -> bool:
+        """Returns whether no robot is near a camera or between it and the point that it looks at."""
+        pb, robots = self._world.pb, {body.body_id: body for body in self._world.bodies.values() if body.joint_indices}
+        for body_id, body in robots.items():
+            for link in (-1, *body.joint_indices):
+                lower, upper = pb.getAABB(body_id, link)
+                if np.linalg.norm(eye - np.clip(eye, lower, upper)) < CLEAR_M:
+                    return False
+        ((hit, *_),) = pb.rayTest(eye.tolist(), target.tolist()) if robots else ((-1,),)
+        return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
         """Puts the objects at random places of the area, each as low as it touches nothing."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from typing import Any, NamedTuple
 
@@ -14,6 +15,23 @@ MAX_SAMPLES = 120_000
 """Number of newest samples that a line keeps; at 1 kHz those of two minutes."""
 ANEW_S = 1.0
 """Time by which stamps have to go back to begin anew [s]; samples that are less late are dropped."""
+
+_UNITS = {
+    "position": "rad or m",
+    "velocity": "rad/s or m/s",
+    "effort": "N m or N",
+    "force": "N",
+    "normal_force": "N",
+    "torque": "N m",
+    "translation": "m",
+    "linear": "m/s",
+    "angular": "rad/s",
+    "angular_velocity": "rad/s",
+    "linear_acceleration": "m/s^2",
+}
+"""Units by the names of fields."""
+_VECTORS = {"position": "m", "velocity": "m/s"}
+"""Units of fields with components x, y and z, where these differ."""
 
 
 class Line(NamedTuple):
@@ -32,6 +50,14 @@ class Line(NamedTuple):
     values: Array
     note: str
     number: int = 0
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values, by the names of its field; empty if they name no quantity."""
+        *_, field, last = ["", "", *re.findall(r"\w+", self.name)]  # the last may be the name of a joint
+        if last in ("x", "y", "z") and field in _VECTORS:
+            return _VECTORS[field]
+        return _UNITS.get(field, _UNITS.get(last, ""))
 
 
 class _Samples:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,10 @@ SIZE = (960, 480)
 MIN_SECONDS, MAX_SECONDS = 0.5, 120.0
 """Shortest and longest time that the window shows [s]."""
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf", "#7f7f7f", "#bcbd22")
-LEFT, RIGHT, TOP, BOTTOM = 70, 12, 8, 28
+LEFT, RIGHT, TOP, BOTTOM = 80, 12, 8, 28
 """Margins of the lines [px]."""
+UNIT_WIDTH, GAP = 18, 12
+"""Width of the column of the units, and height between charts [px]."""
 ROW = 17
 """Height of a row of the legend [px]."""
 MAX_LEGEND = 10
@@ -35,8 +37,34 @@ MAX_LEGEND = 10
 GRID, INK, FAULT, PAPER = QColor("#e0e0e0"), QColor("#303030"), QColor("#a02020"), QColor(255, 255, 255, 200)
 
 
+class Chart(NamedTuple):
+    """The lines of one unit, with a vertical axis of their own.
+
+    Attributes:
+        unit: Their unit.
+        lines: The lines, and the reasons of missing ones.
+        points: Horizontal places [px] and values of each.
+        low: Lower end of the axis.
+        high: Upper end.
+        top: Upper edge [px].
+        height: Height [px].
+    """
+
+    unit: str
+    lines: list[Line]
+    points: list[tuple[np.ndarray, np.ndarray]]
+    low: float
+    high: float
+    top: float
+    height: float
+
+    def y(self, value: Any) -> Any:
+        """Returns the place of a value, or of an array of them [px]."""
+        return self.top + (self.high - value) * (self.height / (self.high - self.low))
+
+
 class Canvas(QWidget):
-    """Draws lines over the last seconds, as fast as they come."""
+    """Draws lines over the last seconds, as fast as they come: a chart for each unit."""
 
     def __init__(self, plot: LivePlot, seconds: float) -> None:
         super().__init__()
@@ -46,7 +74,7 @@ class Canvas(QWidget):
         self._shown = -1
         self._frozen: tuple[float, list[Line]] | None = None
         self._grid: QPixmap | None = None
-        self._grid_of: tuple[float, ...] = ()
+        self._grid_of: tuple[object, ...] = ()
         self.setMinimumSize(320, 200)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
@@ -89,18 +117,34 @@ class Canvas(QWidget):
         self._shown = self._plot.changes
         self.redraws += 1
         end_s, lines = self.view()
-        width, height = self.width() - LEFT - RIGHT, self.height() - TOP - BOTTOM
-        drawn = [self._points(line, end_s, width) for line in lines]
-        low, high = _range([values for _, values in drawn])
+        charts = self._charts(end_s, lines)
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._background(low, high))
-        painter.setClipRect(QRectF(LEFT, TOP, width, height))
-        for line, (places, values) in zip(lines, drawn, strict=True):
-            painter.setPen(QPen(_colour(line), 1.0))
-            painter.drawPolyline(_polygon(LEFT + places, TOP + (high - values) * (height / (high - low))))
+        painter.drawPixmap(0, 0, self._background(charts))
+        for chart in charts:
+            painter.setClipRect(QRectF(LEFT, chart.top, self.width() - LEFT - RIGHT, chart.height))
+            for line, (places, values) in zip(chart.lines, chart.points, strict=True):
+                painter.setPen(QPen(_colour(line), 1.0))
+                painter.drawPolyline(_polygon(LEFT + places, chart.y(values)))
+            self._draw_legend(painter, chart)
         painter.setClipping(False)
-        self._draw_legend(painter, lines)
         painter.end()
+
+    def _charts(self, end_s: float, lines: list[Line]) -> list[Chart]:
+        """Returns the charts from above; reasons of missing lines are in the first one."""
+        of_unit: dict[str, list[Line]] = {}
+        for line in lines:
+            if not line.note:
+                of_unit.setdefault(line.unit, []).append(line)
+        of_unit = of_unit or {"": []}
+        first = next(iter(of_unit))
+        of_unit[first] = [line for line in lines if line.note] + of_unit[first]
+        height = (self.height() - TOP - BOTTOM - GAP * (len(of_unit) - 1)) / len(of_unit)
+        charts = []
+        for number, (unit, own) in enumerate(of_unit.items()):
+            points = [self._points(line, end_s, self.width() - LEFT - RIGHT) for line in own]
+            low, high = _range([values for _, values in points])
+            charts.append(Chart(unit, own, points, low, high, TOP + number * (height + GAP), height))
+        return charts
 
     def _points(self, line: Line, end_s: float, width: int) -> tuple[np.ndarray, np.ndarray]:
         is_finite = np.isfinite(line.values)
@@ -110,44 +154,59 @@ class Canvas(QWidget):
         times, values = line.times[chosen][is_finite[chosen]], line.values[chosen][is_finite[chosen]]
         return thinned(times, values, start_s, end_s, width)
 
-    def _background(self, low: float, high: float) -> QPixmap:
+    def _background(self, charts: list[Chart]) -> QPixmap:
         """Returns the axes, which are drawn only when they change."""
-        wanted = (low, high, self.seconds, self.width(), self.height())
+        axes = [(chart.unit, chart.low, chart.high) for chart in charts]
+        wanted = (*axes, self.seconds, self.width(), self.height())
         if self._grid is None or wanted != self._grid_of:
             self._grid_of = wanted
             self._grid = QPixmap(self.size())
             self._grid.fill(QColor("white"))
             painter = QPainter(self._grid)
-            self._draw_axes(painter, low, high)
+            for chart in charts:
+                self._draw_values(painter, chart)
+            self._draw_times(painter, charts)
             painter.end()
         return self._grid
 
-    def _draw_axes(self, painter: QPainter, low: float, high: float) -> None:
-        width, height = self.width() - LEFT - RIGHT, self.height() - TOP - BOTTOM
-        bottom = TOP + height
-        right, centre = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignHCenter
-        values, digits = ticks(low, high, max(2.0, height / 45))
+    def _draw_values(self, painter: QPainter, chart: Chart) -> None:
+        """Draws the vertical axis of a chart."""
+        width, right = self.width() - LEFT - RIGHT, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        values, digits = ticks(chart.low, chart.high, max(2.0, chart.height / 45, min(4.0, chart.height / 28)))
         for value in values:
-            y = TOP + (high - value) * height / (high - low)
+            y = chart.y(value)
             painter.setPen(GRID)
             painter.drawLine(QPointF(LEFT, y), QPointF(LEFT + width, y))
             painter.setPen(INK)
             text = f"{value:.{digits}f}" if abs(value) < 1e6 and digits < 7 else f"{value:.3g}"
-            painter.drawText(QRectF(0, y - 8, LEFT - 6, 16), int(right), text)
+            painter.drawText(QRectF(UNIT_WIDTH, y - 8, LEFT - UNIT_WIDTH - 6, 16), int(right), text)
+        painter.save()
+        painter.translate(0.0, chart.top + chart.height)
+        painter.rotate(-90.0)
+        place = QRectF(0.0, 0.0, chart.height, UNIT_WIDTH)
+        painter.drawText(place, int(Qt.AlignmentFlag.AlignCenter), f"[{chart.unit}]" if chart.unit else "")
+        painter.restore()
+
+    def _draw_times(self, painter: QPainter, charts: list[Chart]) -> None:
+        """Draws the time axis, which all charts share."""
+        width, bottom = self.width() - LEFT - RIGHT, self.height() - BOTTOM
+        centre = Qt.AlignmentFlag.AlignHCenter
         times, digits = ticks(-self.seconds, 0.0, max(2.0, width / 90))
         for time_s in times:
             x = LEFT + width + time_s * width / self.seconds
             painter.setPen(GRID)
-            painter.drawLine(QPointF(x, TOP), QPointF(x, bottom))
+            for chart in charts:
+                painter.drawLine(QPointF(x, chart.top), QPointF(x, chart.top + chart.height))
             painter.setPen(INK)
             painter.drawText(QRectF(x - 40, bottom + 4, 80, 16), int(centre), f"{time_s:.{digits}f} s")
 
-    def _draw_legend(self, painter: QPainter, lines: list[Line]) -> None:
-        rows = [_legend_row(line) for line in lines[:MAX_LEGEND]]
-        if len(lines) > MAX_LEGEND:
-            rows.append((f"and {len(lines) - MAX_LEGEND} more", INK))
+    def _draw_legend(self, painter: QPainter, chart: Chart) -> None:
+        most = min(MAX_LEGEND, max(1, int(chart.height / ROW) - 1))
+        rows = [_legend_row(line) for line in chart.lines[:most]]
+        if len(chart.lines) > most:
+            rows.append((f"and {len(chart.lines) - most} more", INK))
         for number, (text, colour) in enumerate(rows):
-            room = QRectF(LEFT + 6, TOP + 4 + ROW * number, self.width() - LEFT - RIGHT - 12, ROW)
+            room = QRectF(LEFT + 6, chart.top + 4 + ROW * number, self.width() - LEFT - RIGHT - 12, ROW)
             alignment = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
             painter.fillRect(painter.boundingRect(room, alignment, text), PAPER)
             painter.setPen(colour)
