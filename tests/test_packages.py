@@ -19,7 +19,6 @@ PACKAGES = sorted(path.parent for folder in ("src", "templates") for path in ROO
 OF_ROS = re.compile(r"ros(?!pkg)[a-z_]*|tf2?(_\w+)?|gen(py|msg)|actionlib|interactive_markers|\w+_(msgs|srvs)")
 """Python modules of ROS packages, which Debian ships without package.xml in part."""
 NOT_IN_DEBIAN = {
-    "control_msgs",  # optional: trajectory actions are there if the user has it
     "depth_image_proc", "nodelet",  # optional: off unless the user asks
     "rosbags",  # of the extra data
 }  # fmt: skip

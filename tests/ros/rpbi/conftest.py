@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-
-@pytest.fixture(scope="session")
-def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The package control_msgs for this process; the folder of its Python modules, for others."""
-    from control_msgs_workspace import build_control_msgs
-
-    path = str(build_control_msgs(tmp_path_factory.mktemp("control_msgs")))
-    sys.path.insert(0, path)
-    yield path
-    sys.path.remove(path)
 
 
 @pytest.fixture
@@ -32,19 +20,19 @@ def placed(ros: Any) -> Iterator[None]:
 
 
 @pytest.fixture
-def start(ros: Any, control_msgs: str, tmp_path: Path) -> Callable[..., Any]:
+def start(ros: Any, tmp_path: Path) -> Callable[..., Any]:
     """Starts a world with an arm that follows trajectories; see `open_world` for the arguments."""
     from trajectory_world import open_world
 
-    return partial(open_world, ros, control_msgs, tmp_path)
+    return partial(open_world, ros, tmp_path)
 
 
 @pytest.fixture(scope="module")
-def shared_robot(module_ros: Any, control_msgs: str, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def shared_robot(module_ros: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The world behind `robot`."""
     from trajectory_world import open_world
 
-    return open_world(module_ros, control_msgs, tmp_path_factory.mktemp("shared"))
+    return open_world(module_ros, tmp_path_factory.mktemp("shared"))
 
 
 @pytest.fixture

@@ -17,7 +17,22 @@ MESSAGES = {
     "ros_pybullet_interface/ResetDebugVisualizerCamera": "efde5121549f4407c5ac25e7a0eb7731",
     "safe_robot/Status": "fe313d6462ceec2e84e1ab1b0cebf1b6",
 }
+CONTROL_MSGS = {
+    "control_msgs/FollowJointTrajectoryAction": "bc4f9b743838566551c0390c65f1a248",
+    "control_msgs/GripperCommandAction": "950b2a6ebe831f5d4f4ceaba3d8be01e",
+    "control_msgs/JointControllerState": "987ad85e4756f3aef7f1e5e7fe0595d1",
+    "control_msgs/JointJog": "1685da700c8c2e1254afc92a5fb89c96",
+    "control_msgs/JointTolerance": "f544fe9c16cf04547e135dd6063ff5be",
+    "control_msgs/JointTrajectoryAction": "a04ba3ee8f6a2d0985a6aeaf23d9d7ad",
+    "control_msgs/JointTrajectoryControllerState": "10817c60c2486ef6b33e97dcd87f4474",
+    "control_msgs/PidState": "b138ec00e886c10e73f27e8712252ea6",
+    "control_msgs/PointHeadAction": "7252920f1243de1b741f14f214125371",
+    "control_msgs/SingleJointPositionAction": "c4a786b7d53e5d0983decf967a5a779e",
+}
+"""Messages of Noetic's control_msgs, which planners know by these md5 sums."""
 SERVICES = {
+    "control_msgs/QueryCalibrationState": "28af3beedcb84986b8e470dc5470507d",
+    "control_msgs/QueryTrajectoryState": "ec93cdecbd8062d761aa52b7c90cd44b",
     "cob_srvs/SetString": "546971982e3fbbd5a41e60fb6432e357",
     "custom_srvs/SetTransform": "18a9eea4bf7301361f824b9b6abce083",
     "dmp/GetDMPPlan": "5cd79fd80676a4f8f062c5472a3190b1",

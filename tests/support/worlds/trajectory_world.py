@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +11,7 @@ from typing import Any
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, JointTolerance
 from node_world import main_config
 from ros_system import sends_to_us, wait_until
 from sensor_msgs.msg import JointState
@@ -29,7 +29,6 @@ START = [0.0, math.radians(30.0), 0.0, math.radians(-60.0), 0.0, 0.0, 0.0]
 
 def open_world(
     ros: Any,
-    control_msgs: str,
     folder: Path,
     use_sim_time: bool = True,
     controller: dict[str, Any] | None = None,
@@ -39,17 +38,13 @@ def open_world(
 
     Args:
         ros: The nodes of the test.
-        control_msgs: Where that package is.
         folder: Where files go.
         use_sim_time: Whether stamps are simulated time.
         controller: Keys of the controller.
         **main: Keys of the main file.
     """
-    from control_msgs.msg import FollowJointTrajectoryAction
-
     robot = iiwa(joint_trajectory_controller=controller or {}, joint_state_publisher_hz=1000, **HOME)
-    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
-    process = ros.simulator(main_config(folder, robots=(robot,), **main), use_sim_time=use_sim_time, PYTHONPATH=paths)
+    process = ros.simulator(main_config(folder, robots=(robot,), **main), use_sim_time=use_sim_time)
     states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     rospy.set_param("actionlib_client_pub_queue_size", 1000)  # else a burst of more than 10 goals loses some
     client = actionlib.ActionClient(f"{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction)
@@ -76,8 +71,6 @@ class Goal:
     """A goal that was sent, what has come back of it, and how to wait for its end."""
 
     def __init__(self, robot: SimpleNamespace, trajectory: JointTrajectory, **fields: Any) -> None:
-        from control_msgs.msg import FollowJointTrajectoryGoal
-
         self.feedback: list[Any] = []
         self._done = threading.Event()
         goal = FollowJointTrajectoryGoal(trajectory=trajectory, **fields)
@@ -125,8 +118,6 @@ def far_away() -> JointTrajectory:
 
 
 def tolerance(name: str, **limits: float) -> Any:
-    from control_msgs.msg import JointTolerance
-
     return JointTolerance(name=name, **limits)
 
 

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from release_types import MESSAGES, SERVICES
+from release_types import CONTROL_MSGS, MESSAGES, SERVICES
 
 SOURCES = Path(__file__).resolve().parents[3] / "src"
 
@@ -16,7 +16,7 @@ def md5_of(name: str, kind: str) -> str:
     return getattr(importlib.import_module(f"{package}.{kind}"), type_name)._md5sum
 
 
-@pytest.mark.parametrize("name, md5", MESSAGES.items(), ids=lambda value: value.split("/")[-1])
+@pytest.mark.parametrize("name, md5", (MESSAGES | CONTROL_MSGS).items(), ids=lambda value: value.split("/")[-1])
 def test_message_is_compatible_on_the_wire(name: str, md5: str) -> None:
     assert md5_of(name, "msg") == md5
 

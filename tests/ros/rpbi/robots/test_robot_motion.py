@@ -87,9 +87,10 @@ def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states
     assert now(states)[JOINTS[1]] == pytest.approx(math.radians(30.0), abs=0.005), "joints not named stay"
 
 
-def test_it_moves_back_to_where_it_started_whatever_the_request_says(ros, states):
+@pytest.mark.parametrize("service", ["move_to_initial_joint_state", "move_to_init_joint_state"])
+def test_it_moves_back_to_where_it_started_whatever_the_request_says(ros, states, service):
     move(ros, 0.3, j1=0.4)
-    answer = ros.call("/rpbi/iiwa/move_to_initial_joint_state", ResetJointState, JointState(name=["no joint"]), 0.3)
+    answer = ros.call(f"/rpbi/iiwa/{service}", ResetJointState, JointState(name=["no joint"]), 0.3)
     assert answer.success, answer.message
     assert [now(states)[name] for name in JOINTS] == pytest.approx(
         [math.radians(BENT[name]) for name in JOINTS], abs=0.01

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryActionFeedback, JointTrajectoryControllerState
 from node_world import add, count, main_config, publishing, registrations, remove
 from ros_system import stop_group, wait_until
 from std_srvs.srv import Trigger
@@ -15,15 +15,14 @@ from trajectory_msgs.msg import JointTrajectory
 from trajectory_world import CONTROLLER, HOME, JOINTS, Goal, moved, trajectory
 from worlds import iiwa, write_world
 
-from ros_pybullet_interface.msg import JointTrajectoryControllerState, PybulletObject
+from ros_pybullet_interface.msg import PybulletObject
 from rpbi.engine.pacer import MAX_DEBT_S
 
 
-def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
+def test_client_with_simulated_time_is_served_in_it(start):
     robot = start(real_time_factor=3)
-    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
     arguments = [str(value) for value in (3.0, *moved(0.5))]
-    client = robot.ros.start_program("trajectory_client.py", *arguments, PYTHONPATH=paths)
+    client = robot.ros.start_program("trajectory_client.py", *arguments)
     assert client.wait(120.0) == 0, robot.ros.output(client)
     printed = robot.ros.output(client)
     assert f"state {GoalStatus.SUCCEEDED}, code 0, took " in printed
@@ -32,8 +31,6 @@ def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
 
 def _feedback_of(robot):
     """Listens to the topic of the action's feedback: the client passes nothing on that the answer has overtaken."""
-    from control_msgs.msg import FollowJointTrajectoryActionFeedback
-
     return robot.ros.listen(f"{CONTROLLER}/follow_joint_trajectory/feedback", FollowJointTrajectoryActionFeedback)
 
 
@@ -55,11 +52,9 @@ def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints
 
 
 @pytest.mark.quick
-def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
+def test_command_is_followed_and_states_come_at_their_rate(ros, tmp_path):
     robot = iiwa(joint_trajectory_controller={"state_publish_rate": 100}, **HOME)
-    node = ros.simulator(main_config(tmp_path, robots=(robot,)), use_sim_time=True)
-    missing = "follow_joint_trajectory and the service query_state need control_msgs"
-    wait_until(lambda: missing in ros.output(node), "it is said")
+    ros.simulator(main_config(tmp_path, robots=(robot,)), use_sim_time=True)
     states = ros.listen(f"{CONTROLLER}/state", JointTrajectoryControllerState)
     with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
         command.publish(trajectory((0.5, moved(0.3)), velocity=False))
@@ -73,20 +68,15 @@ def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing
     assert message.joint_names == JOINTS
     gaps_ns = {b - a for a, b in zip(states.stamps_ns, states.stamps_ns[1:])}
     assert gaps_ns == {10_000_000}
-    assert not [name for _, name in registrations() if "follow_joint_trajectory" in name or "query_state" in name]
 
 
-def test_check_lists_the_action_where_control_msgs_is_installed(tmp_path, control_msgs):
+def test_check_lists_the_action(tmp_path):
     world = write_world(tmp_path, robots=(iiwa(joint_trajectory_controller={}),))
-    listed = {}
-    for paths in ("", control_msgs):
-        environment = {**os.environ, "PYTHONPATH": f"{paths}:{os.environ.get('PYTHONPATH', '')}"}
-        command = ["rosrun", "ros_pybullet_interface", "check_world.py", world]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        listed[paths] = done.stdout
-    assert "joint_trajectory_controller/command" in listed[""] and "follow_joint_trajectory" not in listed[""]
-    assert "joint_trajectory_controller/follow_joint_trajectory" in listed[control_msgs]
-    assert "control_msgs/QueryTrajectoryState" in listed[control_msgs]
+    done = subprocess.run(
+        ["rosrun", "ros_pybullet_interface", "check_world.py", world], capture_output=True, text=True, check=True
+    )
+    assert "joint_trajectory_controller/follow_joint_trajectory" in done.stdout
+    assert "control_msgs/QueryTrajectoryState" in done.stdout
 
 
 def test_robot_without_the_key_has_none_of_it(ros, tmp_path):

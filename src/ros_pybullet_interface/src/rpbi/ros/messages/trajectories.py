@@ -1,23 +1,15 @@
-"""Trajectories and the states of their followers as messages; those of control_msgs where it is installed."""
+"""Trajectories and the states of their followers as messages."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import genpy
+from control_msgs.msg import JointTrajectoryControllerState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, TrajectoryPoint, TrajectoryRequest
 from rpbi.control.trajectories.trajectory import TrajectoryStateSample
 from rpbi.ros.headers import to_ros_time
-
-try:
-    from control_msgs.msg import FollowJointTrajectoryAction as FollowJointTrajectoryAction
-    from control_msgs.msg import JointTrajectoryControllerState as JointTrajectoryControllerState
-    from control_msgs.srv import QueryTrajectoryState as QueryTrajectoryState
-except ImportError:  # Debian has no package of it
-    from ros_pybullet_interface.msg import JointTrajectoryControllerState
-
-    FollowJointTrajectoryAction = QueryTrajectoryState = None
 
 CONTROLLER = "joint_trajectory_controller"
 """Namespace of a trajectory follower below `rpbi/NAME/`."""

@@ -1,5 +1,6 @@
 """The topic of each type of samples, and the samples as messages."""
 
+from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -13,7 +14,7 @@ from ros_pybullet_interface.msg import ControllerState as ControllerStateMessage
 from rpbi.ros.endpoints import Topic, find_topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
 from rpbi.ros.messages.controllers import controller_state_message
-from rpbi.ros.messages.trajectories import CONTROLLER, JointTrajectoryControllerState, state_message
+from rpbi.ros.messages.trajectories import CONTROLLER, state_message
 from rpbi.samples import (
     BaseStateSample,
     ContactArrowsSample,

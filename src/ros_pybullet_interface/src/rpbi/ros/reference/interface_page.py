@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
 from rpbi.ros.headers import FRAMES
-from rpbi.ros.messages.trajectories import CONTROLLER
 from rpbi.ros.node_topics import PARAMETERS
 from rpbi.world import World
 
@@ -41,22 +40,6 @@ The nodes of custom_ros_tools, which remap joint states and publish transforms a
 [replay.md](replay.md) and [data.md](data.md). Its nodes are in [interpolation.md](interpolation.md),
 [force_torque.md](force_torque.md#a-zero-and-the-weight-of-a-payload), [tracking.md](tracking.md) and
 [real_robots.md](real_robots.md#the-stand-in)."""
-_FOLLOWER = f"rpbi/NAME/{CONTROLLER}"
-WITH_CONTROL_MSGS = {
-    Endpoint(
-        SERVES,
-        f"{_FOLLOWER}/follow_joint_trajectory",
-        "control_msgs/FollowJointTrajectoryAction",
-        meaning="An action: the robot follows a trajectory and reports its errors; where control_msgs is installed.",
-    ): ["robot", "mobile_robot"],
-    Endpoint(
-        SERVES,
-        f"{_FOLLOWER}/query_state",
-        "control_msgs/QueryTrajectoryState",
-        meaning="Returns the desired state at a time; where control_msgs is installed.",
-    ): ["robot", "mobile_robot"],
-}
-"""Rows that the page always has, so that it does not depend on whether control_msgs is installed."""
 HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
 
 
@@ -75,7 +58,7 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     of_window = {each: [""] for each in rest if each.note == OF_WINDOW}
     parts = [WRITTEN_BY, "# Topics and services", INTRODUCTION]
     parts += ["## Simulator", *_tables(of_node, definitions)]
-    parts += ["## Objects", OBJECTS, *_tables({**_owners(of_bodies), **WITH_CONTROL_MSGS}, definitions)]
+    parts += ["## Objects", OBJECTS, *_tables(_owners(of_bodies), definitions)]
     parts += ["## Cameras", CAMERAS, *_tables({each: [""] for each in of_cameras}, definitions)]
     parts += ["## PyBullet's window", WINDOW, *_tables(of_window, definitions)]
     parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES.items())), FOLLOWED]
@@ -91,13 +74,10 @@ def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[
     placeholders = {f"/{JOINT}/": "/JOINT/", **{f"/{name}/": "/CONTROLLER/" for name in CONTROLLERS}}
     for body, rows in of_bodies.items():
         for row in rows:
-            if row.type.startswith("control_msgs/") and not row.name.endswith("/state"):
-                continue
             name = row.name.replace(f"rpbi/{body}/", "rpbi/NAME/")
             for example, placeholder in placeholders.items():
                 name = name.replace(example, placeholder)
-            type_name = row.type.replace("control_msgs/", "ros_pybullet_interface/")  # fields and md5 are the same
-            kinds = owners.setdefault(Endpoint(row.kind, name, type_name, "", row.meaning), [])
+            kinds = owners.setdefault(Endpoint(row.kind, name, row.type, "", row.meaning), [])
             if body not in kinds:
                 kinds.append(body)
     return owners

@@ -48,6 +48,9 @@ class Endpoint(NamedTuple):
     meaning: str = ""
 
 
+ACTION_MEANING = "An action: the robot follows a trajectory and reports its errors."
+
+
 def endpoints(world: World) -> list[Endpoint]:
     """Lists what the node opens for a world.
 
@@ -92,7 +95,8 @@ def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:
     yield from _inputs(world, name)
     for topic in BODY_TOPICS:
         yield from (_topic(SUBSCRIBES, topic, "", owner) for owner in topic.owners(body))
-    yield from (_service(ACTION, owner, "action") for owner in ACTION.owners(body))
+    for owner in ACTION.owners(body):
+        yield _service(ACTION, owner, "action")._replace(meaning=ACTION_MEANING)
     for service in BODY_SERVICES:
         yield from (_service(service, owner) for owner in service.owners(body))
 

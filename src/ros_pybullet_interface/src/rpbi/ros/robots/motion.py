@@ -42,6 +42,11 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
     return Answer(*_move(context, context.body.start_positions(), request.duration))
 
 
+def move_to_init_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
+    """The same as `move_to_initial_joint_state`, by its name in the documentation of the authors' release."""
+    return move_to_initial_joint_state(context, request)
+
+
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
     """Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.
 

@@ -14,6 +14,7 @@ import rospy
 from actionlib import ActionServer
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies.robots.robot import Robot
@@ -27,23 +28,17 @@ from rpbi.ros.headers import to_ros_time
 from rpbi.ros.messages.topics import FastTopic
 from rpbi.ros.messages.trajectories import (
     CONTROLLER,
-    FollowJointTrajectoryAction,
     fill_state,
     goal_tolerances,
     trajectory_request,
 )
 from rpbi.world.actions import RecordedTrajectory
 
-from .trajectory_commands import followers_with_control_msgs
+from .trajectory_commands import followers
 
 log = logging.getLogger(__name__)
 
-ACTION = Service(
-    f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory",
-    FollowJointTrajectoryAction,
-    None,
-    followers_with_control_msgs,
-)
+ACTION = Service(f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction, None, followers)
 MAX_TASKS = 100
 """Largest number of waiting tasks; beyond it, feedback is dropped."""
 LONGEST_END_S = 5.0
@@ -108,15 +103,6 @@ class _StampedTopic(FastTopic):
 def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
     """Serves the action of a robot that follows trajectories; returns what closes it."""
     if not isinstance(context.body, Robot) or context.body.follower is None:
-        return None
-    if FollowJointTrajectoryAction is None:
-        log.warning(
-            "%s: rpbi/%s/%s has its topics only: the action follow_joint_trajectory and the service query_state need "
-            "control_msgs, which is not installed (see docs/trajectories.md)",
-            context.name,
-            context.name,
-            CONTROLLER,
-        )
         return None
     return TrajectoryAction(context).close
 

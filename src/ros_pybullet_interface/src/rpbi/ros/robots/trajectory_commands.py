@@ -10,18 +10,13 @@ from rpbi.bodies.robots.robot import Robot
 from rpbi.control.trajectories.trajectory import DesiredState
 from rpbi.engine.clock import NS_PER_S
 from rpbi.ros.body_context import BodyContext
-from rpbi.ros.messages.trajectories import QueryTrajectoryState, trajectory_request
+from rpbi.ros.messages.trajectories import trajectory_request
 from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
     """Returns the owner of what every robot with a follower of trajectories has."""
     return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
-
-
-def followers_with_control_msgs(body: Body) -> Sequence[str]:
-    """Returns the owner of what such a robot has where control_msgs is installed."""
-    return followers(body) if QueryTrajectoryState is not None else ()
 
 
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
@@ -38,7 +33,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Returns where joints will be at a time; only with control_msgs."""
+    """Returns where joints will be at a time."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from cob_srvs.srv import SetString
+from control_msgs.srv import QueryTrajectoryState
 from custom_srvs.srv import SetTransform, SetTransformRequest
 from std_srvs.srv import Empty, Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -29,13 +30,14 @@ from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
 from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
-from rpbi.ros.messages.trajectories import CONTROLLER, QueryTrajectoryState
+from rpbi.ros.messages.trajectories import CONTROLLER
 from rpbi.ros.requests import Requests
 from rpbi.ros.robots.controllers import controllers, robots_with_controllers, set_gains, switch_controllers
 from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
 from rpbi.ros.robots.info import publish_description, robot_info
 from rpbi.ros.robots.motion import (
     move_to_eff_state,
+    move_to_init_joint_state,
     move_to_initial_joint_state,
     move_to_joint_state,
     set_control_mode,
@@ -45,7 +47,7 @@ from rpbi.ros.robots.motion import (
     stop_motion,
 )
 from rpbi.ros.robots.trajectory_action import open_trajectory_action
-from rpbi.ros.robots.trajectory_commands import follow_command, followers, followers_with_control_msgs, query_state
+from rpbi.ros.robots.trajectory_commands import follow_command, followers, query_state
 from rpbi.ros.simulation import Simulation
 from rpbi.sensors.filters import Zeroing
 
@@ -130,8 +132,9 @@ BODY_SERVICES = (
     Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),
     Service("rpbi/{name}/move_to_joint_state", ResetJointState, move_to_joint_state, of(Robot)),
     Service("rpbi/{name}/move_to_initial_joint_state", ResetJointState, move_to_initial_joint_state, of(Robot)),
+    Service("rpbi/{name}/move_to_init_joint_state", ResetJointState, move_to_init_joint_state, of(Robot)),
     Service("rpbi/{name}/move_to_eff_state", ResetEffState, move_to_eff_state, of(Robot)),
-    Service(f"rpbi/{{name}}/{CONTROLLER}/query_state", QueryTrajectoryState, query_state, followers_with_control_msgs),
+    Service(f"rpbi/{{name}}/{CONTROLLER}/query_state", QueryTrajectoryState, query_state, followers),
 )
 BODY_TOPICS = (
     Topic(
