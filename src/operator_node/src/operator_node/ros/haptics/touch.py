@@ -6,7 +6,8 @@ import time
 from typing import Literal
 
 import rospy
-from geometry_msgs.msg import TwistStamped, Vector3, Wrench
+from geomagic_touch_x_ros.msg import OmniFeedback as TouchXFeedback
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, TwistStamped, Vector3, Wrench
 from omni_msgs.msg import OmniButtonEvent, OmniFeedback, OmniState
 from pydantic import Field
 from tf2_msgs.msg import TFMessage
@@ -25,6 +26,12 @@ needs the time to send.
 """
 
 MAX_LEAVE_S = 2.0
+FORCES: dict[str, tuple[str, type]] = {
+    "omni": ("force_feedback", OmniFeedback),
+    "pose": ("force_feedback", TouchXFeedback),
+    "touch_x": ("cmd_force", Wrench),
+}
+"""Topic and type of the forces of each driver."""
 ENDED = "its ROS node was shut down"
 
 
@@ -33,8 +40,10 @@ class TouchConfig(HapticConfig):
 
     max_force_n: Positive = Field(3.0, description="Largest force that is sent to it [N]; the Touch X has 7.9.")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
-    driver: Literal["omni", "touch_x"] = Field(
-        "omni", description="omni: omni_msgs, as in omni_common; touch_x: cmd_force, twist and TF."
+    driver: Literal["omni", "pose", "touch_x"] = Field(
+        "omni",
+        description="omni: omni_msgs, as in omni_common; pose: Pose and force_feedback of geomagic_touch_x_ros, as in"
+        " the release's human_interaction; touch_x: cmd_force, twist and TF, as in its nsl.",
     )
     name: Name = Field("phantom", description="Prefix of the topics.")
     metres_per_unit: Positive = Field(0.001, description="Unit of lengths of `omni`: 0.001 for mm, 1 for m.")
@@ -59,6 +68,7 @@ class TouchDevice(HapticDevice):
         self._newest: HapticReading | None = None
         self._buttons: tuple[int, ...] = ()
         self._velocity: Vector | None = None
+        self._place = Point()
         self._seen_s = self._sent_s = 0.0
         self._force: rospy.Publisher | None = None
         self._is_leaving, self._closed = False, threading.Event()
@@ -81,6 +91,10 @@ class TouchDevice(HapticDevice):
             self._subscribers = [
                 rospy.Subscriber(f"{name}/state", OmniState, self._on_state, queue_size=1, tcp_nodelay=True),
                 rospy.Subscriber(f"{name}/button", OmniButtonEvent, self._on_buttons, queue_size=10),
+            ]
+        elif self.config.driver == "pose":
+            self._subscribers = [
+                rospy.Subscriber(f"{name}/Pose", PoseStamped, self._on_pose, queue_size=1, tcp_nodelay=True)
             ]
         else:
             self._subscribers = [
@@ -143,10 +157,7 @@ class TouchDevice(HapticDevice):
         self._send_zeros()
 
     def _publisher(self) -> rospy.Publisher:
-        if self.config.driver == "omni":
-            topic, kind = "force_feedback", OmniFeedback
-        else:
-            topic, kind = "cmd_force", Wrench
+        topic, kind = FORCES[self.config.driver]
         return rospy.Publisher(f"{self.config.name}/{topic}", kind, queue_size=1, tcp_nodelay=True)
 
     def _send_zeros(self) -> None:
@@ -165,6 +176,8 @@ class TouchDevice(HapticDevice):
         try:
             if self.config.driver == "omni":
                 self._force.publish(OmniFeedback(force=Vector3(-y, x, z)))
+            elif self.config.driver == "pose":
+                self._force.publish(TouchXFeedback(force=Vector3(-y, z, -x), position=self._place))
             else:
                 self._force.publish(Wrench(force=Vector3(-y, z, -x)))
         except rospy.ROSException:
@@ -177,10 +190,17 @@ class TouchDevice(HapticDevice):
 
     def _on_state(self, message: OmniState) -> None:
         """Stores a state in axes x right, y forward, z up."""
-        p, v, q = message.pose.position, message.velocity, message.pose.orientation
-        unit_m = self.config.metres_per_unit
+        v, unit_m = message.velocity, self.config.metres_per_unit
+        self._put_pose(message.pose.position, message.pose.orientation, unit_m, scaled(unit_m, (v.y, -v.x, v.z)))
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        """Stores a pose in the same axes, in metres; the driver reports no velocity."""
+        self._place = message.pose.position
+        self._put_pose(message.pose.position, message.pose.orientation, 1.0, None)
+
+    def _put_pose(self, p: Point, q: Quaternion, unit_m: float, velocity: Vector | None) -> None:
         x, y, z = minus(scaled(unit_m, (p.x, p.y, p.z)), self.config.centre)
-        self._put((y, -x, z), scaled(unit_m, (v.y, -v.x, v.z)), (q.y, -q.x, q.z, q.w))
+        self._put((y, -x, z), velocity, (q.y, -q.x, q.z, q.w))
 
     def _on_buttons(self, message: OmniButtonEvent) -> None:
         self._buttons = int(bool(message.grey_button)), int(bool(message.white_button))

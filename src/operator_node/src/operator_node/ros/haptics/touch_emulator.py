@@ -4,7 +4,17 @@ import threading
 import time
 
 import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, TwistStamped, Vector3, Wrench
+from geomagic_touch_x_ros.msg import OmniFeedback as TouchXFeedback
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    TransformStamped,
+    TwistStamped,
+    Vector3,
+    Wrench,
+)
 from omni_msgs.msg import OmniButtonEvent, OmniFeedback, OmniState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
@@ -32,6 +42,11 @@ class TouchEmulator:
             self._button = rospy.Publisher(f"{name}/button", OmniButtonEvent, queue_size=1, latch=True)
             self._button.publish(OmniButtonEvent())
             rospy.Subscriber(f"{name}/force_feedback", OmniFeedback, self._feel_omni, queue_size=1, tcp_nodelay=True)
+        elif self._driver == "pose":
+            self._state = rospy.Publisher(f"{name}/Pose", PoseStamped, queue_size=1, tcp_nodelay=True)
+            rospy.Subscriber(
+                f"{name}/force_feedback", TouchXFeedback, self._feel_touch_x, queue_size=1, tcp_nodelay=True
+            )
         else:
             self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, tcp_nodelay=True)
             self._twist = rospy.Publisher(f"{name}/twist", TwistStamped, queue_size=1, tcp_nodelay=True)
@@ -44,7 +59,7 @@ class TouchEmulator:
         f = message.force
         self._feel((f.y, -f.x, f.z))
 
-    def _feel_touch_x(self, message: Wrench) -> None:
+    def _feel_touch_x(self, message: Wrench | TouchXFeedback) -> None:
         f = message.force
         self._feel((-f.z, -f.x, f.y))
 
@@ -70,6 +85,9 @@ class TouchEmulator:
             self._state.publish(
                 OmniState(header, False, False, pose, Vector3(), Vector3(-vy * unit, vx * unit, vz * unit))
             )
+            return
+        if self._driver == "pose":
+            self._state.publish(PoseStamped(header, Pose(Point(-y, x, z), no_turn)))
             return
         header.frame_id = "touch_x_base"
         twist = TwistStamped(header=header)
