@@ -16,9 +16,10 @@ def test_lines_are_about_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp
     checks = {"self_collision": {"margin_m": 0.02}, "link_box": {"boxes": {"lower": {"x": [-0.5, 0.5]}}}}
     guard = guard_of(folding(tmp_path), checks=checks)
     decide(guard, (0.0, 2.6))  # the elbow is folded: the lower arm is beside the base
-    shown = ros.listen("/robot_safety/markers", MarkerArray)
+    shown, boxes = ros.listen("/robot_safety/markers", MarkerArray), ros.listen("/safe_robot/box_limit/marker", Marker)
     markers = GuardMarkers(guard, Condition(), "base")
     message = wait_until(lambda: shown.messages[-1], "something is shown")
+    alone = boxes.wait_for()[0]
     markers.close()
     lines = [each for each in message.markers if each.type == Marker.LINE_LIST]
     texts = [each.text for each in message.markers if each.type == Marker.TEXT_VIEW_FACING]
@@ -31,4 +32,5 @@ def test_lines_are_about_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp
         assert (line.color == TOO_NEAR) == (said_mm <= 40.0)
     (box,) = [each for each in message.markers if each.ns == "link_box"]
     assert box.scale.x == pytest.approx(1.0) and box.pose.position.x == pytest.approx(0.0)
+    assert alone == box, "the release's README has its topic"
     assert {each.header.frame_id for each in message.markers} == {"base"}

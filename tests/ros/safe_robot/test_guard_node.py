@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
 from guard_nodes import NAMES, GuardStation
 from guarded_arm import FOLDING, SLIDER
 from node_world import Rosout, publishing
@@ -16,7 +17,7 @@ from std_msgs.msg import Header
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.check import CheckContext
-from safe_robot.ros.guard_status import GuardStatus
+from safe_robot.ros.guard_status import GuardStatus, violation_of
 from safe_robot.ros.parameters import guard_of_parameters
 
 
@@ -251,3 +252,17 @@ def test_stamps_that_go_back_are_warned_of_once_a_minute(parameters, ros):
         "/joint_states/target: staleness: the stamp of the target is 0.01 s before that of the target before; give each"
         " target a later stamp, or none, and let one source publish"
     ]
+
+
+def test_status_may_be_a_diagnostic_as_the_readme_of_the_release_has_it(parameters, ros):
+    parameters(start_from="target")
+    guard, _ = guard_of_parameters()
+    guard.start()
+    shown = ros.listen("/robot_safety/status", DiagnosticStatus)
+    status = GuardStatus(guard, "/joint_states/target", as_diagnostic=True)
+    status.publish(Header(), None)
+    status.publish(Header(), violation_of("input", "expected numbers, got NaN"))
+    safe, unsafe = shown.wait_for(2)
+    assert (safe.level, unsafe.level) == (DiagnosticStatus.OK, DiagnosticStatus.ERROR)
+    assert unsafe.message == "input: expected numbers, got NaN"
+    assert {each.key: each.value for each in unsafe.values}["check"] == "input"

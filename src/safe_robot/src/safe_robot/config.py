@@ -58,6 +58,11 @@ class NodeConfig(ConfigModel):
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."
     )
+    status_as_diagnostic: Switch = Field(
+        False,
+        description="Whether robot_safety/status is a diagnostic_msgs/DiagnosticStatus, as the README of the authors'"
+        " release has it; else a safe_robot/Status.",
+    )
     targets_are_states: Switch = Field(
         False,
         description="Whether targets are joint states that are measured; only the positions of guarded joints count.",

@@ -25,7 +25,7 @@ NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.
 
 
 class GuardMarkers:
-    """Publishes `robot_safety/markers` while somebody listens.
+    """Publishes `robot_safety/markers` while somebody listens, and the boxes alone on `safe_robot/box_limit/marker`.
 
     Args:
         guard: The guard.
@@ -36,14 +36,19 @@ class GuardMarkers:
     def __init__(self, guard: Guard, lock: Condition, frame: str) -> None:
         self._guard, self._lock, self._frame = guard, lock, frame
         self._publisher = rospy.Publisher("robot_safety/markers", MarkerArray, queue_size=10, latch=True)
+        self._box = rospy.Publisher("safe_robot/box_limit/marker", Marker, queue_size=10)
         self._timer = WallTimer(HZ, self._publish)
 
     def close(self) -> None:
         """Publishes no more."""
         self._timer.stop()
         self._publisher.unregister()
+        self._box.unregister()
 
     def _publish(self) -> None:
+        if self._box.get_num_connections():
+            for box in self._boxes():
+                self._box.publish(box)
         if not self._publisher.get_num_connections():
             return
         with self._lock:

@@ -64,7 +64,7 @@ class GuardNode:
             tcp_nodelay=True,
         )
         self._sending = DirectSending.of(self._command, QUEUE_SIZE)
-        self._status = GuardStatus(self._guard, self._target_topic)
+        self._status = GuardStatus(self._guard, self._target_topic, config.status_as_diagnostic)
         base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
         self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out)
         self._guard.start()

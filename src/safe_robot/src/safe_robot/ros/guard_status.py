@@ -3,6 +3,7 @@
 import math
 
 import rospy
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
@@ -28,11 +29,13 @@ class GuardStatus:
     Args:
         guard: The guard.
         subject: Subject of warnings: the topic of targets.
+        as_diagnostic: Whether the status is a `DiagnosticStatus`.
     """
 
-    def __init__(self, guard: Guard, subject: str) -> None:
-        self._guard, self._subject = guard, subject
-        self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
+    def __init__(self, guard: Guard, subject: str, as_diagnostic: bool = False) -> None:
+        self._guard, self._subject, self._as_diagnostic = guard, subject, as_diagnostic
+        kind = DiagnosticStatus if as_diagnostic else Status
+        self._status = rospy.Publisher("robot_safety/status", kind, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
         self._warn = ThrottledWarning(WARNING_PERIOD_S)
         self._way_out_from: object = None
@@ -54,10 +57,10 @@ class GuardStatus:
             note: The message of a safe target.
         """
         if violation is None:
-            self._status.publish(Status(header=header, message=note, is_safe=True))
+            self._status.publish(self._status_message(header, note, None))
             return
         message = f"{violation}{self._way_out(obstacles)}"
-        self._status.publish(Status(header=header, message=message, is_safe=False))
+        self._status.publish(self._status_message(header, message, violation))
         self._violation.publish(
             ViolationMessage(
                 header=header,
@@ -75,6 +78,18 @@ class GuardStatus:
         else:
             check = f"{violation.check}: "
             self._warn(f"{self._subject}: {violation.check}", message.removeprefix(check))
+
+    def _status_message(self, header: Header, text: str, violation: Violation | None) -> Status | DiagnosticStatus:
+        if not self._as_diagnostic:
+            return Status(header=header, message=text, is_safe=violation is None)
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, name=rospy.get_name(), message=text)
+        status.values = [KeyValue("stamp", f"{header.stamp.to_sec():.9f}")]
+        if violation is not None:
+            status.level = DiagnosticStatus.ERROR
+            status.values += [
+                KeyValue(key, str(getattr(violation, key))) for key in ("check", "subject", "value", "limit")
+            ]
+        return status
 
     def warn_of_halt(self) -> None:
         """Warns that a target was ignored."""
