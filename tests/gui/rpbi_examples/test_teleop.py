@@ -24,7 +24,7 @@ REQUESTED, GUARDED, MEASURED = (
     "/rpbi/kuka_lwr/joint_states/target",
     "/rpbi/kuka_lwr/joint_states",
 )
-TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
+TARGET, TIP = "teleop_target", "rpbi/kuka_lwr/end_effector_ball"
 AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 """Directions of a person who stands behind the arm, in the world."""
 MIDDLE = np.array([0.0, 0.0, 0.3])

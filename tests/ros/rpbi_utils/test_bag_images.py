@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import PIL.Image
 import pytest
+import rosbag_pandas
 from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Float64, Header
 
@@ -138,6 +139,7 @@ def test_one_table_of_all_topics_as_rosbag_pandas_has_it(write_bag: WriteBag) ->
     assert table["/number/data"].iloc[1] == 7.0
     assert not any(name.startswith("/rgb") for name in table.columns)
     assert list(bag_to_dataframe(bag, include=["/number"]).columns) == ["/number/data"]
+    assert list(rosbag_pandas.bag_to_dataframe(bag, ["/number"]).columns) == ["/number/data"]
     assert list(bag_to_dataframe(bag, include="/n.*|/j.*", exclude=["/joints"]).columns) == ["/number/data"]
     assert len(bag_to_dataframe(bag, include="/nothing")) == 0
     assert "/rgb/data" in bag_to_dataframe(bag, include="/rgb").columns

@@ -1,4 +1,4 @@
-"""Motions in the examples: a figure eight, circles, an orbit, a route, joints that swing, and a grasp."""
+"""Motions in the examples: a figure eight, circles, an orbit, a route, joints that swing, a wave, and a grasp."""
 
 import math
 from collections.abc import Sequence
@@ -48,6 +48,12 @@ SWING_AMPLITUDE = 1.0
 """Amplitude of a swing [rad or m]; smaller where its limits require it."""
 SWING_MARGIN = 0.95
 """Share of the way to a limit that is used."""
+RAISED_DEG = {"jRightShoulder_rotx": -10.0, "jRightShoulder_roty": -60.0, "jRightElbow_rotz": 75.0}
+"""Joints of a human model that raise the right hand."""
+RAISE_S = 2.0
+"""Time to raise the hand [s]."""
+WAVE_JOINT, WAVE_AMPLITUDE, WAVE_PERIOD_S = "jRightElbow_rotz", math.radians(30.0), 1.5
+"""Joint that waves, its motion to either side [rad], and the time of one wave [s]."""
 FINGERS_OPEN, FINGERS_CLOSED = 0.04, 0.0
 """Position of a finger [m]; on the way to closed there is the box."""
 GRASP_HEIGHT, CARRY_HEIGHT = 0.025, 0.2
@@ -216,6 +222,29 @@ class Swing:
         joint = self._order[int(turn) % len(self._order)]
         positions = list(self._middle)
         positions[joint] += self._amplitude[joint] * math.sin(_swing_angle(phase_s))
+        return tuple(positions)
+
+
+class Wave:
+    """Positions of all joints of a human model that raises its right hand and waves.
+
+    Args:
+        names: Names of the n joints.
+        start: Where they are at time 0 [rad].
+    """
+
+    def __init__(self, names: Sequence[str], start: Sequence[float]) -> None:
+        self._joint = names.index(WAVE_JOINT)
+        raised = {name: math.radians(angle_deg) for name, angle_deg in RAISED_DEG.items()}
+        goal = [raised.get(name, at) for name, at in zip(names, start, strict=True)]
+        self._raising = minimum_jerk(start, goal, 0.0, RAISE_S)
+
+    def at(self, time_s: float) -> tuple[float, ...]:
+        """Returns the positions of the n joints at a time since the start [s]."""
+        positions = list(self._raising.sample(min(time_s, RAISE_S)).position)
+        waved_s = max(time_s - RAISE_S, 0.0)
+        growth = min(waved_s / WAVE_PERIOD_S, 1.0)
+        positions[self._joint] += growth * WAVE_AMPLITUDE * math.sin(2.0 * math.pi * waved_s / WAVE_PERIOD_S)
         return tuple(positions)
 
 

@@ -3,6 +3,7 @@
 import math
 import sys
 import threading
+from typing import NoReturn
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Twist
@@ -15,7 +16,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.tf import TfInterface
 from robot_model.urdf.files import write_description
 from ros_pybullet_interface.msg import Contacts
-from rpbi_examples.motions import CIRCLE_CENTRE, SWING_AMPLITUDE, PlanarPose, Route, Swing, wiped
+from rpbi_examples.motions import CIRCLE_CENTRE, SWING_AMPLITUDE, PlanarPose, Route, Swing, Wave, wiped
 from rpbi_examples.two_hands import MirroredHands
 
 from .joint_targets import HZ, JointTargets
@@ -30,6 +31,11 @@ def basic_robot_example() -> None:
     They swing by `~amplitude` (1 rad or m) about 0, or with `~about_start` about where they are at first.
     """
     run_node("basic_robot_example", _swing)
+
+
+def wave() -> None:
+    """Waves with the right hand of the human model that `~robot_name` or the first argument names."""
+    run_node("wave", _wave)
 
 
 def drive_around() -> None:
@@ -69,9 +75,19 @@ def _swing() -> None:
     lower, upper = zip(*robot.limits)
     middle = robot.positions if rospy.get_param("~about_start", False) else None
     swing = Swing(robot.positions, lower, upper, middle, float(rospy.get_param("~amplitude", SWING_AMPLITUDE)))
+    _play(robot, swing)
+
+
+def _wave() -> None:
+    robot = JointTargets(_robot_name())
+    _play(robot, Wave(robot.names, robot.positions))
+
+
+def _play(robot: JointTargets, motion: Swing | Wave) -> NoReturn:
+    """Sends a motion until ROS shuts down."""
     time_s = 0.0
     while True:
-        robot.send(swing.at(time_s))
+        robot.send(motion.at(time_s))
         time_s += 1.0 / HZ
 
 

@@ -27,7 +27,7 @@ from rpbi_examples.motions import PlanarPose
 ORIGIN, TARGET, TARGET_TIP, TIP = (
     "rpbi/teleop_origin",
     "rpbi/teleop_target",
-    "rpbi/teleop_tip",
+    "teleop_target",
     "rpbi/kuka_lwr/end_effector_ball",
 )
 BASE = "rpbi/kuka_lwr/lwr_arm_0_link"

@@ -19,7 +19,7 @@ from rpbi_examples.lfd.report import BoxError
 from .arm import ORIGIN, planar
 
 FILE, NAME = "{rpbi_examples}/configs/lfd/box.yaml", "pushing_box"
-FRAME, GOAL = f"rpbi/{NAME}", "rpbi/goal"
+FRAME, GOAL = f"rpbi/{NAME}", "rpbi/visual_goal"
 REST_S, MAX_DROP_S = 0.5, 5.0
 """Time for which the box has to lie still, and longest time until it does [s]."""
 REST_M = 0.0005
