@@ -1,13 +1,14 @@
 """Effort and lag of an iiwa that follows 50 targets a second with jitter and stalls, beside targets at every tick.
 
 The floor is the largest effort with targets at every tick. Offline cases depend on nothing but their seeds: five with
-`--quick`, else fifty, on none of which the jitter buffer was tuned. Live, a node sends targets beside two busy
-processes.
+`--quick`, else fifty, on none of which the jitter buffer was tuned. Live, a node sends targets beside none, two and
+seven busy processes.
 """
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import random
 import sys
@@ -34,6 +35,8 @@ SETTLING_S = 1.0
 """Time at the start that does not count [s]."""
 FIRST_SEED = 9000
 JITTER_S, STALL_S = 0.012, 0.03
+LONG_STALLS_S = (0.05, 0.1, 0.18)
+"""Stalls that are longer than the buffer [s]."""
 MAX_LAG_MS = 50.0
 STATES = "/rpbi/iiwa/joint_states"
 BUSY = "while True: pass"
@@ -54,7 +57,7 @@ class Sent(NamedTuple):
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures the worst of all seeds: efforts of jitter and of one stall, and lags."""
+    """Measures the worst of all seeds: efforts of jitter and of one short or long stall, and lags."""
     seeds = range(FIRST_SEED, FIRST_SEED + (5 if quick else 50))
     results = []
     with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
@@ -65,17 +68,24 @@ def run(quick: bool) -> list[Result]:
             for stamps in ("sample", "sending", "none"):
                 jitter = [_follow(Path(folder), _late(seed, stamps, JITTER_S), velocities) for seed in seeds]
                 stall = [_follow(Path(folder), _late(seed, stamps, 0.0, STALL_S), velocities) for seed in seeds]
+                long_stall = [
+                    _follow(Path(folder), _late(seed, stamps, 0.0, stall_s), velocities)
+                    for seed, stall_s in zip(seeds, itertools.cycle(LONG_STALLS_S))
+                ]
                 name = f"stamps of the {stamps}{more}" if stamps != "none" else f"no stamps{more}"
                 effort, lag_ms = (max(each) for each in zip(*jitter))
+                target = Target(1.5, of_floor=True)
                 results += [
                     Result("streams", f"jitter, {name}", effort, "N m", floor, Target(1.2, of_floor=True)),
-                    Result("streams", f"one stall, {name}", max(stall)[0], "N m", floor, Target(1.5, of_floor=True)),
+                    Result("streams", f"one stall, {name}", max(stall)[0], "N m", floor, target),
+                    Result("streams", f"one long stall, {name}", max(long_stall)[0], "N m", floor, target),
                     Result("streams", f"lag, {name}", lag_ms, "ms", None, Target(MAX_LAG_MS)),
                 ]
         floor = results[0].floor
-    efforts = [_live(10.0 if quick else 30.0, busy) for busy in (0, 2)]
-    for effort, beside in zip(efforts, ("", " beside two busy processes")):
-        results.append(Result("streams", f"live{beside}", effort, "N m", floor, Target(1.5, of_floor=True)))
+    for busy, *options in ((0,), (2,), (7,), (7, "--no-stamps")):
+        name = f"live beside {busy} busy processes{', no stamps' if options else ''}"
+        effort = _live(10.0 if quick else 30.0, busy, *options)
+        results.append(Result("streams", name, effort, "N m", floor, Target(1.5, of_floor=True)))
     return results
 
 
@@ -126,13 +136,13 @@ def _follow(folder: Path, sent: Sequence[Sent], velocities: bool) -> tuple[float
     return float(np.abs(effort).max()), float(-1e3 * (error @ speed) / (speed @ speed))
 
 
-def _live(seconds: float, busy: int) -> float:
-    """Returns the largest effort [N m] of a robot that a node swings, beside so many busy processes."""
+def _live(seconds: float, busy: int, *options: str) -> float:
+    """Returns the largest effort [N m] of a robot that a node swings with options, beside so many busy processes."""
     with Session(use_sim_time=False) as ros:
         ros.simulator(_world(ros.folder))
         for _ in range(busy):
             ros.start([sys.executable, "-c", BUSY])
-        efforts = ros.result_of(ros.program("swing", STATES, seconds))
+        efforts = ros.result_of(ros.program("swing", STATES, seconds, *options))
     largest = max(map(abs, efforts))
     if not math.isfinite(largest):
         raise RuntimeError(f"efforts must be finite, got {largest}")

@@ -1,4 +1,4 @@
-"""Swings a joint by 50 targets a second, stamped as they are sent, and notes its efforts."""
+"""Swings a joint by 50 targets a second, stamped as they are sent or not at all, and notes its efforts."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("states", help="topic of the joint states; targets go to TOPIC/target")
     parser.add_argument("seconds", type=float, help="how long to swing")
+    parser.add_argument("--no-stamps", action="store_true", help="send targets without stamps")
     arguments = parser.parse_args()
     rospy.init_node("swing", disable_signals=True)
     targets = rospy.Publisher(f"{arguments.states}/target", JointState, queue_size=10, tcp_nodelay=True)
@@ -47,7 +48,8 @@ def main() -> None:
         rate.sleep()
     for number in range(round(arguments.seconds * HZ)):
         target = JointState(name=[JOINT], position=[position(number / HZ)])
-        target.header.stamp = rospy.Time.now()
+        if not arguments.no_stamps:
+            target.header.stamp = rospy.Time.now()
         targets.publish(target)
         rate.sleep()
         if number == round(RAMP_S * HZ):

@@ -31,20 +31,12 @@ MIN_LOSS_RATIO = 16.0
 """Ratio of squared misfits above which a gap counts as lost targets rather than as a late one."""
 MAX_LOST = 4
 """Longest gap that can count as lost targets [periods]."""
-PERSISTENT = 4
+PERSISTENT = 16
 """Number of targets out of step in a row after which only these count."""
 SAME_PERIOD = (0.6, 1.6)
 """Range of the mean of the last `PERSISTENT` intervals within which the period has not changed [periods]."""
 SHORTEST_WAY = 0.05
 """Least time from one target to the next as they are played [ticks]."""
-MARGIN = 1.25
-"""Ratio of the delay to the lateness of targets, where the buffer is shorter."""
-MAX_DELAY_S = 0.2
-"""Longest delay by late targets [s]."""
-FORGETTING_S = 10.0
-"""Time constant with which a late target is forgotten [s]."""
-MAX_EXTRAPOLATION_S = 0.04
-"""Longest time for which a stream with a longer delay than the buffer goes on without targets [s]."""
 LEAST_AHEAD = 0.25
 """Smallest delay between arrival and playing of a target [ticks]."""
 
@@ -58,7 +50,8 @@ class Playout(NamedTuple):
         period: Period of the stream [ticks], 0 if the target is not part of a stream.
         speed: Time between this target and the one before as they were sent, over that as they are played.
         pace: Mean time between the last targets as they came [ticks].
-        gap: Time for which the stream had stopped, since the target came too late [ticks].
+        gap: Time by which the target came later than set points continue without it [ticks].
+        apart: Time between this target and the one before by their stamps or arrivals [ticks], 0 if it is unknown.
     """
 
     start: float
@@ -67,6 +60,7 @@ class Playout(NamedTuple):
     speed: float = 1.0
     pace: float = 0.0
     gap: float = 0.0
+    apart: float = 0.0
 
     @property
     def is_immediate(self) -> bool:
@@ -80,8 +74,7 @@ class JitterBuffer:
     Two kinds of send times compete. Stamps are those of irregular samples; without valid stamps, arrivals replace them.
     A regular period, fitted to them, is that of samples which a busy machine sends late. Those on which positions lie
     more smoothly are used. Delays are one-sided, so the promptest of the last arrivals counts as undelayed; the buffer
-    comes on top. The delay follows changes slowly, except where a target is too late for it. Where targets are later
-    than the buffer repeatedly, as on a busy machine, the delay grows with them.
+    comes on top. The delay follows changes slowly, except where a target is too late for it.
 
     Args:
         dt_s: Length of a tick [s].
@@ -90,16 +83,12 @@ class JitterBuffer:
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
+        self.dt_s, self.has_delay = dt_s, buffer_s > 0.0
         self._buffer = max(buffer_s / dt_s - 1.5, 0.0)
         self._settling = SETTLING_S / dt_s
-        self._max_delay = MAX_DELAY_S / dt_s if buffer_s else 0.0
-        self._extrapolations = (buffer_s / dt_s / 2.0 + 3.0, MAX_EXTRAPOLATION_S / dt_s) if buffer_s else (0.0, 0.0)
-        self._forgetting = FORGETTING_S / dt_s
+        self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
+        """Time for which a stream continues at its last velocity when the next target is too late [ticks]."""
         self._longest = LONGEST_PERIOD_S / dt_s
-        self._late = (0.0, 0.0)
-        """The two largest values of lateness, of separate stalls [ticks]; they shrink with time."""
-        self._delay = self._buffer
-        """Delay beyond the promptest target [ticks]: the buffer, or longer where targets are later."""
         self._sender = SenderClock(dt_s)
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
@@ -116,17 +105,6 @@ class JitterBuffer:
         self._is_regular: bool | None = None
         self._misfits = (0.0, 0.0)
         self._out_of_step = 0
-
-    @property
-    def extrapolation(self) -> float:
-        """Time for which a stream is to go on when the next target is too late [ticks]."""
-        least, most = self._extrapolations
-        return max(least, min((self._delay + 1.5) / 2.0 + 3.0, most))
-
-    @property
-    def delay(self) -> float:
-        """The delay in which late targets are still in time [ticks], the ticks of waiting included."""
-        return self._delay + 1.5
 
     def add(self, tick: int, stamp_ns: int, goal: Mapping[int, float]) -> Playout:
         """Adds a target that comes before a tick.
@@ -162,23 +140,8 @@ class JitterBuffer:
         if regular or count == 2:
             interval = period * self._seen[-1].step
         undelayed = self._undelayed(times, steps, regular)
-        self._adapt_delay(-undelayed, interval)
-        planned = undelayed + self._delay + period
-        return self._schedule(tick, tick + planned, interval, period)
-
-    def _adapt_delay(self, late: float, interval: float) -> None:
-        """Makes the delay as long as targets are late repeatedly; a single late target does not change it.
-
-        Args:
-            late: Lateness of the newest target [ticks].
-            interval: Time since the target before [ticks].
-        """
-        kept = math.exp(-interval / self._forgetting)
-        first, second = (kept * each for each in self._late)
-        if len(self._seen) > 1 and self._seen[-1].tick > self._seen[-2].tick:  # else it is late by the same stall
-            first, second = sorted((first, second, late))[:0:-1]
-        self._late = first, second
-        self._delay = max(self._buffer, min(MARGIN * second, self._max_delay))
+        playout = self._schedule(tick, tick + undelayed + self._buffer + period, interval, period)
+        return playout._replace(apart=times[-1] - times[-2])
 
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
         """Returns whether a target comes, or was sent by a right clock, too long after the last one for a stream."""
@@ -236,7 +199,7 @@ class JitterBuffer:
         delays = [each.tick - tick - scale * time for each, time in zip(self._seen, sent)]
         least = min(delays)
         undelayed = least - 2.0 * (sum(delays) / len(delays) - least) / len(delays)
-        self._out_of_step = self._out_of_step + 1 if undelayed < -self._delay - 1.0 else 0
+        self._out_of_step = self._out_of_step + 1 if undelayed < -self._buffer - 1.0 else 0
         return undelayed
 
     def _steps(self) -> list[int]:

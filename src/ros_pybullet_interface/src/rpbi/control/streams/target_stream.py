@@ -6,8 +6,9 @@ targets are apart, and a moving average over one period rounds the corners. For 
 B-spline, which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period.
 The delay of the jitter buffer comes on top.
 
-A target that is too late even for the buffer must not stop the robot from full speed. The set points go on at the last
-velocity for a while, then slow down and come back to the last target.
+A target that is too late even for the buffer must not stop the robot from full speed. The set points continue at the
+last velocity for a while, then slow down and come back to the last target. Where that plan changes its velocity at
+once, as when late targets come, the set points follow it with the accelerations of a `BoundedMotion`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from rpbi.control.motors import POSITION_MODES, Motors, ResolvedCommand, coalesce
 
+from .bounded_motion import BoundedMotion
 from .jitter_buffer import EVERY_TICK, JitterBuffer
 from .segment import StreamSegment, agree
 
@@ -31,8 +33,6 @@ SAME_TIME = 1e-9
 """Difference of times that is an error of rounding [ticks]."""
 QUIET_S = 60.0
 """Time after a warning of late targets without another [s] of the world's time."""
-RETURN_PERIODS = 5.0
-"""Time in which a stream that went on beyond its last target comes back to it [periods]."""
 
 
 class TargetStream:
@@ -60,6 +60,7 @@ class TargetStream:
         """Velocities at the last targets by joint index [rad or m per tick]; none of a hurried way."""
         self._period = 0.0
         self._window = self._lagging_window = self._wanted_window = 0.0
+        self._motion = BoundedMotion(held, buffer.dt_s, buffer.has_delay, self._limited)
         self.set_points = held
         """Where the joints are to be now."""
         self.gap = 0.0
@@ -77,12 +78,18 @@ class TargetStream:
         """
         playout = self.buffer.add(tick, stamp_ns, goal)
         self.gap = playout.gap
+        is_under_way = self._motion.is_under_way(tick)
         if playout.is_immediate:
             self._segments.clear()
             self._velocities.clear()
             self._base = goal
             has_lead = playout.period > 0.0 and slopes
-            self.set_points = {index: value - slopes[index] for index, value in goal.items()} if has_lead else goal
+            planned = {index: value - slopes[index] for index, value in goal.items()} if has_lead else goal
+            if is_under_way:
+                self._motion.jump(planned)
+            else:
+                self._motion.restart(planned, slopes if has_lead else {})
+                self.set_points = planned
             self._period = 0.0
         else:
             slopes = {index: velocity * playout.speed for index, velocity in slopes.items()}
@@ -96,6 +103,10 @@ class TargetStream:
             if not self._period:
                 self._window = self._lagging_window = self._wanted_window
             self._period = period
+        if is_under_way or not playout.is_immediate:
+            ways = {index: value - self._goal[index] for index, value in goal.items()}
+            corner = 0.0 if self._smooth or slopes else 1.0
+            self._motion.add(ways, playout.apart, corner)
         self._goal, self._slopes, self.rests = goal, slopes, False
 
     def _append(
@@ -133,8 +144,8 @@ class TargetStream:
                 positions[index] += segment.covered(index, basis)
         if any(segment.slopes is not None for segment in segments):  # cubics may leave the hull of their targets
             positions = {index: self._limited(index, value) for index, value in positions.items()}
-        self.set_points = positions
-        return positions
+        self.set_points = self._motion.advance(positions)
+        return self.set_points
 
     def _limited(self, index: int, value: float) -> float:
         return value if self._limits is None else self._limits(index, value)
@@ -158,15 +169,12 @@ class TargetStream:
             then = {index: value + length * _lesser(bends[index], means[index]) for index, value in first.items()}
         if length <= 0.0 or not any((*first.values(), *then.values())):
             return
-        rest = dict.fromkeys(first, 0.0)
-        self._extend(
-            length, {index: length * (value + then[index]) / 2.0 for index, value in first.items()}, first, then
-        )
-        if not self._wanted_window:
-            self._extend(self._period, {i: self._period * value / 2.0 for i, value in then.items()}, then, rest)
-        beyond = self._segments[-1].goal
-        back = {index: value - beyond[index] for index, value in last.goal.items()}
-        self._extend(RETURN_PERIODS * self._period, back, rest, rest)
+        rest, brake = dict.fromkeys(first, 0.0), self._motion.brake
+        on = {index: length * (value + then[index]) / 2.0 for index, value in first.items()}
+        self._extend(length, on, first, then)
+        self._extend(brake, {index: brake * value / 2.0 for index, value in then.items()}, then, rest)
+        back = {index: value - self._segments[-1].goal[index] for index, value in last.goal.items()}
+        self._extend(2.0 * brake, back, rest, rest)
 
     def _extend(
         self, length: float, way: Mapping[int, float], first: Mapping[int, float], last: Mapping[int, float]
@@ -215,16 +223,12 @@ class TargetStreams:
         if tick < self._quiet_until:
             return
         self._quiet_until = tick + round(QUIET_S / self._dt_s)
-        stopped_ms, delay_ms, buffer_ms = (
-            1e3 * each for each in (stream.gap * self._dt_s, stream.buffer.delay * self._dt_s, self._buffer_s)
-        )
         log.warning(
-            "%s: targets come too late: the motion had stopped for %.0f ms; they are delayed by %.0f ms now,"
-            " target_buffer_s is %.0f ms; end other programs, or raise it",
+            "%s: a target came %.0f ms too late, so that the motion slowed down; target_buffer_s is %.0f ms;"
+            " end other programs, or raise it",
             self._name,
-            stopped_ms,
-            delay_ms,
-            buffer_ms,
+            1e3 * stream.gap * self._dt_s,
+            1e3 * self._buffer_s,
         )
 
     @property
