@@ -209,7 +209,7 @@ def test_position_targets_and_motions_drive_the_springs(build):
     for number in range(50):
         world.put("lwr/target", JointCommand(JOINTS[:1], [0.01 * number], stamp_ns=1 + number * 20_000_000))
         run(world, 20)
-    run(world, 500)
+    run(world, 800)
     assert positions(world)[0] == pytest.approx(0.49, abs=1e-3)
     world.act("lwr", "switch_mode", world.bodies["lwr"].config.setJointMotorControlArray.controlMode)
     efforts = world.bodies["lwr"].efforts(tuple([0.0] * len(world.bodies["lwr"].joints)))
@@ -236,7 +236,7 @@ def test_a_cartesian_spring_goes_to_its_target_at_the_largest_stiffness(build):
         pose = Pose((x, y + 0.004 * number, z), tuple(-part for part in quat))  # the same orientation
         world.put("lwr/hold/target", PoseTarget(pose, round(1e9 + 2e7 * number)))
         run(world, 20)
-    run(world, 1200)
+    run(world, 1600)
     assert controller._pose().position == pytest.approx((x, y + 0.1, z), abs=1e-4)
     assert world.bodies["lwr"].controllers.sample("lwr", "hold").values["turn/x"] == pytest.approx(0.0, abs=1e-3)
 
