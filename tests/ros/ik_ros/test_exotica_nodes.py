@@ -70,30 +70,25 @@ def test_services_and_problems_of_the_release(ros, tmp_path):
 
 
 LAUNCH = """<launch>
-  <node pkg="ik_ros_examples" name="figure_eight_motion" type="figure_eight_node.py">
-    <param name="start_on_init" type="bool" value="false"/>
-  </node>
-  <node pkg="tf2_ros" type="static_transform_publisher" name="motion_base_in_world"
-        args="-0.5 0 0.65 0 1.57 3.141 rpbi/world figure_eight_base"/>
-  <node pkg="ik_ros" name="ik_setup" type="ik_setup_node.py" args="exotica" output="screen">
-    <param name="start_on_init" type="bool" value="false"/>
-    <rosparam param="sync_tf_to_exotica_object">[
-    "rpbi/kuka_lwr/base figure_eight '' Target",
-    ]</rosparam>
-    <remap from="ik/setup/exotica/start_state" to="rpbi/kuka_lwr/joint_states"/>
-    <remap from="ik/setup/exotica/previous_solutions" to="rpbi/kuka_lwr/joint_states/target"/>
-  </node>
-  <node pkg="ik_ros" name="ik_solver" type="ik_solver_node.py" args="exotica" output="screen">
-    <param name="xml_filename" type="str" value="{ik_ros_examples}/configs/kuka_lwr_exotica_example/kuka_lwr.xml"/>
-    <param name="start_on_init" type="bool" value="false"/>
-    <remap from="joint_states/target" to="rpbi/kuka_lwr/joint_states/target"/>
-  </node>
-  <node pkg="ros_pybullet_interface" name="ros_pybullet_interface_node" type="ros_pybullet_interface_node.py">
+  <node pkg="ros_pybullet_interface" type="ros_pybullet_interface_node.py" name="simulator">
     <rosparam param="config" file="$(find ik_ros_examples)/configs/kuka_lwr_exotica_example/config.yaml"/>
   </node>
-  <node pkg="ik_ros_examples" name="start" type="run_example.py" args="exotica" output="screen">
-    <param name="robot_name" type="str" value="kuka_lwr"/>
-    <param name="eff_name" type="str" value="lwr_arm_7_link"/>
+  <node pkg="ik_ros" type="ik_solver_node.py" name="ik_solver" args="exotica" output="screen">
+    <remap from="joint_states/target" to="rpbi/kuka_lwr/joint_states/target"/>
+    <param name="xml_filename" value="{ik_ros_examples}/configs/kuka_lwr_exotica_example/kuka_lwr.xml"/>
+  </node>
+  <node pkg="ik_ros" type="ik_setup_node.py" name="ik_setup" args="exotica" output="screen">
+    <remap from="ik/setup/exotica/start_state" to="rpbi/kuka_lwr/joint_states"/>
+    <remap from="ik/setup/exotica/previous_solutions" to="rpbi/kuka_lwr/joint_states/target"/>
+    <rosparam>sync_tf_to_exotica_object: ["rpbi/kuka_lwr/base figure_eight '' Target"]</rosparam>
+  </node>
+  <node pkg="ik_ros_examples" type="figure_eight_node.py" name="figure_eight">
+    <param name="start_on_init" value="false"/>
+  </node>
+  <node pkg="tf2_ros" type="static_transform_publisher" name="figure_tf"
+        args="-0.5 0 0.65 0 1.57 3.141 rpbi/world figure_eight_base"/>
+  <node pkg="ik_ros_examples" type="run_example.py" name="client" args="exotica" output="screen">
+    <param name="robot_name" value="kuka_lwr"/>
   </node>
 </launch>"""
 CONFIGS = "configs/kuka_lwr_exotica_example"
