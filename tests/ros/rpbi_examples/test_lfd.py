@@ -12,16 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
+from geometry_msgs.msg import Point, Vector3, Wrench
 from node_world import registrations
+from real_robot import RealRobot
 from ros_system import RPBI, wait_until
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.transforms import Array
 from episodes import EpisodeFolder
 from operator_node.emulators.spacenavd import SpacenavDaemon
+from ros_pybullet_interface.srv import ApplyWrench
 from rpbi_utils import bag_to_dataframes
+from rpbi_utils.msg import DriverState
+from safe_robot.msg import Violation
 
 FAST = "real_time_factor:=0"
 ORIGIN, TIP = "rpbi/teleop_origin", "rpbi/kuka_lwr/end_effector_ball"
@@ -118,3 +124,24 @@ def test_a_device_demonstrates_in_the_plane(ros, tmp_path, device):
     assert (episode.state, episode.label) == ("complete", "failure")
     recorded = bag_to_dataframes(folder.folder_of(episode.number) / "episode.bag", "/joy")["/joy"]
     assert recorded[f"buttons/{stick.button}"].any() and recorded["axes/0"].any()
+
+
+@pytest.mark.parametrize("guard", [True, False])
+def test_real_robot_follows_until_it_feels_more_than_it_may(ros, tmp_path, guard):
+    violations = ros.listen("/real_robot/robot_safety/violation", Violation)
+    driver, real = ros.listen("/stand_in/driver_state", DriverState), RealRobot(ros)
+    device = ["operator:=joystick", "virtual:=true", "headless:=true", f"out:={tmp_path}"]
+    launched = [*device, "real_robot:=true", f"guard:={str(guard).lower()}"]
+    process = ros.start(["roslaunch", "rpbi_examples", "lfd.launch", *launched])
+    wait_until(lambda: "key 1: home" in ros.output(process), "the lesson is ready")
+    assert ros.call("/lfd/home", Trigger).success
+    real.wait_until_moved()
+
+    push, tool = Wrench(force=Vector3(0.0, 0.0, 120.0)), "kuka_lwr/end_effector_ball"
+    assert ros.call("/stand_in/rpbi/apply_wrench", ApplyWrench, tool, push, Point(), "world", 0.0).success
+    if guard:
+        wait_until(lambda: any(each.check == "force" for each in list(violations.messages)), "the force is too large")
+        wait_until(lambda: len({each.commands for each in driver.messages[-20:]}) == 1, "no command comes any more")
+    else:
+        commands = driver.messages[-1].commands
+        wait_until(lambda: driver.messages[-1].commands > commands + 100, "it follows all the same")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 import pytest
+import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped
 from guarded_arm import folding, guard_of
 from node_world import publishing
 from ros_system import wait_until
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from robot_model.geometry import Pose
@@ -31,7 +33,7 @@ def around(ros):
     base.transform.rotation = Quaternion(*UPRIGHT)
     broadcaster = tf2_ros.StaticTransformBroadcaster()
     broadcaster.sendTransform(base)
-    around = LiveObstacles(BASE, ["arm"])
+    around = LiveObstacles(BASE, ["arm"], timeout_s=0.5)
     with publishing("rpbi/markers", MarkerArray) as markers:
         yield around, markers.publish
     around.close()
@@ -76,3 +78,21 @@ def test_an_arm_keeps_away_from_them_and_stands_while_nobody_knows_where_they_ar
     assert "'box'" in str(decision.violation)
     publish([marker("box", 0.0, 0.0, 0.0, frame="nobody/knows")])
     wait_until(lambda: around.obstacles is None, "it is not known any more where it is")
+
+
+@pytest.mark.parametrize(("timeout_s", "known"), [(0.5, False), (1e6, True)])
+def test_places_older_than_the_timeout_are_unknown(around, timeout_s, known):
+    late = TransformStamped(child_frame_id="late")
+    late.header.frame_id, late.header.stamp = "rpbi/world", rospy.Time.now() - rospy.Duration(5.0)
+    late.transform.rotation.w = 1.0
+    _, publish = around
+    patient = LiveObstacles(BASE, ["arm"], timeout_s)
+    try:
+        with publishing("/tf", TFMessage) as tf:
+            tf.publish([late])
+            publish([marker("box", 0.0, 0.0, 0.0)])
+            wait_until(lambda: patient.obstacles, "a body that does not move is known")
+            publish([marker("ball", 0.0, 0.0, 0.0, frame="late")])
+            wait_until(lambda: len(patient.obstacles) == 2 if known else patient.obstacles is None, "it is looked at")
+    finally:
+        patient.close()

@@ -24,11 +24,14 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.schema import ConfigModel, Positive
 from operator_node.msg import SegmentForces
+from ros_pybullet_interface.msg import SimulationState
 from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
 from rpbi_examples.dressing.force import ArmForce, forces_on_arm
 from rpbi_examples.dressing.hand import HandSolver
 from rpbi_examples.dressing.outcome import Outcome, outcome, rings_of
 from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
+
+from .joint_targets import wait_until_ready
 
 JOINTS_OF_ARM = ("RightUpperArm", "RightForeArm", "RightHand")
 STILL_S = 1.0
@@ -42,6 +45,7 @@ class TelepresenceParameters(ConfigModel):
 
     force_limit: Positive = Field(15.0, description="Sum of forces on the arm above which the cuff goes back [N].")
     speed: Positive = Field(0.1, description="Speed of the cuff where nothing is touched [m/s].")
+    ready: str = Field("", description="Topic of the commands of a real robot, which are waited for; empty: none.")
     out: str = Field("", description="File that the outcome is written to, as JSON; empty: none.")
 
 
@@ -58,6 +62,7 @@ class TelepresenceNode:
         self._solver = HandSolver()
         self._tf, self._lock = TfInterface(), threading.Lock()
         self._felt_s = -math.inf
+        self._world_pace = 1.0
         self._positions: tuple[float, ...] | None = None
         self._rings: Array | None = None
         self._targets = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=1, tcp_nodelay=True)
@@ -66,16 +71,19 @@ class TelepresenceNode:
         self._warn = ThrottledWarning()
         self._subscribe("rpbi/panda/joint_states", JointState, self._on_state, queue_size=1)
         self._subscribe("rpbi/sleeve/surface", Marker, self._on_surface, queue_size=1)
+        if not rospy.get_param("/use_sim_time", False):
+            self._subscribe("rpbi/state", SimulationState, self._on_world_state, queue_size=1)
         self._subscribe("avatar/segment_forces", SegmentForces, self._on_forces, queue_size=100)
 
     def run(self) -> None:
         """Dresses the person, and returns when the sleeve is on, or ROS shuts down."""
+        wait_until_ready()
         rate, still_s, last_s = rospy.Rate(TARGET_HZ), 0.0, rospy.get_time()
         rospy.loginfo("waiting for the person to hold out the right arm")
         while not (rospy.is_shutdown() or self._dressing.is_done):
             rate.sleep()
             now_s = rospy.get_time()
-            dt, last_s = min(max(now_s - last_s, 0.0), 0.1), now_s
+            dt, last_s = min(max(now_s - last_s, 0.0), 0.1) * self._world_pace, now_s
             arm = self._arm()
             if arm is None or self._positions is None or now_s - self._felt_s > SEES_NOTHING_S:
                 continue
@@ -152,6 +160,10 @@ class TelepresenceNode:
         if not positions:
             raise ValueError("expected positions of the joints, got none")
         self._positions = tuple(positions)
+
+    def _on_world_state(self, message: SimulationState) -> None:
+        """Slows the robot down with its world, which wall time does not show."""
+        self._world_pace = min(message.real_time_factor, 1.0)
 
     def _on_surface(self, message: Marker) -> None:
         self._rings = rings_of([(point.x, point.y, point.z) for point in message.points])

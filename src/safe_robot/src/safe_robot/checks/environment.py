@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import NonNegativeMetres, Text
+from custom_ros_tools.schema import NonNegativeMetres, Seconds, Text
 from safe_robot.check import CheckConfig, CheckContext, Violation
 from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.geometry.obstacles import Obstacle
@@ -22,6 +22,7 @@ class EnvironmentConfig(CheckConfig):
     """Least distances between links and bodies of the environment."""
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
+    timeout_s: Seconds = Field(0.5, description="Oldest place of a live body; while one is older, no target is safe.")
     geometry: Geometry = Field("hulls", description=GEOMETRY)
     world: Text | None = Field(
         None, description="Main YAML file of a world: its bodies as they are at the start; without it, live ones."

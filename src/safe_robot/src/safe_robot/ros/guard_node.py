@@ -36,6 +36,8 @@ JUMP_S = 0.5
 """Largest difference between two stamps beyond the time between their targets [s]; more is a jump."""
 FIRST_STATE_S = 1.0
 """Longest time for which the node waits for a measured state before it subscribes to targets [s]."""
+BODIES_TIMEOUT_S = 0.5
+"""Largest age of the places of bodies for checks that have no `timeout_s` [s]."""
 NEVER_S = float("-inf")
 REPEATED = "the stamp is that of the target before: both are one target, with one command"
 SWITCH_S = 0.0005
@@ -65,8 +67,12 @@ class GuardNode:
         )
         self._sending = DirectSending.of(self._command, QUEUE_SIZE)
         self._status = GuardStatus(self._guard, self._target_topic, config.status_as_diagnostic)
-        base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
-        self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out)
+        takers = [check for check in self._guard.checks if check.takes_obstacles]
+        timeout_s = min(
+            (getattr(check.config, "timeout_s", BODIES_TIMEOUT_S) for check in takers), default=BODIES_TIMEOUT_S
+        )
+        base_frame = config.base_frame if takers else None
+        self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out, timeout_s)
         self._guard.start()
         # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
         can_skip = self._guard.config.policy == "limit" or self._guard.config.shape

@@ -18,8 +18,6 @@ HZ = 50.0
 """Rate at which the poses of bodies are read [Hz]."""
 STILL = 1e-4
 """Smallest motion of a body [m, and parts of a quaternion]; smaller ones are ignored."""
-OLDEST_S = 0.5
-"""Largest age of a transform [s]; beyond it, the pose of the body is unknown."""
 KINDS: dict[int, Kind] = {
     Marker.CUBE: "box",
     Marker.SPHERE: "sphere",
@@ -35,16 +33,17 @@ class LiveObstacles:
     Args:
         base_frame: TF frame of the robot's root.
         left_out: Bodies that are none: the robot itself, and what can be gone through.
+        timeout_s: Largest age of a transform [s]; beyond it, the pose of the body is unknown.
 
     Attributes:
         obstacles: The shapes in the robot's root; None while it is not known what there is or where.
     """
 
-    def __init__(self, base_frame: str, left_out: Sequence[str]) -> None:
+    def __init__(self, base_frame: str, left_out: Sequence[str], timeout_s: float) -> None:
         self.obstacles: tuple[Obstacle, ...] | None = None
         self._base_frame, self._left_out = base_frame, frozenset(left_out)
         self._markers: dict[tuple[str, int], Marker] = {}
-        self._is_told = False
+        self._is_told, self._timeout_s = False, timeout_s
         self._warn = ThrottledWarning()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = TfListener(self._buffer)
@@ -93,7 +92,7 @@ class LiveObstacles:
     def _place(self, frame: str) -> Pose:
         found = self._buffer.lookup_transform(self._base_frame, frame, rospy.Time(0))
         age_s = (rospy.Time.now() - found.header.stamp).to_sec()
-        if found.header.stamp and age_s > OLDEST_S:
+        if found.header.stamp and age_s > self._timeout_s:
             raise ValueError(f"TF from '{self._base_frame}' to '{frame}' is {age_s:.1f} s old")
         t, r = found.transform.translation, found.transform.rotation
         return Pose((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))

@@ -32,11 +32,14 @@ class Measurements:
         joint_names: The n guarded joints.
         base_frame: TF frame of the robot's root; None without a source of bodies.
         left_out: Bodies that are none.
+        bodies_timeout_s: Largest age of the places of bodies [s].
     """
 
-    def __init__(self, joint_names: Sequence[str], base_frame: str | None, left_out: Sequence[str]) -> None:
+    def __init__(
+        self, joint_names: Sequence[str], base_frame: str | None, left_out: Sequence[str], bodies_timeout_s: float
+    ) -> None:
         self._joint_names = tuple(joint_names)
-        self._around = None if base_frame is None else LiveObstacles(base_frame, left_out)
+        self._around = None if base_frame is None else LiveObstacles(base_frame, left_out, bodies_timeout_s)
         self._measured: Mapping[str, tuple[float, float]] = {}
         """Position [rad or m] and time [s] by joint."""
         self._has_measured = threading.Event()

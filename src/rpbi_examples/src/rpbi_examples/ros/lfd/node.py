@@ -28,6 +28,7 @@ from rpbi_examples.lfd.report import SIZE, Run, draw_paths, draw_pipeline, write
 from rpbi_examples.lfd.skill import Learn, PushSkill, learn_dmp
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.ros.human_interaction import interrupt_roslaunch
+from rpbi_examples.ros.joint_targets import wait_until_ready
 
 from .arm import ORIGIN, TARGET, TIP, Arm, planar
 from .box import GOAL, PushedBox
@@ -89,6 +90,7 @@ class Lesson:
         Raises:
             InterfaceError: If the box was not at its goal after one of them.
         """
+        wait_until_ready()
         rospy.loginfo("key 1: home; key 2: starts and ends a demonstration; key 3: learns, and then executes")
         self._become("ready")
         while not rospy.is_shutdown() and not (self._rounds and len(self._executed) >= self._rounds):
