@@ -48,3 +48,7 @@ def test_one_refusal_of_each_kind_is_logged(monkeypatch):
     for letters in ("a" * length for length in range(1, 3 * MAX_KINDS)):
         warn("/many", letters)
     assert len(logged) == 3 + MAX_KINDS
+    rarely = ThrottledWarning(period_s=3600.0, max_kinds=1)
+    for name in ("table", "wall"):
+        rarely("guard", f"near the {name}")
+    assert logged[3 + MAX_KINDS :] == ["guard: near the table"]

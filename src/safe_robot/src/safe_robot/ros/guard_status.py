@@ -37,7 +37,7 @@ class GuardStatus:
         kind = DiagnosticStatus if as_diagnostic else Status
         self._status = rospy.Publisher("robot_safety/status", kind, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
-        self._warn = ThrottledWarning(WARNING_PERIOD_S)
+        self._warn = ThrottledWarning(WARNING_PERIOD_S, max_kinds=1)  # its messages name whatever is near
         self._way_out_from: object = None
         self._way_out_words = ""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import rospy
 
 MAX_KINDS = 20
-"""Largest number of kinds of warnings of a subject that are told apart."""
+"""Number of kinds of warnings of a subject that are told apart, unless another one is given."""
 _NUMBER = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 
@@ -73,12 +73,15 @@ class WallTimer:
 class ThrottledWarning:
     """Warns of each new kind of fault of a subject at once, else at most once in a period of wall time [s].
 
-    It counts the warnings that it suppresses. Messages are of one kind if they differ in numbers alone; beyond
-    `MAX_KINDS` kinds of a subject, none counts as new.
+    It counts the warnings that it suppresses. Messages are of one kind if they differ in numbers alone.
+
+    Args:
+        period_s: The period.
+        max_kinds: Number of kinds of a subject beyond which none counts as new.
     """
 
-    def __init__(self, period_s: float = 5.0) -> None:
-        self._period_s = period_s
+    def __init__(self, period_s: float = 5.0, max_kinds: int = MAX_KINDS) -> None:
+        self._period_s, self._max_kinds = period_s, max_kinds
         self._lock = threading.Lock()
         self._last: dict[str, tuple[float, int]] = {}
         self._kinds: dict[str, set[str]] = {}
@@ -88,7 +91,7 @@ class ThrottledWarning:
         now_s, kind = time.monotonic(), _NUMBER.sub("#", message)
         with self._lock:
             kinds = self._kinds.setdefault(subject, set())
-            is_new = kind not in kinds and len(kinds) < MAX_KINDS
+            is_new = kind not in kinds and len(kinds) < self._max_kinds
             last_s, kept_back = self._last.get(subject, (-self._period_s, 0))
             if not is_new and now_s - last_s < self._period_s:
                 self._last[subject] = (last_s, kept_back + 1)
