@@ -60,7 +60,7 @@ def topic_or_service(name: str) -> bool:
     if re.search(rf"(?<![\w/]){pattern}(?![\w/])", code()):
         return True
     first, *_, last = name.split("/")
-    return word(first) and bool(re.search(rf"[/\"']{last}[\"']", code()))
+    return word(first) and bool(re.search(rf"[/\"']{last}[/\"']", code()))
 
 
 def word(name: str) -> bool:

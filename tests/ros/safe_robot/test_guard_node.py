@@ -260,6 +260,7 @@ def test_status_may_be_a_diagnostic_as_the_readme_of_the_release_has_it(paramete
     guard.start()
     shown = ros.listen("/robot_safety/status", DiagnosticStatus)
     status = GuardStatus(guard, "/joint_states/target", as_diagnostic=True)
+    wait_until(lambda: shown.is_connected, "the status is heard")
     status.publish(Header(), None)
     status.publish(Header(), violation_of("input", "expected numbers, got NaN"))
     safe, unsafe = shown.wait_for(2)
