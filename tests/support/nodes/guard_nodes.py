@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
 from guarded_arm import SLIDER
 from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import JointState
@@ -38,7 +39,8 @@ class GuardStation:
         self._publisher = rospy.Publisher(f"{namespace}/joint_states/target", JointState, queue_size=100)
         kind = JointState if parameters.get("publish_as_joint_state", True) else Float64MultiArray
         self.commands = ros.listen(f"{namespace}/joint_states/command", kind)
-        self.statuses = ros.listen(f"{namespace}/robot_safety/status", Status)
+        shown = DiagnosticStatus if parameters.get("status_as_diagnostic", False) else Status
+        self.statuses = ros.listen(f"{namespace}/robot_safety/status", shown)
         self.violations = ros.listen(f"{namespace}/robot_safety/violation", Violation)
 
     def wait(self) -> None:

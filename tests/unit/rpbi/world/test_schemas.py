@@ -28,7 +28,9 @@ STORE = {f"{BESIDE}{kind}.schema.json": schema for kind, schema in SCHEMAS.items
 """The files as they stand beside each other in a folder."""
 PACKAGES = [path.parent for path in SRC.glob("*/configs") if path.parent.name != "operator_node"]
 """Packages with YAML files; mappings of operator_node have no schema."""
-SHIPPED = sorted(path for package in PACKAGES for path in package.glob("configs/**/*.yaml"))
+OF_ROS = {"controllers.yaml"}
+"""Files of other packages' formats."""
+SHIPPED = sorted(path for package in PACKAGES for path in package.glob("configs/**/*.yaml") if path.name not in OF_ROS)
 MODELINE = re.compile(r"# yaml-language-server: \$schema=(\S+)")
 SECTION = {"collision": "collision_objects", "dynamic": "dynamic_objects", "soft": "soft_objects", "robot": "robots"}
 CAMERA: dict[str, Any] = {"name": "camera", "object_tf": {"tf_id": "rpbi/camera"}}
