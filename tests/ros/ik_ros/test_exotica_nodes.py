@@ -24,6 +24,7 @@ from ik_ros.ros.exotica_setup import synced_frames
 from ik_ros.srv import EXOTica, EXOTicaInfo, JointNames, JointNamesRequest
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "support/programs"
+FIGURE_EIGHT = Path(__file__).parents[3] / "src/compatibility/ik_ros_examples/nodes/figure_eight_node.py"
 COSTS = '<Task Task="Pose" Rho="1"/><Task Task="JointVel" Rho="0.5e-3"/>'
 NEAR_M = 2e-3
 
@@ -105,8 +106,11 @@ def write_package(folder: Path) -> Path:
         "<maintainer email='a@b.invalid'>a</maintainer><license>l</license></package>"
     )
     shutil.copy(ARM, configs / "lwr.urdf")
-    (package / "scripts").mkdir()
-    shutil.copy(PROGRAMS / "exotica_client.py", package / "scripts/run_example.py")
+    programs = folder / "devel/lib/ik_ros_examples"
+    programs.mkdir(parents=True)
+    shutil.copy(PROGRAMS / "exotica_client.py", programs / "run_example.py")
+    shutil.copy(FIGURE_EIGHT, programs)
+    (folder / "devel/.catkin").write_text(str(folder))
     pose = POSE_MAP.replace("end_effector_ball", "lwr_arm_7_link")
     urdf = f"{{ik_ros_examples}}/{CONFIGS}/lwr.urdf"
     xml = Path(write_problem(configs, pose + VELOCITY_MAP, COSTS, urdf=urdf))
@@ -141,8 +145,9 @@ def write_package(folder: Path) -> Path:
 def test_example_of_the_release_tracks_its_figure(ros, tmp_path):
     launch = write_package(tmp_path)
     tf = ros.listen_to_tf()
-    search_path = f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}"
-    process = ros.start(["roslaunch", str(launch)], ROS_PACKAGE_PATH=search_path)
+    over_ours = {"ROS_PACKAGE_PATH": tmp_path, "CMAKE_PREFIX_PATH": tmp_path / "devel"}
+    paths = {name: f"{path}:{os.environ[name]}" for name, path in over_ours.items()}
+    process = ros.start(["roslaunch", str(launch)], **paths)
 
     def at(frame: str) -> tuple[float, float, float] | None:
         assert process.poll() is None, ros.output(process)

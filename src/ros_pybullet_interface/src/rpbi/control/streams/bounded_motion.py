@@ -15,6 +15,8 @@ HEADROOM = 1.5
 """Ratio of the largest acceleration of set points to that of the targets."""
 LAST = 6
 """Number of targets whose accelerations count."""
+FADING = 0.97
+"""Share of the bound that is left at the next target while set points are off the plan, though targets hardly move."""
 ROUNDING = 1e-9
 """Difference of positions that is an error of rounding [rad or m]."""
 
@@ -97,7 +99,13 @@ class BoundedMotion:
             bounds[index] = max(HEADROOM * change, abs(way) / max(apart, period) / self.brake)
         self._ways, self._apart = ways, apart
         self._last.append(bounds)
-        self._bounds = {index: max(each[index] for each in self._last) or self._bounds[index] for index in bounds}
+        self._bounds = {index: self._bound(index) for index in bounds}
+
+    def _bound(self, index: int) -> float:
+        """Returns the bound of a joint, which fades slowly while the joint is off its plan, and stays at rest."""
+        latest, before = max(each[index] for each in self._last), self._bounds[index]
+        is_off = self._positions[index] != self._planned[index]
+        return max(latest, FADING * before) if is_off else latest or before
 
     def advance(self, planned: Mapping[int, float]) -> Mapping[int, float]:
         """Advances by a tick, after which the plan is at positions, and returns those of the motion by joint index."""
