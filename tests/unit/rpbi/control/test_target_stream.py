@@ -317,3 +317,22 @@ def test_hostile_velocities_pass_no_limit():
     velocities = [rng.uniform(-10.0, 10.0) for _ in targets]
     assert max(map(abs, play(targets, 1100, velocities=velocities, buffer_s=0.02))) > 0.51
     assert max(map(abs, play(targets, 1100, velocities=velocities, buffer_s=0.02, limit=0.5))) <= 0.5
+
+
+def test_a_motion_off_its_plan_returns_to_targets_that_hardly_move():
+    motion = BoundedMotion({0: 0.0}, DT_S, True, lambda index, value: value)
+    tick = 0
+
+    def follow(way: float, planned: float) -> float:
+        """Returns the set point at the end of the period of a target."""
+        nonlocal tick
+        motion.is_under_way(tick)
+        motion.add({0: way}, PERIOD, PERIOD)
+        tick += PERIOD
+        return [motion.advance({0: planned})[0] for _ in range(PERIOD)][-1]
+
+    for number in range(20):
+        follow(0.001 * (-1) ** number, 0.0)
+    motion.jump({0: 0.05})
+    positions = [follow(1e-6 * (-1) ** number, 0.05) for number in range(50)]
+    assert positions[-1] == pytest.approx(0.05, abs=1e-6)
