@@ -169,7 +169,7 @@ class SceneConfig(ElementConfig):
 
 
 class CostConfig(ElementConfig):
-    """How much a task map counts in the costs, and its goal."""
+    """Weight of a task map in the costs, and its goal."""
 
     Task: Text
     Rho: Numbers = ()

@@ -311,7 +311,7 @@ class JointJerkBackwardDifferenceMap(_BackwardDifference):
 
 
 class JointLimitMap(TaskMap):
-    """How far joints are beyond their limits, or beyond a share of them."""
+    """Distance of joints beyond their limits, or beyond a share of them."""
 
     SafePercentage: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.0
 

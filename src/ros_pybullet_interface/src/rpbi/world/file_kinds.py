@@ -1,4 +1,4 @@
-"""Kinds of files, told by their keys: for the message about one that is named in a place for another kind."""
+"""Recognises kinds of files by their keys, for errors about a file in the place of another kind."""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import rospy
 
 MAX_KINDS = 20
-"""Number of kinds of warnings of a subject that are told apart, unless another one is given."""
+"""Default number of kinds of warnings that are distinguished for each subject."""
 _NUMBER = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 

@@ -36,7 +36,7 @@ from .dmp_services import ServerMotion
 from .recording import begin_episode, discard_episode, finish_episode
 
 LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
-"""What learns and plans, by the argument `dmp` of the launch file."""
+"""Classes that learn and plan, by value of the launch file's argument `dmp`."""
 DEMONSTRATING = "demonstrating"
 AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
 """State after a step that failed, by the state before."""
