@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import threading
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
 import rospy
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from ik_ros.msg import EXOTicaProblem, EXOTicaSyncTf
 from ik_ros.node_configs import ExoticaSetupParameters
-from ik_ros.problem import IKProblem, JointPositions
+from ik_ros.problem import IKProblem
 from ik_ros.srv import EXOTicaInfo, EXOTicaInfoResponse
 
 from .exotica import INFO
-from .messages import positions_in, positions_message
-from .problem_publisher import PREVIOUS_TOPICS, QUEUE_SIZE, START_TOPICS, publish_problems
+from .messages import positions_message
+from .problem_inputs import ProblemInputs
+from .problem_publisher import publish_problems
 from .solver_name import topics_of
 from .tf import FreshTf
 
@@ -73,38 +70,15 @@ class ExoticaSetup:
         config = private_parameters(ExoticaSetupParameters)
         synced = synced_frames(config.sync_tf_to_exotica_object)
         self._frames = [(one, FreshTf(one.tf_parent, one.tf_child, config.tf_timeout_s)) for one in synced]
-        self._lock, self._warn = threading.Lock(), ThrottledWarning()
-        self._start: JointPositions = {}
-        self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         info = _info()
         self._goals = {name: [0.0] * size for name, size in zip(info.task_map_names, info.task_map_nrho)}
         rospy.set_param("ik_ros/interface", "exotica")
-        self._topics = topics_of("setup", "exotica")
-        for topic in START_TOPICS:
-            self._listen(topic, JointState, partial(self._on_start, topic))
-        for topic in PREVIOUS_TOPICS:
-            self._listen(topic, JointState, partial(self._on_previous, topic))
+        topics = topics_of("setup", "exotica")
+        self._inputs = ProblemInputs(topics, config.max_num_prev_solutions, {})
+        self._inputs.subscribe()
         for name in self._goals:
-            self._listen(f"task_map_goal/{name}", Float64MultiArray, partial(self._on_goal, name))
-        publish_problems(self._topics, EXOTicaProblem, config.hz, config.start_on_init, self._problem)
-
-    def _listen(self, topic: str, message_type: type, on_message: Callable[[rospy.Message], None]) -> None:
-        full_name = f"{self._topics}/{topic}"
-
-        def checked(message: rospy.Message) -> None:
-            try:
-                with self._lock:
-                    on_message(message)
-            except ValueError as error:
-                self._warn(rospy.resolve_name(full_name), f"message refused: {error}")
-
-        rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-
-    def _on_start(self, topic: str, message: JointState) -> None:
-        self._start = positions_in(topic, message)
-
-    def _on_previous(self, topic: str, message: JointState) -> None:
-        self._previous.append(positions_in(topic, message))
+            self._inputs.listen(f"task_map_goal/{name}", Float64MultiArray, partial(self._on_goal, name))
+        publish_problems(topics, EXOTicaProblem, config.hz, config.start_on_init, self._problem)
 
     def _on_goal(self, name: str, message: Float64MultiArray) -> None:
         if len(message.data) != len(self._goals[name]):
@@ -117,13 +91,13 @@ class ExoticaSetup:
         for synced, tf in self._frames:
             pose = tf.pose()
             sync_tf.append(EXOTicaSyncTf(*synced, [*pose.position, *pose.quat_xyzw]))
-        with self._lock:
+        with self._inputs.lock:
             return EXOTicaProblem(
                 header=Header(stamp=rospy.Time.now()),
                 task_map_names=list(self._goals),
                 task_map_goals=[Float64MultiArray(data=values) for values in self._goals.values()],
-                start_state=positions_message(self._start),
-                previous_solutions=[positions_message(one) for one in self._previous],
+                start_state=positions_message(self._inputs.start or {}),
+                previous_solutions=[positions_message(one) for one in self._inputs.previous],
                 sync_tf=sync_tf,
             )
 

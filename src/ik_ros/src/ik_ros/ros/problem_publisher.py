@@ -13,10 +13,8 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 
-QUEUE_SIZE = 10
-START_TOPICS = ("qinit", "start_state", "currentPosition")
-"""Names that the release's solvers have for the same."""
-PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
+from .problem_inputs import QUEUE_SIZE
+
 LOOK_HZ = 1.0
 SILENT_AFTER_S = 5.0
 """Longest time without a solution while problems are published [s]; beyond it, the solver is reported."""

@@ -1,9 +1,6 @@
 """`ik_setup_node.py SOLVER`: TF, joint states, tolerances and goals in, problems of inverse kinematics out."""
 
-import threading
 import time
-from collections import deque
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -24,8 +21,9 @@ from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
 from .exotica_setup import ExoticaSetup
-from .messages import positions_in, problem_message
-from .problem_publisher import PREVIOUS_TOPICS, QUEUE_SIZE, START_TOPICS, publish_problems
+from .messages import problem_message
+from .problem_inputs import START_TOPICS, ProblemInputs
+from .problem_publisher import publish_problems
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import FreshTf
 
@@ -49,14 +47,12 @@ class SetupNode:
     def __init__(self, name: str) -> None:
         self._config = config = private_parameters(SetupParameters)
         self._topics = topics_of("setup", name)
-        self._warn = ThrottledWarning()
-        self._lock = threading.Lock()
+        start: JointPositions | None = None if config.wait_for_start else {}
+        self._inputs = ProblemInputs(self._topics, config.max_num_prev_solutions, start)
         self._tf: FreshTf | None = None
         if config.parent_frame_id is not None and config.child_frame_id is not None:
             self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
-        self._start: JointPositions | None = None if config.wait_for_start else {}
         self._began_s = time.monotonic()
-        self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         self._goals = dict(config.goals)
         self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
         try:
@@ -68,33 +64,12 @@ class SetupNode:
         publish_problems(self._topics, IKProblemMessage, config.hz, config.start_on_init, self._message)
 
     def _subscribe(self) -> None:
-        for topic in START_TOPICS:
-            self._listen(topic, JointState, partial(self._on_start, topic))
-        for topic in PREVIOUS_TOPICS:
-            self._listen(topic, JointState, partial(self._on_previous, topic))
+        self._inputs.subscribe()
         for key in TOLERANCES:
-            self._listen(key, Float64, partial(self._on_tolerance, key))
+            self._inputs.listen(key, Float64, partial(self._on_tolerance, key))
         for task in self._goals:
             topic = f"task_map_goal/{task}"
-            self._listen(topic, Float64MultiArray, partial(self._on_goal, task))
-
-    def _listen(self, topic: str, message_type: type, on_message: Callable[[rospy.Message], None]) -> None:
-        full_name = f"{self._topics}/{topic}"
-
-        def checked(message: rospy.Message) -> None:
-            try:
-                with self._lock:
-                    on_message(message)
-            except ValueError as error:
-                self._warn(rospy.resolve_name(full_name), f"message refused: {error}")
-
-        rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-
-    def _on_start(self, topic: str, message: JointState) -> None:
-        self._start = positions_in(topic, message)
-
-    def _on_previous(self, topic: str, message: JointState) -> None:
-        self._previous.append(positions_in(topic, message))
+            self._inputs.listen(topic, Float64MultiArray, partial(self._on_goal, task))
 
     def _on_tolerance(self, key: str, message: Float64) -> None:
         changed = {**self._tolerances, key: message.data}
@@ -109,7 +84,7 @@ class SetupNode:
         self._goals[task] = tuple(message.data)
 
     def _message(self) -> IKProblemMessage | None:
-        if self._start is None:
+        if self._inputs.start is None:
             if time.monotonic() - self._began_s > START_PATIENCE_S:
                 topic = rospy.resolve_name(f"{self._topics}/{START_TOPICS[0]}")
                 raise InterfaceError(f"no start has come yet on {topic}; with ~wait_for_start: false none is needed")
@@ -118,12 +93,12 @@ class SetupNode:
         return problem_message(problem, Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or ""))
 
     def _problem(self, target: Pose | None) -> IKProblem:
-        with self._lock:
+        with self._inputs.lock:
             return IKProblem(
                 target=target,
                 **_fields(self._tolerances),
-                start=self._start or {},
-                previous=tuple(self._previous),
+                start=self._inputs.start or {},
+                previous=tuple(self._inputs.previous),
                 goals=self._goals,
                 seed=self._config.seed,
             )
