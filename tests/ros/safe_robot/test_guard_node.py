@@ -264,3 +264,46 @@ def test_status_may_be_a_diagnostic_as_the_readme_of_the_release_has_it(ros):
     unsafe = station.statuses.messages[-1]
     assert unsafe.message.startswith("input: ")
     assert {each.key: each.value for each in unsafe.values}["check"] == "input"
+
+
+@pytest.mark.parametrize("policy", ["limit", "reject"])
+def test_targets_that_pause_halt_only_the_policy_reject(ros, policy):
+    """A busy computer pauses targets; with `limit` the robot brakes and follows again, without a call."""
+    checks = {"staleness": {"timeout_s": 0.5}}
+    options = {"start_from": "target", "period_s": 0.01, "limits": {"velocity": 1.0}}
+    guard = GuardStation(ros, "/pausing", policy=policy, checks=checks, **options)
+    guard.wait()
+    guard.send_unstamped(0.0, 0.0)
+    sent = guard.commands.wait_for(1)
+    while sent[-1].position[0] < 0.005 and not guard.violations.messages:
+        guard.send_unstamped(sent[-1].position[0] + 1e-3, 0.0)
+        sent = guard.commands.wait_for(len(sent) + 1)
+    assert guard.violations.wait_for()[0].message.startswith("staleness: no target for 0.5")
+    wait_until(lambda: resting(guard) or policy == "reject", "the robot has been braked")
+    before, far = len(guard.commands.messages), guard.commands.messages[-1].position[0] + 0.01
+    guard.send_unstamped(far, 0.0)
+    if policy == "limit":
+        wait_until(lambda: len(guard.commands.messages) > before, "a target is followed again")
+        assert len(guard.violations.messages) == 1 or guard.violations.messages[1].check != "staleness"
+    else:
+        guard.statuses.wait_for(len(sent) + 1)
+        assert not guard.call("start").message.startswith("targets are taken already"), "it has halted"
+        assert len(guard.commands.messages) == before
+    guard.close()
+
+
+def resting(guard: GuardStation) -> bool:
+    """Tells whether the last two commands are the same."""
+    last, before = [each.position for each in reversed(guard.commands.messages[-2:])]
+    return last == before
+
+
+def test_with_limit_targets_held_back_too_long_are_dropped_and_it_goes_on(ros):
+    guard = GuardStation(ros, "/held", start_from="target", period_s=0.5, policy="limit", silence_s=0.1)
+    guard.wait()
+    for x in (0.0, 0.0, 1e-3):
+        guard.send_unstamped(x, 0.0)
+    assert guard.violations.wait_for()[0].message.startswith("staleness: the target is ")
+    guard.send_unstamped(0.0, 0.0)
+    guard.commands.wait_for(2)
+    guard.close()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from safe_robot.check import CheckContext
+from safe_robot.check import Check, CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Decision, Guard
 from safe_robot.robot import GuardedRobot
@@ -38,6 +38,17 @@ FOLDING = """<robot name="folding">
     <origin xyz="0.4 0 0"/><limit lower="-3" upper="3" effort="1" velocity="3"/></joint>
 </robot>"""
 """Two boxes on a box: the second one meets the first, the lower one the base, when the elbow folds."""
+
+
+class BrokenCheck(Check):
+    """A check that raises."""
+
+    name = "broken"
+    watches = True
+
+    def check(self, motion, context):
+        """See `Check`."""
+        raise ZeroDivisionError
 
 
 def folding(folder: Path) -> GuardedRobot:

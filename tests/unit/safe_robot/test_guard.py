@@ -7,10 +7,10 @@ import re
 
 import numpy as np
 import pytest
-from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of, slider, worst_shares
+from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, BrokenCheck, decide, folding, guard_of, slider, worst_shares
 
 from custom_ros_tools.errors import ConfigError
-from safe_robot.check import Check, CheckContext, Violation
+from safe_robot.check import CheckContext, Violation
 from safe_robot.guard import Decision
 from safe_robot.robot import GuardedRobot
 
@@ -80,14 +80,8 @@ def test_targets_that_are_no_targets_are_refused(tmp_path, bad):
 
 
 def test_an_exception_in_a_check_stops_everything(tmp_path):
-    class Broken(Check):
-        name = "broken"
-
-        def check(self, motion, context):
-            raise ZeroDivisionError
-
     guard = guard_of(slider(tmp_path))
-    guard.checks = [Broken(None, None, None, ""), *guard.checks]
+    guard.checks = [BrokenCheck(None, None, None, ""), *guard.checks]
     with pytest.raises(ZeroDivisionError):
         decide(guard, (0.0, 0.0))
     assert guard.is_halted and decide(guard, (0.0, 0.0)).command is None
@@ -194,6 +188,41 @@ class TestLimitPolicy:
         commands += [decide(guard, (math.nan, 0.0)).command for _ in range(100)]
         assert max(worst_shares(commands, LIMITS, PERIOD_S).values()) <= 1.0 + ROUNDING
         assert commands[-1] == commands[-2] and not guard.is_moving
+
+    def test_late_targets_brake_it_until_the_next(self, tmp_path):
+        """A busy computer delays targets: the robot rests meanwhile, and follows the next one without a call."""
+        robot = slider(tmp_path)
+        guard = guard_of(robot, policy="limit")
+        commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:50]]
+        known, late = guard.stop_commands, CheckContext(since_command_s=0.11)
+        assert guard.check_watchdogs(late).check == "staleness" and guard.is_braking and not guard.is_halted
+        assert guard.check_watchdogs(late) is None, "it is reported once"
+        braking = list(iter(guard.next_braking, None))
+        assert np.array_equal(braking, known) and not guard.is_braking
+        commands += [*braking, *(decide(guard, (0.5, 0.5)).command for _ in range(300))]
+        assert max(worst_shares(commands, LIMITS, PERIOD_S).values()) <= 1.0 + ROUNDING
+        assert commands[-1] == pytest.approx((0.5, 0.5), abs=1e-3)
+
+    def test_a_target_during_the_braking_for_late_ones_ends_it(self, tmp_path):
+        robot = slider(tmp_path)
+        guard = guard_of(robot, policy="limit")
+        commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:50]]
+        guard.wait_for_target()
+        commands += [guard.next_braking(), guard.next_braking(), decide(guard, (0.5, 0.5)).command]
+        assert guard.is_moving and not guard.is_braking and guard.next_braking() is None
+        commands += [decide(guard, (0.5, 0.5)).command for _ in range(300)]
+        assert max(worst_shares(commands, LIMITS, PERIOD_S).values()) <= 1.0 + ROUNDING
+
+    def test_a_broken_check_halts_it_while_targets_are_late(self, tmp_path):
+        robot = slider(tmp_path)
+        guard = guard_of(robot, policy="limit")
+        for target in list(smooth(robot, 1.0))[:50]:
+            decide(guard, target)
+        guard.wait_for_target()
+        guard.checks = [BrokenCheck(None, None, None, ""), *guard.checks]
+        with pytest.raises(ZeroDivisionError):
+            guard.check_watchdogs(CheckContext())
+        assert guard.is_halted
 
     def test_away_from_what_is_near_it_may_be_fast(self, tmp_path):
         """Out of the margin of a self-collision, the speed is that of anywhere."""

@@ -8,24 +8,13 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from guarded_arm import LIMITS, PERIOD_S, decide, guard_of, slider, worst_shares
+from guarded_arm import LIMITS, PERIOD_S, BrokenCheck, decide, guard_of, slider, worst_shares
 
-from safe_robot.check import Check, CheckContext
+from safe_robot.check import CheckContext
 from safe_robot.guard import Guard
 
 ROUNDING = 1e-6
 """Relative, of differences."""
-
-
-class Broken(Check):
-    """A check that raises."""
-
-    name = "broken"
-    watches = True
-
-    def check(self, motion, context):
-        """See `Check`."""
-        raise ZeroDivisionError
 
 
 def refuse(guard: Guard) -> None:
@@ -52,7 +41,7 @@ def fail_later(guard: Guard) -> None:
 
 @contextmanager
 def broken(guard: Guard) -> Iterator[None]:
-    guard.checks = [Broken(None, None, None, ""), *guard.checks]
+    guard.checks = [BrokenCheck(None, None, None, ""), *guard.checks]
     with pytest.raises(ZeroDivisionError):
         yield
     guard.checks = guard.checks[1:]
@@ -94,13 +83,6 @@ def test_by_default_nothing_follows(tmp_path, halt):
     halt(guard)
     assert guard.is_halted and not guard.is_braking and guard.next_braking() is None
     assert guard.last_command == commands[-1] and not len(guard.stop_commands)
-
-
-def test_what_limits_brakes_at_once_where_it_halts(tmp_path):
-    guard, _ = in_motion(tmp_path, policy="limit", on_halt="brake")
-    known = guard.stop_commands
-    stale(guard)
-    assert np.array_equal(list(iter(guard.next_braking, None)), known)
 
 
 def test_a_robot_that_stands_is_sent_nothing(tmp_path):

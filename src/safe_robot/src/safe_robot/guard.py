@@ -11,6 +11,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 
 from .braking import Brake, Braking, BrakingCommands
 from .check import Check, CheckContext, MarginViolation, Violation
+from .checks.staleness import Staleness
 from .commands.command_qp import can_keep_bounds
 from .commands.escape import EscapeDirection, find_escape
 from .commands.pursuit import ROUNDING
@@ -102,6 +103,7 @@ class Guard:
         if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit tracks targets less closely without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
+        self._is_late = False
         self._state: State | None = None
         self._is_first = True
         self._target: tuple[float, ...] | None = None
@@ -114,8 +116,8 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether it is halted, and `next_braking` has commands that bring the robot to rest."""
-        return self.is_halted and self.is_moving
+        """Whether it is halted or targets are late, and `next_braking` has commands that bring the robot to rest."""
+        return (self.is_halted or self._is_late) and self.is_moving
 
     @property
     def last_command(self) -> tuple[float, ...] | None:
@@ -141,13 +143,20 @@ class Guard:
         """
         if self.is_braking:
             raise RuntimeError("the robot still brakes: start when next_braking() returns None")
-        self.is_halted, self._is_first = False, True
+        self.is_halted, self._is_late, self._is_first = False, False, True
 
     def halt(self) -> None:
         """Lets no target pass any more; with `on_halt: brake` the robot is to be braked by `next_braking`."""
         self.is_halted = True
         if self.config.on_halt == "nothing":
             self.rest()
+
+    def wait_for_target(self) -> None:
+        """Targets are late: with `limit`, `next_braking` is to brake the robot until the next target; else it halts."""
+        if self.config.policy == "reject":
+            self.halt()
+        else:
+            self._is_late = True
 
     def rest(self) -> None:
         """Halts without braking: the robot is taken to stand where it was commanded to last."""
@@ -157,7 +166,7 @@ class Guard:
         self._stop = BrakingCommands.none(len(self.joint_names))
 
     def next_braking(self) -> tuple[float, ...] | None:
-        """Returns what to command next after a halt, a period after the last command; None if the robot rests."""
+        """Returns the next command of the braking, due a period after the last command; None if the robot rests."""
         return self._brake_on() if self.is_braking else None
 
     def decide(self, target: Sequence[float], context: CheckContext) -> Decision:
@@ -169,6 +178,7 @@ class Guard:
         """
         if self.is_halted:
             return Decision(None, None, True)
+        self._is_late = False
         try:
             decision = self._decide(tuple(target), context)
         except BaseException:
@@ -188,7 +198,7 @@ class Guard:
         return decision
 
     def check_watchdogs(self, context: CheckContext) -> Violation | None:
-        """Returns what is wrong while no target comes; if anything is, it halts."""
+        """Returns what is wrong between targets; if anything is, it halts, or for late targets waits for the next."""
         if self.is_halted or self._is_first or self._state is None:
             return None
         try:
@@ -197,13 +207,14 @@ class Guard:
             self.halt()
             raise
         if violation is not None:
-            self.halt()
+            self.wait_for_target() if violation.check == Staleness.name else self.halt()
         return violation
 
     def _watchdog_violation(self, context: CheckContext) -> Violation | None:
         assert self._state is not None
         motion = CommandedMotion(self.robot, self._state, self._state.position, self.config.period_s)
-        found = (each.check(motion, context) for each in self.checks if each.watches)
+        watches = [each for each in self.checks if each.watches and not (self._is_late and each.name == Staleness.name)]
+        found = (each.check(motion, context) for each in watches)
         return next(filter(None, found), None)
 
     def _decide(self, target: tuple[float, ...], context: CheckContext) -> Decision:

@@ -129,7 +129,8 @@ class GuardNode:
 
     def _end_wait(self, age_s: float) -> None:
         if not self._guard.is_halted:
-            self._halt(too_old(age_s, self._silence_s, "silence_s"))
+            self._guard.wait_for_target()
+            self._brake_for(too_old(age_s, self._silence_s, "silence_s"))
 
     def _lose_master(self) -> None:
         reason = f"the ROS master at {self._master.uri} has gone, and nobody could find stop_subscriber"
@@ -138,8 +139,11 @@ class GuardNode:
                 self._halt(violation_of("master", reason))
 
     def _halt(self, violation: Violation | None, header: Header | None = None) -> None:
-        """Halts, brakes if configured, and reports the reason; the queue's lock is held."""
         self._guard.halt()
+        self._brake_for(violation, header)
+
+    def _brake_for(self, violation: Violation | None, header: Header | None = None) -> None:
+        """Sends the commands of the braking, if the guard has any, and reports the reason; the queue's lock is held."""
         self._queue.run_instead(self._brake)
         if violation is not None:
             self._status.publish(header or Header(stamp=_now()), violation, self._measurements.obstacles)
@@ -235,7 +239,7 @@ class GuardNode:
             except Exception as error:
                 violation = violation_of("input", f"the context cannot be judged: {error!r}")
             if violation is not None:
-                self._halt(violation)
+                self._brake_for(violation)  # the guard has halted, or waits for the next target
 
     def _start(self, _: TriggerRequest) -> TriggerResponse:
         with self._queue.lock:
