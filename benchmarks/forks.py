@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,32 +20,15 @@ SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
 sys.path += (support := [str(SUPPORT / each) for each in ("worlds", "robots")])
 os.environ["PYTHONPATH"] = os.pathsep.join((os.environ.get("PYTHONPATH", ""), *support))  # of forks
 import sleeping_session as script  # noqa: E402
-import streaming_session  # noqa: E402
 
-from rpbi.geometry import Pose, Twist  # noqa: E402
 from rpbi.world import World  # noqa: E402
-from rpbi.world.loading import load_world  # noqa: E402
 
 SEEDS, QUICK_SEEDS = 200, 5
 FIRST_SEED = 5000
 """Seeds from here on were not used before."""
-FIRST_KEYFRAME_SEED = 9000
 RESETS = 1000
 SHORTEST, LONGEST, AHEAD = 100, 900, 500
 """Ticks before a state is saved, and after."""
-SINCE, ON = 200, 300
-"""Ticks with further commands between a keyframe and the state, and ticks with a candidate's inputs after it."""
-Inputs = Mapping[str, Callable[[np.random.Generator], Any]]
-"""What makes a value, by input that always takes one."""
-DRIVEN: Inputs = {
-    "mobile/cmd_vel": lambda random: Twist((*random.uniform(-1.0, 1.0, 2).tolist(), 0.0), (0.0, 0.0, 0.5)),
-    "follower/pose": lambda random: Pose(tuple(random.uniform((0.3, -0.3, 0.0), (0.6, 0.3, 0.3)).tolist())),
-}
-STREAMED: Inputs = {
-    "gripper/target": lambda random: {"left": float(random.uniform(0.01, 0.05))},
-    "seen/pose": lambda random: Pose((0.5, float(random.uniform(-0.62, -0.58)), 0.12)),
-    "eye/pose": lambda random: Pose((float(random.uniform(0.3, 0.7)), 0.0, 2.0), streaming_session.LOOKS_DOWN),
-}
 ASLEEP = 0.4
 """Smallest share of worlds in which a body sleeps when they are saved."""
 KUKA = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
@@ -59,12 +38,6 @@ CHOSEN, QUICK_CHOSEN = 100, 5
 LARGEST_S = 0.2
 PREPARED_S = 2.0
 """Time between the start of the process that forks, and the first prediction."""
-OLD_S, QUICK_OLD_S = 3600.0, 20.0
-"""Age of a world with a target at every tick [s]."""
-KEYFRAME_S = 5.0
-"""Period of its keyframes [s]."""
-MOST_S, MOST_PAUSE_S = 1.0, 0.05
-"""Largest time to restore, fork and predict; largest processor time of a part of a keyframe [s]."""
 SAVED_S = 10
 """Time with a target at every tick before a save [s]."""
 BESIDE_S, QUICK_BESIDE_S = 20.0, 5.0
@@ -83,10 +56,7 @@ def run(quick: bool) -> list[Result]:
         *_predictions(QUICK_CHOSEN if quick else CHOSEN),  # while this process is as large as a script is
         *_exact(seeds),
         *_saves(),
-        *_keyframes("sleeping", script.SleepingScript, script.build, DRIVEN, seeds),
-        *_keyframes("streaming", streaming_session.Script, streaming_session.build, STREAMED, seeds),
         *exact_resets(range(QUICK_SEEDS if quick else RESETS)),
-        *_old(QUICK_OLD_S if quick else OLD_S, 0.001),
         *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
     ]
 
@@ -202,110 +172,6 @@ def _saves() -> list[Result]:
     what = f"save after {SAVED_S} s, {world.commands.count} targets"
     world.close()
     return [Result("forks", f"{what}: time", taken_s, "s"), Result("forks", f"{what}: file", size / 1000, "kB")]
-
-
-def _keyframes(name: str, make: Any, build: Any, inputs: Inputs, seeds: int) -> list[Result]:
-    """Compares worlds that go on after a keyframe with the running one: by hashes, some by all samples too."""
-    same = dict.fromkeys(("from_state", "fork", "prediction", "restore"), 0)
-    for seed in range(FIRST_KEYFRAME_SEED, FIRST_KEYFRAME_SEED + seeds):
-        with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
-            world = build(Path(folder), seed)
-            for way, is_same in _after_keyframe(world, make(seed), inputs, seed).items():
-                same[way] += is_same
-                if not is_same:
-                    print(f"keyframes, {name} session {seed}: {way} differs", file=sys.stderr)
-            world.close()
-    what = f"{SINCE} ticks after keyframes of {name} sessions"
-    return [
-        Result("forks", f"{what}, {way}: equal, of {seeds}", count, "", None, Target(seeds, at_least=True))
-        for way, count in same.items()
-    ]
-
-
-def _after_keyframe(world: World, script: Any, inputs: Inputs, seed: int) -> dict[str, bool]:
-    """Makes a keyframe, goes on with further commands, and returns by way whether it goes on in the same way."""
-    random = np.random.default_rng(seed)
-    for tick in range(ticks := int(random.integers(SHORTEST, LONGEST)) + SINCE):
-        if tick == ticks - SINCE:
-            world.keyframe()
-        script.act(world)
-        world.step()
-    state = world.save()
-    candidate = [(tick, slot, make(random)) for tick in range(0, ON, 50) for slot, make in inputs.items()]
-    with _second_thread():  # so that forks are those of a program of its own, which starts at the keyframe
-        (prediction,) = world.predict([candidate], ON)
-        with world.fork()[0] as fork:
-            forked = _go_on(candidate, fork.put, fork.step), fork.state_hash()
-    samples, expected = _go_on(candidate, world.put, world.step), world.state_hash()
-    same = {"fork": forked == (samples, expected), "prediction": prediction.state_hash == expected}
-    other = World.from_state(state)
-    same["from_state"] = _go_on(candidate, other.put, other.step) == samples and other.state_hash() == expected
-    other.close()
-    world.restore(state)
-    _go_on(candidate, world.put, world.step)
-    same["restore"] = world.state_hash() == expected
-    return same
-
-
-def _go_on(candidate: list[Any], put: Any, step: Any) -> list[Any]:
-    """Steps with the inputs of a candidate, and returns all samples."""
-    samples = []
-    for tick in range(ON):
-        for planned, slot, value in candidate:
-            if planned == tick:
-                put(slot, value)
-        samples += step()
-    return samples
-
-
-@contextmanager
-def _second_thread() -> Iterator[None]:
-    over = threading.Event()
-    thread = threading.Thread(target=over.wait)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
-
-
-def _old(seconds: float, dt_s: float) -> list[Result]:
-    """Restores, forks and predicts a world of a certain age just before its next keyframe, and times keyframes."""
-    random = np.random.default_rng(FIRST_SEED)
-    gc.collect()
-    gc.freeze()  # as the node does: a collection of all objects of this process would be the longest part
-    world = World(load_world(KUKA, overrides={"timeStep": dt_s}))
-    ticks, period, pauses = round(seconds / dt_s), round(KEYFRAME_S / dt_s), []
-    for tick in range(ticks + period - 1):
-        world.put(TARGET, {"lwr_arm_0_joint": float(random.uniform(-0.5, 0.5))})
-        world.step()
-        if (tick + 1) % period == 0:
-            parts, longest_s, is_over = world.keyframe_in_parts(), 0.0, False
-            while not is_over:
-                begin_s = time.thread_time()
-                is_over = next(parts, parts) is parts
-                longest_s = max(longest_s, time.thread_time() - begin_s)
-            pauses.append(longest_s)
-    durations = {}
-    state = world.save()
-    for what, ask in (
-        ("restore", lambda: world.restore(state)),
-        ("World.from_state", lambda: World.from_state(state).close()),
-        ("fork", lambda: world.fork()[0].close()),
-        ("predict 200 ticks", lambda: world.predict([[]], TICKS)),
-    ):
-        begin_s = time.perf_counter()
-        ask()
-        durations[what] = time.perf_counter() - begin_s
-    world.close()
-    what = f"the KUKA at {1.0 / dt_s:g} Hz after {seconds:g} s"
-    aged = f"{what} of targets, {KEYFRAME_S:g} s after its last keyframe"
-    return [
-        Result("forks", f"{what}: longest part of a keyframe, median", float(np.median(pauses)), "s"),
-        Result("forks", f"{what}: longest part of {len(pauses)}", max(pauses), "s", None, Target(MOST_PAUSE_S)),
-        *(Result("forks", f"{aged}: {way}", taken_s, "s", None, Target(MOST_S)) for way, taken_s in durations.items()),
-    ]
 
 
 def _beside_a_node(seconds: float) -> list[Result]:

@@ -33,6 +33,7 @@ WHEN_NAMED = (
         "guard_faults",
         "gym",
         "haptics",
+        "keyframes",
         "lfd",
         "live_plot",
         "passivity",

@@ -17,8 +17,8 @@ def bench(
     """Runs the benchmarks, each beside its floor.
 
     Args:
-        NAME: by default all but controls, datasets, dressing, examples, farm, forks, guard_faults, gym, haptics, lfd,
-            live_plot, passivity, press, pushing, recording, soak, streams, teleop and verify
+        NAME: by default all but controls, datasets, dressing, examples, farm, forks, guard_faults, gym, haptics,
+            keyframes, lfd, live_plot, passivity, press, pushing, recording, soak, streams, teleop and verify
         quick: measures for a shorter time, less exactly
         json: file for the figures
     """
