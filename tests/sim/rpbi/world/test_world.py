@@ -2,6 +2,7 @@
 
 import math
 
+import pybullet
 import pytest
 from worlds import FLOOR, ball, box, iiwa, write_world
 
@@ -184,6 +185,17 @@ def test_a_taken_name_is_refused(build):
     with pytest.raises(ConfigError, match="'ball' is taken"):
         world.add("dynamic", _config("dynamic", ball()))
     assert list(world.bodies) == ["ball"]
+
+
+def test_close_ends_all_clients_of_robots(tmp_path):
+    def clients():
+        return [number for number in range(100) if pybullet.isConnected(number)]
+
+    before = clients()
+    world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
+    world.bodies["iiwa"].robot_model.mass_matrix([0.0] * 7)
+    world.close()
+    assert clients() == before
 
 
 def test_a_window_without_a_screen_is_refused_and_ends_nothing(build, monkeypatch):

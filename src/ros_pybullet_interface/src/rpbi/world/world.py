@@ -819,7 +819,7 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Disconnects from PyBullet and fails the requests that wait."""
+        """Disconnects from PyBullet, closes all bodies and fails the requests that wait."""
         self.mailbox.close()
         self._end_shadow()
         try:
@@ -827,6 +827,9 @@ class World:
             self.pb.disconnect()
         except pybullet.error:
             log.debug("PyBullet had disconnected before")
+        finally:
+            for body in self.bodies.values():
+                body.close()
 
     def _set_up_window(self) -> None:
         for arguments in self.config.configureDebugVisualizer.calls():
