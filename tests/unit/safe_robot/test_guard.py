@@ -192,7 +192,7 @@ class TestLimitPolicy:
     def test_late_targets_brake_it_until_the_next(self, tmp_path):
         """A busy computer delays targets: the robot rests meanwhile, and follows the next one without a call."""
         robot = slider(tmp_path)
-        guard = guard_of(robot, policy="limit")
+        guard = guard_of(robot, policy="limit", on_halt="brake")
         commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:50]]
         known, late = guard.stop_commands, CheckContext(since_command_s=0.11)
         assert guard.check_watchdogs(late).check == "staleness" and guard.is_braking and not guard.is_halted
@@ -205,7 +205,7 @@ class TestLimitPolicy:
 
     def test_a_target_during_the_braking_for_late_ones_ends_it(self, tmp_path):
         robot = slider(tmp_path)
-        guard = guard_of(robot, policy="limit")
+        guard = guard_of(robot, policy="limit", on_halt="brake")
         commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:50]]
         guard.wait_for_target()
         commands += [guard.next_braking(), guard.next_braking(), decide(guard, (0.5, 0.5)).command]
@@ -215,7 +215,7 @@ class TestLimitPolicy:
 
     def test_a_broken_check_halts_it_while_targets_are_late(self, tmp_path):
         robot = slider(tmp_path)
-        guard = guard_of(robot, policy="limit")
+        guard = guard_of(robot, policy="limit", on_halt="brake")
         for target in list(smooth(robot, 1.0))[:50]:
             decide(guard, target)
         guard.wait_for_target()
@@ -223,6 +223,17 @@ class TestLimitPolicy:
         with pytest.raises(ZeroDivisionError):
             guard.check_watchdogs(CheckContext())
         assert guard.is_halted
+
+    def test_after_late_targets_without_braking_it_begins_at_rest(self, tmp_path):
+        robot = slider(tmp_path)
+        guard = guard_of(robot, policy="limit")
+        commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:50]]
+        assert guard.check_watchdogs(CheckContext(since_command_s=0.11)).check == "staleness"
+        assert not guard.is_halted and not guard.is_moving and guard.next_braking() is None
+        stands = [commands[-1]] * 3
+        commands = [decide(guard, (0.5, 0.5)).command for _ in range(300)]
+        assert max(worst_shares([*stands, *commands], LIMITS, PERIOD_S).values()) <= 1.0 + ROUNDING
+        assert commands[-1] == pytest.approx((0.5, 0.5), abs=1e-3)
 
     def test_away_from_what_is_near_it_may_be_fast(self, tmp_path):
         """Out of the margin of a self-collision, the speed is that of anywhere."""

@@ -26,7 +26,7 @@ class MissingJointsError(InterfaceError):
 
 @dataclass(frozen=True)
 class JointValues:
-    """Values of joints that belong together; made by `of`, which checks them.
+    """Checked values of joints, which are measured, remapped or guarded; made by `of`.
 
     Attributes:
         names: n joint names; empty if the sender names none.

@@ -149,18 +149,23 @@ class Guard:
         """Lets no target pass any more; with `on_halt: brake` the robot is to be braked by `next_braking`."""
         self.is_halted = True
         if self.config.on_halt == "nothing":
-            self.rest()
+            self._take_as_at_rest()
 
     def wait_for_target(self) -> None:
-        """Targets are late: with `limit`, `next_braking` is to brake the robot until the next target; else it halts."""
+        """Ends the motion because targets are late, as after a halt; with `limit`, the next target is followed."""
         if self.config.policy == "reject":
             self.halt()
-        else:
-            self._is_late = True
+            return
+        self._is_late = True
+        if self.config.on_halt == "nothing":
+            self._take_as_at_rest()
 
     def rest(self) -> None:
         """Halts without braking: the robot is taken to stand where it was commanded to last."""
         self.is_halted = True
+        self._take_as_at_rest()
+
+    def _take_as_at_rest(self) -> None:
         if self._state is not None:
             self._state = State.at_rest(self._state.position)
         self._stop = BrakingCommands.none(len(self.joint_names))
@@ -180,7 +185,7 @@ class Guard:
             return Decision(None, None, True)
         self._is_late = False
         try:
-            decision = self._decide(tuple(target), context)
+            decision = self._decision_for(tuple(target), context)
         except BaseException:
             self.halt()  # fails closed: who cannot judge does not let pass
             raise
@@ -192,7 +197,7 @@ class Guard:
         """Returns what to command in place of a target that cannot even be judged, and why it cannot."""
         if self.is_halted:
             return Decision(None, None, True)
-        decision = self._refused(Violation("input", reason, math.nan, math.nan, ""))
+        decision = self._brake_or_halt(Violation("input", reason, math.nan, math.nan, ""))
         if decision.is_halted:
             self.halt()
         return decision
@@ -217,16 +222,16 @@ class Guard:
         found = (each.check(motion, context) for each in watches)
         return next(filter(None, found), None)
 
-    def _decide(self, target: tuple[float, ...], context: CheckContext) -> Decision:
+    def _decision_for(self, target: tuple[float, ...], context: CheckContext) -> Decision:
         if violation := self._input_problem(target):
-            return self._refused(violation)
+            return self._brake_or_halt(violation)
         is_first = self._is_first
         if is_first and (violation := self._start_at(target, context)):
             return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
         assert self._state is not None
         if context.stamp_step_s == 0.0 and not is_first:
             repeated = self._watchdog_violation(context)
-            return Decision(None) if repeated is None else self._refused(repeated)
+            return Decision(None) if repeated is None else self._brake_or_halt(repeated)
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
             wanted = (
@@ -264,7 +269,7 @@ class Guard:
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
 
-    def _refused(self, violation: Violation) -> Decision:
+    def _brake_or_halt(self, violation: Violation) -> Decision:
         if self.config.policy == "reject" or self._is_first:
             return Decision(None, violation, True)
         return Decision(self._brake_on(), violation)
@@ -338,7 +343,7 @@ class Guard:
         """Returns the nearest safe command that is found, or the next one of the braking that is known to be safe."""
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
-            return self._refused(violation)
+            return self._brake_or_halt(violation)
         safe = self._nearest.find(
             np.array(target),
             self._state,

@@ -17,6 +17,8 @@ class WrongQuantityError(ValueError):
 class JointCommand(NamedTuple):
     """Values for some of a robot's joints; the others keep theirs.
 
+    An input of the world, which the robot checks against its own joints; `JointValues` are checked by themselves.
+
     Attributes:
         names: n joint names.
         position: n positions [rad or m], or none.

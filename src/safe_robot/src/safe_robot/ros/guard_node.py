@@ -77,7 +77,9 @@ class GuardNode:
         # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
         can_skip = self._guard.config.policy == "limit" or self._guard.config.shape
         size = 1 if can_skip else QUEUE_SIZE
-        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._process, self._end_wait)
+        self._queue = TargetQueue(
+            self._guard.config.period_s, self._silence_s, size, self._handle_target, self._end_wait
+        )
         GuardMarkers(self._guard, self._queue.lock, config.base_frame or self._guard.robot.document.root_link())
         self._master = MasterConnection(self._lose_master)
         if self._guard.config.start_from == "measured":
@@ -98,34 +100,37 @@ class GuardNode:
             message = JointState(message.header, [name for name, _ in guarded], [q for _, q in guarded], [], [])
         self._queue.put(message, (_now() - stamp).to_sec() if stamp else 0.0)
 
-    def _process(self, message: JointState) -> bool:
-        """Decides on a target; returns whether a command was sent. A node that shuts down drops it."""
-        try:
-            return self._answer(message)
-        except rospy.ROSException:
-            if not rospy.core.is_shutdown_requested():  # from then on topics are closed
-                raise
-            return False
+    def _handle_target(self, message: JointState) -> bool:
+        """Sends a command for a target, reports the decision and returns whether a command was sent.
 
-    def _answer(self, message: JointState) -> bool:
+        A node that shuts down, whose topics have closed, drops the target.
+        """
         if self._guard.is_halted:
-            if not rospy.core.is_shutdown_requested():  # otherwise it is because its topic has closed
+            if not rospy.core.is_shutdown_requested():
                 self._status.warn_of_halt()
             return False
         try:
-            decision = self._decide(message)
+            decision = self._decide_on(message)
             if decision.command is not None:
                 self._send(message, decision)
         except Exception as error:
             if rospy.core.is_shutdown_requested():
                 return False
-            decision = Decision(None, violation_of("input", f"it cannot be judged: {error!r}"), True)
+            decision = Decision(None, violation_of("input", f"the check raised an error: {error!r}"), True)
+        try:
+            self._report(message.header, decision)
+        except rospy.ROSException:
+            if not rospy.core.is_shutdown_requested():
+                raise
+            return False
+        return decision.command is not None
+
+    def _report(self, header: Header, decision: Decision) -> None:
         if decision.is_halted:
-            self._halt(decision.violation, message.header)
+            self._halt(decision.violation, header)
         else:
             note = REPEATED if decision.command is None and decision.violation is None else ""
-            self._status.publish(message.header, decision.violation, self._measurements.obstacles, note)
-        return decision.command is not None
+            self._status.publish(header, decision.violation, self._measurements.obstacles, note)
 
     def _end_wait(self, age_s: float) -> None:
         if not self._guard.is_halted:
@@ -156,13 +161,13 @@ class GuardNode:
         try:
             self._publish(self._message(Header(stamp=_now()), command))
         except Exception as error:
-            rospy.logerr("the braking ends: %r", error)
+            rospy.logerr("braking aborted: %r", error)
             return False
         return True
 
-    def _decide(self, message: JointState) -> Decision:
+    def _decide_on(self, message: JointState) -> Decision:
         try:
-            values = self._checked(message)
+            values = self._guarded_values(message)
         except (InterfaceError, ValueError) as error:
             return self._guard.refuse(str(error))
         stamp, last = message.header.stamp, self._last_stamp
@@ -183,12 +188,12 @@ class GuardNode:
                 return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
         return self._guard.decide(values.position, self._measurements.context(since_s, age_s, step_s))
 
-    def _checked(self, message: JointState) -> JointValues:
-        """Returns the positions of the guarded joints, in order.
+    def _guarded_values(self, message: JointState) -> JointValues:
+        """Returns the values of the guarded joints, in order.
 
         Raises:
             MissingJointsError: If some are missing.
-            ValueError: If there is something that the guard cannot answer for.
+            ValueError: If the message has something that the guard cannot check.
         """
         values, names = values_in(message), self._guard.joint_names
         ordered = values.in_order(names)
@@ -237,7 +242,7 @@ class GuardNode:
                 last_s = max(self._sent_s, self._repeated_s)  # repeated targets are judged when they come
                 violation = self._guard.check_watchdogs(self._measurements.context(last_s))
             except Exception as error:
-                violation = violation_of("input", f"the context cannot be judged: {error!r}")
+                violation = violation_of("input", f"a check raised an error: {error!r}")
             if violation is not None:
                 self._brake_for(violation)  # the guard has halted, or waits for the next target
 

@@ -76,8 +76,8 @@ class GuardStatus:
             then = "braking to rest, and halted" if self._guard.is_braking else "halted"
             rospy.logwarn("%s: %s; %s until robot_safety/start_subscriber is called", self._subject, message, then)
         else:
-            then = "; braking until the next target" if self._guard.is_braking else ""
-            self._warn(f"{self._subject}: {violation.check}", f"{message.removeprefix(f'{violation.check}: ')}{then}")
+            check = f"{violation.check}: "
+            self._warn(f"{self._subject}: {violation.check}", message.removeprefix(check))
 
     def _status_message(self, header: Header, text: str, violation: Violation | None) -> Status | DiagnosticStatus:
         if not self._as_diagnostic:
