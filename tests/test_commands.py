@@ -58,10 +58,10 @@ def test_the_list_has_a_line_for_each_command(bare):
 
 @pytest.mark.quick
 def test_the_page_names_all_extras_and_all_benchmarks_that_run_only_when_named():
-    extras = {path.stem.removeprefix("requirements-") for path in ROOT.glob("requirements-*.txt")}
+    extras = {path.stem for path in ROOT.glob("requirements/extras/*.txt")}
     assert words_of("setup", "EXTRA") >= extras
     (named,) = re.findall(
-        r"^WHEN_NAMED = \((.*?)^\)", (ROOT / "benchmarks/run.py").read_text(), re.MULTILINE | re.DOTALL
+        r"^WHEN_NAMED = \((.*?)^\)", (ROOT / "dev/benchmarks/run.py").read_text(), re.MULTILINE | re.DOTALL
     )
     assert words_of("bench", "NAME") >= set(re.findall(r"\w+", named))
 
@@ -90,9 +90,9 @@ def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
 def test_the_first_set_up_without_a_network_says_what_it_waits_for_and_gives_up(tmp_path):
     """The only server of packages takes connections and never answers, as behind many a firewall."""
     checkout = tmp_path / "checkout"
-    checkout.mkdir()
+    (checkout / "requirements").mkdir(parents=True)
     shutil.copy(ROOT / "rpbi", checkout)
-    (checkout / "apt-packages.txt").write_text("package-that-nobody-has\n")
+    (checkout / "requirements/apt-packages.txt").write_text("package-that-nobody-has\n")
     for folder in ("lists/partial", "cache/archives/partial"):
         (tmp_path / folder).mkdir(parents=True)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -146,7 +146,7 @@ PROGRAMS: dict[str, list[str]] = {
     "demo": [find_executable("rpbi_examples", "demo.py")],
     "check": [find_executable("ros_pybullet_interface", "check_world.py")],
     "replay": [find_executable("rpbi_utils", "replay")],
-    "bench": [sys.executable, str(ROOT / "benchmarks")],
+    "bench": [sys.executable, str(ROOT / "dev/benchmarks")],
     **{
         name: [find_executable("rpbi_utils", "world"), name]
         for name in ("list", "spawn", "remove", "move", "send", "attach", "detach", "gravity")

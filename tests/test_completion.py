@@ -12,7 +12,7 @@ import pytest
 from terminal import PROMPT, Terminal
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(ROOT / "dev"))
 
 from robustness.completion import UNGUARDED, make_launch, trial  # noqa: E402
 

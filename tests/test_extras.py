@@ -12,7 +12,7 @@ import pytest
 from ros_system import support_on_path
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = sorted(ROOT.glob("requirements*.txt"))
+FILES = [ROOT / "requirements/base.txt", *sorted(ROOT.glob("requirements/extras/*.txt"))]
 
 
 def pins(file: Path) -> dict[str, str]:
@@ -80,5 +80,5 @@ def test_what_is_installed_is_known_with_and_without_extras(tmp_path, wanted):
     command = f"set -o pipefail; root={ROOT}; state={tmp_path}\n{functions}\nvenv_inputs"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=300.0)
     assert done.returncode == 0, done.stderr
-    files = [ROOT / "requirements.txt", *(ROOT / f"requirements-{extra}.txt" for extra in wanted)]
+    files = [ROOT / "requirements/base.txt", *(ROOT / f"requirements/extras/{extra}.txt" for extra in wanted)]
     assert done.stdout == "".join(file.read_text() for file in files)

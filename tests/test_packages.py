@@ -15,7 +15,7 @@ import rospkg
 from clean_shell import in_clean_shell
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = sorted(path.parent for folder in ("src", "templates") for path in ROOT.glob(f"{folder}/**/package.xml"))
+PACKAGES = sorted(path.parent for folder in ("src", "docs/templates") for path in ROOT.glob(f"{folder}/**/package.xml"))
 OF_ROS = re.compile(r"ros(?!pkg)[a-z_]*|tf2?(_\w+)?|gen(py|msg)|actionlib|interactive_markers|\w+_(msgs|srvs)")
 """Python modules of ROS packages, which Debian ships without package.xml in part."""
 NOT_IN_DEBIAN = {

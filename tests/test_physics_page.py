@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "dev/benchmarks"))
 
 import physics  # noqa: E402
 from physics.scene import Span, Table  # noqa: E402

@@ -220,9 +220,9 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for package in PACKAGES:
         others = shutil.ignore_patterns("__pycache__")  # whose files come and go while other tests run
         shutil.copytree(ROOT / "src" / package / "src", folder / "src" / package / "src", ignore=others)
-    for name in ("tools", "docs"):
-        (folder / name).mkdir()
-    for name in ("rpbi", "tools/completion.bash"):
+    for name in ("dev/tools", "docs"):
+        (folder / name).mkdir(parents=True)
+    for name in ("rpbi", "dev/tools/completion.bash"):
         shutil.copy(ROOT / name, folder / name)
     for files in FILES.values():
         for name, text in files.items():
@@ -331,7 +331,7 @@ def test_command_is_completed(workspace: Path) -> None:
 
 def completed(workspace: Path, *words: str, word: str = "") -> set[str]:
     """Returns the words that bash offers after others."""
-    script = 'source tools/completion.bash; _rpbi_words "$PWD" "$@"'
+    script = 'source dev/tools/completion.bash; _rpbi_words "$PWD" "$@"'
     done = run(workspace, "bash", "-c", script, "bash", word, "rpbi", *words)
     return set(done.stdout.split())
 

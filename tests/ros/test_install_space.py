@@ -51,7 +51,7 @@ def installed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed_lab(tmp_path_factory, installed):
-    return _install(tmp_path_factory.mktemp("lab"), ROOT / "templates", onto=installed)
+    return _install(tmp_path_factory.mktemp("lab"), ROOT / "docs/templates", onto=installed)
 
 
 def _do(installed: Path, line: str) -> str:

@@ -1,4 +1,4 @@
-"""Hostile data sets of each format through `check_dataset`; `robustness/datasets.py` checks 500 of each."""
+"""Hostile data sets of each format through `check_dataset`; `dev/robustness/datasets.py` checks 500 of each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from ros_system import support_on_path
 
-ROBUSTNESS = Path(__file__).resolve().parents[3] / "robustness"
+ROBUSTNESS = Path(__file__).resolve().parents[3] / "dev/robustness"
 
 
 def test_hostile_datasets_are_checked_in_words(tmp_path: Path) -> None:

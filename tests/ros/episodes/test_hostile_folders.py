@@ -1,4 +1,4 @@
-"""Hostile folders of episodes, one of each kind, through their readers; `robustness/episode_folders.py` has more."""
+"""Hostile folders of episodes, one of each kind, through their readers; see `dev/robustness/episode_folders.py`."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _run(*command: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_hostile_folders_are_taken_or_refused_in_words(tmp_path: Path) -> None:
-    program = str(ROOT / "robustness/episode_folders.py")
+    program = str(ROOT / "dev/robustness/episode_folders.py")
     done = _run(program, "--first", "20", "--count", "20", "--readers", *READERS, folder=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     rows = [line.strip("| ").split(" | ") for line in done.stdout.splitlines() if line.startswith("| ")][1:]

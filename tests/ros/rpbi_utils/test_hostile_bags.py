@@ -1,6 +1,6 @@
 """Hostile topics, indices, chunks, bytes and sessions, through each reader and replay.
 
-`robustness/bags.py` reads a thousand, of all kinds; definitions, names and columns are in unit tests.
+`dev/robustness/bags.py` reads a thousand, of all kinds; definitions, names and columns are in unit tests.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ros_system import support_on_path
 
-ROBUSTNESS = Path(__file__).resolve().parents[3] / "robustness"
+ROBUSTNESS = Path(__file__).resolve().parents[3] / "dev/robustness"
 FIRST_SEED = 5016
 
 

@@ -18,7 +18,7 @@ import pytest
 
 from safe_robot.ros.target_queue import TargetQueue
 
-PROGRAM = Path(__file__).resolve().parents[3] / "benchmarks/programs/guard_faults.py"
+PROGRAM = Path(__file__).resolve().parents[3] / "dev/benchmarks/programs/guard_faults.py"
 SOON_S = 0.15
 """Shorter than the time that the program looks on after a fault; a busy machine takes more than the guard's 20 ms."""
 SEED = 53

@@ -17,7 +17,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 ROBOTS = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "robots"
 MESHES = ROBOTS / "kuka_lwr"
-TOOLS = ROBOTS.parents[2] / "tools/kuka_lwr"
+TOOLS = ROBOTS.parents[2] / "dev/tools/kuka_lwr"
 URDF = ElementTree.parse(ROBOTS / "kuka_lwr.urdf")
 HOME_DEG = (0, 30, 0, -90, 0, 60, 0)
 ARM_LINKS = [f"lwr_arm_{i}_link" for i in range(8)]

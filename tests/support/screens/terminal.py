@@ -36,7 +36,7 @@ class Terminal:
         )  # fmt: skip
         os.close(them)
         self.read_until(PROMPT)
-        self.send(f"source {ROOT}/tools/completion.bash; ln -sf {ROOT}/rpbi rpbi\n")
+        self.send(f"source {ROOT}/dev/tools/completion.bash; ln -sf {ROOT}/rpbi rpbi\n")
         self.read_until(f"\n{PROMPT}")
 
     def send(self, text: str) -> None:

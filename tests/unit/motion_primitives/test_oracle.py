@@ -1,4 +1,4 @@
-"""The primitives against another library, by numbers that tools/primitives/oracle.py has written."""
+"""The primitives against another library, by numbers that dev/tools/primitives/oracle.py has written."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "dev/benchmarks"))
 
 from passivity import MAX_ACCELERATION, MAX_FORCE_N, SetUp, leak_j, run_set_up, set_up
 

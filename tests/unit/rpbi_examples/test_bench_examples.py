@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "dev/benchmarks"))
 
 from examples import EXAMPLES, LEFT_OUT, asked_rates, rate_results
 

@@ -1,4 +1,4 @@
-"""A sample of the hostile targets of `robustness/guard_fuzz.py`; and its oracle finds what a bad guard lets through."""
+"""A sample of the hostile targets of `dev/robustness/guard_fuzz.py`; its oracle finds faults of a bad guard."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from safe_robot.checks.proximity import Proximity
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("daqp")
-sys.path.append(str(Path(__file__).resolve().parents[3] / "robustness"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "dev/robustness"))
 from fuzz.climbing import TOLERANCE_M, Climber  # noqa: E402
 from fuzz.grid import Grid  # noqa: E402
 from fuzz.hostile import fuzz  # noqa: E402

@@ -209,7 +209,7 @@ def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node):
 
 @pytest.mark.parametrize("kind", ["urdf", "mesh", "yaml"])
 def test_check_and_node_agree_on_hostile_files(ros, node, tmp_path, kind):
-    program = str(ROOT / "robustness/hostile_files/verdicts.py")
+    program = str(ROOT / "dev/robustness/hostile_files/verdicts.py")
     command = [sys.executable, program, "node", str(tmp_path), "2000", str(FILES_EACH), kind]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **support_on_path()}, check=True)
     verdicts = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]

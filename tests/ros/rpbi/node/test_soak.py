@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-BENCHMARKS = Path(__file__).resolve().parents[4] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[4] / "dev/benchmarks"
 RUN = """
 import json, soak
 soak.CAMERA["intrinsics"].update(width=320, height=240)

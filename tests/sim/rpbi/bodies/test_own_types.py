@@ -16,7 +16,7 @@ from rpbi.world.loading import load_object
 from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.values import from_text, to_text
 
-TEMPLATES = Path(__file__).resolve().parents[4] / "templates"
+TEMPLATES = Path(__file__).resolve().parents[4] / "docs/templates"
 CONVEYOR, RANGE_FINDER = "my_robot_lab.conveyor:Conveyor", "my_robot_lab.range_finder:RangeFinder"
 BELT = {"name": "belt", "type": CONVEYOR, "size": [4.0, 0.5, 0.1], "position": [0.0, 0.0, 0.3], "speed": 0.2}
 EYE = {"name": "eye", "type": RANGE_FINDER, "hz": 100.0, "max_range": 2.0}

@@ -1,6 +1,6 @@
 """Broken and hostile files: whoever reads them takes them or says what is wrong, and does nothing else.
 
-`robustness/hostile_files/try_files.py` reads a thousand; here is a share of each kind.
+`dev/robustness/hostile_files/try_files.py` reads a thousand; here is a share of each kind.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rpbi.world.loading import load_world
 from safe_robot.robot import GuardedRobot
 
 ROOT = Path(__file__).resolve().parents[4]
-sys.path.append(str(ROOT))
+sys.path.append(str(ROOT / "dev"))
 
 from robustness.hostile_files.files import KINDS  # noqa: E402
 
@@ -37,7 +37,7 @@ FIRST_SEED, EACH = 1000, 8
 
 
 def _verdicts(folder, *kinds):
-    program = str(ROOT / "robustness/hostile_files/verdicts.py")
+    program = str(ROOT / "dev/robustness/hostile_files/verdicts.py")
     command = [sys.executable, program, "alone", str(folder), str(FIRST_SEED), str(EACH), *kinds]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **support_on_path()}, check=True)
     return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]

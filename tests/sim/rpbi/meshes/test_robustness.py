@@ -1,4 +1,4 @@
-"""A sample of the hostile files that `robustness/try_files.py` makes, and that it sees what goes wrong."""
+"""A sample of the hostile files that `dev/robustness/try_files.py` makes, and that it sees what goes wrong."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import pytest
 from custom_ros_tools.errors import InterfaceError
 
 ROOT = Path(__file__).resolve().parents[4]
-sys.path.append(str(ROOT))
+sys.path.append(str(ROOT / "dev"))
 
 from robustness import trials  # noqa: E402
 
 
 @pytest.mark.quick
 def test_every_reader_takes_or_refuses_a_sample_of_hostile_files():
-    command = [sys.executable, str(ROOT / "robustness/try_files.py"), "--share", "0.01", "--first", "5000"]
+    command = [sys.executable, str(ROOT / "dev/robustness/try_files.py"), "--share", "0.01", "--first", "5000"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-3000:]
     rows = {line.split()[1]: line.split("|")[2:6] for line in done.stdout.splitlines() if line.startswith("| ")}

@@ -1,4 +1,4 @@
-"""A sample of the hostile `.world` files that `robustness/states.py` makes, and that it notices what goes wrong."""
+"""A sample of the hostile `.world` files that `dev/robustness/states.py` makes, and that it notices what goes wrong."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from worlds import FLOOR, box, write_world
 
 ROOT = Path(__file__).resolve().parents[4]
-sys.path.append(str(ROOT))
+sys.path.append(str(ROOT / "dev"))
 
 from robustness import states  # noqa: E402
 from robustness.hostile_bags.trial import tried  # noqa: E402
@@ -18,7 +18,7 @@ from rpbi.world.saved.command_log import RecordedCommand  # noqa: E402
 
 
 def test_every_reader_takes_or_refuses_a_sample_of_hostile_states():
-    command = [sys.executable, str(ROOT / "robustness/states.py"), "--count", "12", "--first", "5000"]
+    command = [sys.executable, str(ROOT / "dev/robustness/states.py"), "--count", "12", "--first", "5000"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-3000:]
     rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith("| ")][1:]

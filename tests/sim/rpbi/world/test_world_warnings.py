@@ -186,7 +186,7 @@ def test_shipped_worlds_have_no_warnings_but_of_frames_of_other_nodes(path):
 
 
 def test_no_page_and_no_template_shows_a_plane_to_copy():
-    texts = {path: path.read_text() for path in ROOT.glob("templates/**/*.yaml")}
+    texts = {path: path.read_text() for path in ROOT.glob("docs/templates/**/*.yaml")}
     texts |= {
         path: "".join(re.findall("```yaml.*?```", path.read_text(), re.DOTALL)) for path in ROOT.glob("docs/*.md")
     }

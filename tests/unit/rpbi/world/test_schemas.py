@@ -137,7 +137,7 @@ def test_shipped_files_name_the_schema_of_the_list_that_names_them() -> None:
 
 
 def test_files_of_the_template_hold_the_schemas() -> None:
-    root = SRC.parent / "templates"
+    root = SRC.parent / "docs/templates"
     main = yaml.safe_load((root / "my_robot_lab/configs/lab.yaml").read_text())
     assert problems("world", main) == []
     files = [(section, file) for section in sections() for file in main.get(section, ())]

@@ -18,7 +18,7 @@ class Argument(NamedTuple):
         flag: Name of an option, by default `--` and the name of the parameter.
         parse: Returns the value of a word; it raises ValueError for a wrong one.
         choices: Returns the valid words.
-        offers: Name of a function in `tools/completion.bash` that prints words to complete.
+        offers: Name of a function in `dev/tools/completion.bash` that prints words to complete.
         files: Pattern of the files that completion offers; empty for none.
         excludes: Name of a group of options of which at most one may be given.
         is_raw: Whether the function parses all words itself, options included.

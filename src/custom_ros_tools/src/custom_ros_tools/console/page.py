@@ -28,7 +28,7 @@ _TAIL = f"""\
 In `~/.bashrc`, with the path of your checkout:
 
 ```
-source ~/rpbi/tools/completion.bash
+source ~/rpbi/dev/tools/completion.bash
 ```
 
 `{PROGRAM} shell` has it already. It works for every checkout, called as `{PROGRAM}`, `rpbi` or by its path.
@@ -50,4 +50,4 @@ def console_files(root: Path) -> dict[Path, str]:
     order = {name: place for place, name in enumerate(FIRST)}
     listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
     lines = [line for each in listed for line in each.completions()]
-    return {root / "docs/commands.md": page(listed), root / "tools/completion.txt": "\n".join(lines) + "\n"}
+    return {root / "docs/commands.md": page(listed), root / "dev/tools/completion.txt": "\n".join(lines) + "\n"}

@@ -22,7 +22,7 @@ def bench(
         quick: measures for a shorter time, less exactly
         json: file for the figures
     """
-    sys.path.insert(0, str(workspace() / "benchmarks"))
+    sys.path.insert(0, str(workspace() / "dev/benchmarks"))
     benchmarks = importlib.import_module("run")
     known = benchmarks.BENCHMARKS + benchmarks.WHEN_NAMED
     for name in names:

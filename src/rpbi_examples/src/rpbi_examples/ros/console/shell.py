@@ -14,6 +14,6 @@ def shell(*words: Annotated[str, Argument("[-c COMMAND]", is_raw=True)]) -> None
     Usage:
         ./rpbi shell [-c COMMAND]
     """
-    arguments = words if words[:1] == ("-c",) else ("--rcfile", str(workspace() / "tools/shell.bash"))
+    arguments = words if words[:1] == ("-c",) else ("--rcfile", str(workspace() / "dev/tools/shell.bash"))
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # which Python ignores, and its successor would
     os.execvp("bash", ["bash", *arguments])
