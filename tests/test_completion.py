@@ -40,6 +40,7 @@ def terminal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminal]:
         ("./rpbi launch grasp_example gui:=true headl\ttrue", "./rpbi launch grasp_example gui:=true headless:=true"),
         ("./rpbi launch mi\tsp\t2", "./rpbi launch mine.launch speed:=2"),
         ("./rpbi docs --h\t", "./rpbi docs --help"),
+        ("./rpbi test --a\t", "./rpbi test --all"),
         ("./rpbi demo --head\t", "./rpbi demo --headless"),
         ("./rpbi demo --headless --sec\t", "./rpbi demo --headless --seconds"),
         ("./rpbi check my\tl\t", "./rpbi check my worlds/lab.yaml"),

@@ -46,6 +46,7 @@ def test_an_unknown_extra_is_refused_with_the_known_ones():
     [
         ("", False),
         ("--quick", False),
+        ("--all", False),
         ("-k grasp", False),
         ("tests/unit", True),
         ("-x tests/test_lint.py::test_x", True),

@@ -79,6 +79,8 @@ class SecondTry:
         """Runs one test in a process of its own, and returns its output and exit code."""
         where = ["-c", str(self._config.inipath), "--rootdir", str(self._config.rootpath)]
         alone = ["-n0", "--strict", "-rP", "-p", "no:run_report", name]
+        if self._config.getoption("all", False):
+            alone.append("--all")  # else a thorough test would be left out
         command = [sys.executable, "-m", "pytest", *where, *alone]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
         return subprocess.run(command, cwd=self._config.rootpath, text=True, errors="replace", **pipes)

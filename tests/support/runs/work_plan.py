@@ -79,8 +79,9 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, None, None]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Knows `--quick` and `--skip-missing-extras`."""
+    """Knows `--quick`, `--all` and `--skip-missing-extras`."""
     parser.addoption("--quick", action="store_true", help="most of unit and sim, one test of each ROS path")
+    parser.addoption("--all", action="store_true", help="also tests with the mark `thorough`")
     text = "skip tests that need an extra that is not installed"
     parser.addoption("--skip-missing-extras", action="store_true", help=text)
 
@@ -124,16 +125,22 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leaves out what is not asked for and brings the folders into their order; within, everything stays as it is."""
-    if config.getoption("quick"):
-        slow = [item for item in items if not _is_quick(item)]
-        config.hook.pytest_deselected(items=slow)
-        items[:] = [item for item in items if _is_quick(item)]
+    chosen = [item for item in items if _is_chosen(item)]
+    config.hook.pytest_deselected(items=[item for item in items if not _is_chosen(item)])
+    items[:] = chosen
 
     def rank(item: pytest.Item) -> int:
         matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
         return next(matches, len(FIRST))
 
     items.sort(key=rank)
+
+
+def _is_chosen(item: pytest.Item) -> bool:
+    option = item.config.getoption
+    if item.get_closest_marker("thorough") and not option("all"):
+        return False
+    return _is_quick(item) or not option("quick")
 
 
 def _is_quick(item: pytest.Item) -> bool:

@@ -12,10 +12,16 @@ from custom_ros_tools.console.modules import workspace
 PARALLEL = ("-n", "auto", "--max-worker-restart=0")
 
 
-def test(*words: Annotated[str, Argument("[--quick] [PATH | OPTION OF PYTEST ...]", files="*", is_raw=True)]) -> int:
-    """Runs all tests, or those chosen as for pytest, in parallel workers.
+WORDS = Argument("[--quick | --all] [PATH | OPTION OF PYTEST ...]", files="*", is_raw=True)
 
-    All tests together install all extras first, 1.8 GB; chosen ones install nothing but what every command needs, and
+
+def test(*words: Annotated[str, WORDS]) -> int:
+    """Runs the tests, or those chosen as for pytest, in parallel workers.
+
+    Without options these are the tests of what a change can break. Tests with the mark `thorough` run only with
+    --all, also when their file or their own name is given as PATH.
+
+    A run without PATH installs all extras first, 1.8 GB. Chosen tests install nothing but what every command needs, and
     those that miss an extra are skipped with its name.
 
     A run ends with the time of each folder, of the slowest files and of the slowest tests.
@@ -26,6 +32,7 @@ def test(*words: Annotated[str, Argument("[--quick] [PATH | OPTION OF PYTEST ...
 
     Args:
         --quick: most that need no ROS, and one test of each ROS path
+        --all: also examples and scenes to their end, hostile files at scale, tests of benchmarks, and installation
         --strict: no failed test is run again
         -n N: N workers; -n 0 is one process
         PATH: a folder, a file or FILE::TEST
