@@ -194,6 +194,8 @@ FAMILIES = {
     "mapping": ("operator_node.mappings:MAPPINGS", "operator_node.mappings.mapping:Mapping", "teleoperation.md"),
     "check": ("safe_robot.checks:CHECKS", "safe_robot.check:Check", "safety.md"),
     "primitive": ("motion_primitives.primitives:PRIMITIVES", "motion_primitives.primitive:Primitive", "learning.md"),
+    "gym task": ("rpbi.gym.tasks:TASKS", "rpbi.gym.task:WorldTask", "gym.md"),
+    "scene": ("rpbi_examples.scenes:SCENES", "rpbi_examples.scenes.scene:Scene", "examples.md"),
     "format": ("episodes.datasets.formats:FORMATS", "episodes.datasets.format:DatasetFormat", "datasets.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""
@@ -204,7 +206,7 @@ def test_every_plug_in_is_explained(family):
     table, _, page = FAMILIES[family]
     text = (ROOT / "docs" / page).read_text()
     for name in pkgutil.resolve_name(table):
-        assert f"| `{name}` |" in text, f"docs/{page} does not tell of {family} '{name}'"
+        assert re.search(rf"\| \[?`{name}`(\]\(#{name}\))? \|", text), f"docs/{page} has no row for {family} '{name}'"
 
 
 @pytest.mark.parametrize("family", FAMILIES)

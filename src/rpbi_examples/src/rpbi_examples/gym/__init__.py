@@ -1,10 +1,11 @@
 """Environments of Gymnasium with the robots of the examples; importing this registers their names."""
 
 from rpbi.gym.env import register
+from rpbi.gym.tasks import TASKS
 from rpbi_examples.scenes import SCENES
 
 FOLDER = "{rpbi_examples}/configs/gym"
-ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in ("reach", "push", "lift", "wipe", "peg")}
+ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in TASKS}
 """Folder of each environment's files by its id."""
 
 SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0": name for name in SCENES}
