@@ -86,6 +86,7 @@ def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     assert done.stderr.endswith(" take no path with spaces. Move it.\n") and done.stderr.count("\n") == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may install packages without being asked")
 def test_the_first_set_up_without_a_network_says_what_it_waits_for_and_gives_up(tmp_path):
     """The only server of packages takes connections and never answers, as behind many a firewall."""
@@ -226,8 +227,12 @@ MOMENTS = {"sourcing the workspace": _sources_the_workspace, "Python has started
 @pytest.mark.parametrize("moment", MOMENTS)
 @pytest.mark.parametrize(
     "words",
-    [["check", WORLD], ["launch", "run_kuka"], ["list"], ["test", "tests/test_layout.py"]],
-    ids=lambda words: words[0],
+    [
+        pytest.param(["check", WORLD], id="check"),
+        pytest.param(["launch", "run_kuka"], id="launch", marks=pytest.mark.thorough),
+        pytest.param(["list"], id="list", marks=pytest.mark.thorough),
+        pytest.param(["test", "tests/test_layout.py"], id="test", marks=pytest.mark.thorough),
+    ],
 )
 def test_ctrl_c_at_once_ends_a_command_without_a_traceback(words, moment, tmp_path):
     is_there = MOMENTS[moment]

@@ -59,7 +59,7 @@ def test_extras_are_wanted_unless_tests_are_chosen(arguments, chosen):
     assert (done.returncode == 0) == chosen
 
 
-@pytest.mark.parametrize("lenient", [True, False])
+@pytest.mark.parametrize("lenient", [True, pytest.param(False, marks=pytest.mark.thorough)])
 def test_chosen_tests_that_miss_an_extra_are_skipped_with_its_name(lenient):
     """Without the option, which `./rpbi test PATH` adds, they fail."""
     files = ["test_tasks.py", "test_tasks_solver.py", "test_trajectory_solver.py", "test_schemas.py"]

@@ -83,6 +83,7 @@ def test_packages_agree_on_who_maintains_them_and_under_which_licence() -> None:
     assert len(own) == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("tool", ["catkin_make", "catkin_make_isolated"])
 def test_packages_of_the_release_are_built_over_ours(tool: str, tmp_path: Path) -> None:
     for name, needed in RELEASE.items():

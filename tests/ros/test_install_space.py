@@ -11,6 +11,8 @@ from clean_shell import in_clean_shell
 from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState, Range
 
+pytestmark = pytest.mark.thorough
+
 ROOT = Path(__file__).resolve().parents[2]
 MESSAGES = "devel/lib/python3/dist-packages"
 

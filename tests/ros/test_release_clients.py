@@ -49,6 +49,7 @@ def client(tmp_path: Path) -> Path:
     return tmp_path / "release_client"
 
 
+@pytest.mark.thorough
 def test_client_in_cpp_knows_all_types_and_is_served(ros, tmp_path, client):
     ros.simulator(main_config(tmp_path, robots=(iiwa(),), setGravity={"gravZ": -9.81}))
     process = ros.start([str(client)])

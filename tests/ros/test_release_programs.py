@@ -68,6 +68,7 @@ def where(ros: RosSystem) -> Where:
     return look
 
 
+@pytest.mark.thorough
 def test_the_human_model_waves(ros, where):
     ros.start(["roslaunch", "rpbi_examples", "human_model_waving.launch", "headless:=true"])
     seen: list[np.ndarray] = []
@@ -82,6 +83,7 @@ def test_the_human_model_waves(ros, where):
     wait_until(has_waved, "the hand is up, and moves to both sides", 120.0)
 
 
+@pytest.mark.thorough
 def test_sensors_of_nsl_are_calibrated_and_its_driver_is_emulated(ros, where):
     ros.start(["roslaunch", "rpbi_examples", "nsl.launch", "headless:=true", "emulator:=true", "real_time_factor:=0"])
     calibrated = ros.listen("/rpbi/kuka_lwr/lwr_arm_7_joint/ft_sensor/calibrated", WrenchStamped)
@@ -185,6 +187,7 @@ def start(ros: RosSystem, folder: Path, body: str, **world: object) -> None:
     ros.start(["roslaunch", str(folder / "release.launch")])
 
 
+@pytest.mark.thorough
 def test_run_example_has_the_arm_track_the_figure(ros, where, tmp_path):
     start(ros, tmp_path, IK.format(world="{world}", target="figure_eight", tip="lwr_arm_7_link") + FIGURE)
     numbers = ros.listen("/transform", Float64MultiArray)
@@ -202,6 +205,7 @@ def test_run_example_has_the_arm_track_the_figure(ros, where, tmp_path):
     assert len(numbers.wait_for(1)[-1].data) == 3
 
 
+@pytest.mark.thorough
 def test_run_teleop_moves_the_arm_by_keys(ros, where, tmp_path):
     start(ros, tmp_path, IK.format(world="{world}", target="teleop_target", tip="end_effector_ball") + TELEOP)
     with publishing("/keyboard/keydown", Key) as down, publishing("/keyboard/keyup", Key) as up:
@@ -228,6 +232,7 @@ def test_run_teleop_moves_the_arm_by_keys(ros, where, tmp_path):
         up.publish(Key(code=Key.KEY_UP))
 
 
+@pytest.mark.thorough
 def test_run_human_interaction_moves_the_arm_by_the_release_s_driver_and_renders_its_force(ros, where, tmp_path):
     soft = {"contactStiffness": 2000.0, "contactDamping": 50.0, "lateralFriction": 1.0}
     table = box(name="box", changeDynamics=soft, object_tf={"tf_id": "box", "hz": 30})

@@ -94,7 +94,13 @@ def mouse(example, screen):
         raise TimeoutError("\n".join([str(error), *map(str, screen.windows()), *said])) from None
 
 
-@pytest.mark.parametrize("way", [(0.0, 0.0, 0.1), (-0.08, 0.0, 0.0)], ids=["up", "away"])
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param((0.0, 0.0, 0.1), id="up"),
+        pytest.param((-0.08, 0.0, 0.0), id="away", marks=pytest.mark.thorough),
+    ],
+)
 def test_arm_follows_a_target_that_is_dragged_with_the_mouse(position, mouse, way):
     before, way = position(TARGET), np.array(way)
     handle = before + HANDLE_M * way / np.linalg.norm(way)

@@ -39,6 +39,7 @@ def session(ros_master, screen, tmp_path_factory):
         system.close()
 
 
+@pytest.mark.thorough
 def test_the_box_is_at_its_goal_after_the_execution(session):
     launch, output, out = session
     summary = json.loads((out / "summary.json").read_text())
@@ -49,6 +50,7 @@ def test_the_box_is_at_its_goal_after_the_execution(session):
     assert "box/yaw" in output, "the demonstration is shown as a table"
 
 
+@pytest.mark.thorough
 def test_demonstration_and_execution_are_episodes_and_tables(session):
     *_, out = session
     folder = EpisodeFolder(out / "episodes")
@@ -65,6 +67,7 @@ def test_demonstration_and_execution_are_episodes_and_tables(session):
         assert len(pd.read_csv(out / f"tables/episode_{number:06d}.csv")) == len(table)
 
 
+@pytest.mark.thorough
 def test_pictures_are_drawn(session):
     for name in ("paths", "pipeline"):
         with Image.open(session[-1] / f"{name}.png") as picture:

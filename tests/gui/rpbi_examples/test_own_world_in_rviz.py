@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from ros_system import wait_until
 from rviz_view import SLOW_S, find_view, launch_with_rviz
 from worlds import FLOOR, box, write_world
+
+pytestmark = pytest.mark.thorough
 
 EYE = {"tf_id": "rpbi/eye", "position": [-15.0, -26.0, 3.0], "rpy": [math.pi, 0.0, 0.0]}
 """A camera that looks down, behind that of RViz."""

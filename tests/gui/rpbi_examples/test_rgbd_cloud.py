@@ -10,6 +10,8 @@ from ros_system import RosSystem, wait_until
 from rviz_view import start_rviz
 from sensor_msgs.msg import PointCloud2
 
+pytestmark = pytest.mark.thorough
+
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/pybullet_rgbd_example.rviz"
 SLOW_S = 300.0
 

@@ -224,6 +224,7 @@ def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(ship
     assert [line for line in complaints if not HARMLESS.search(line)] == []
 
 
+@pytest.mark.thorough
 def test_robot_display_paints_the_arm_where_tf_says_and_nothing_else(show, bare, links):
     def is_shown(picture, view):
         arm = view.silhouette(np.concatenate(list(links.values())))
@@ -239,6 +240,7 @@ def test_robot_display_paints_the_arm_where_tf_says_and_nothing_else(show, bare,
         assert painted[view.silhouette(triangles)].mean() > 0.95, link
 
 
+@pytest.mark.thorough
 def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cloud):
     def is_shown(picture, view):
         covered = view.paint(*cloud, point_size())[1]

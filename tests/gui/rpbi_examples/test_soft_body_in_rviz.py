@@ -11,6 +11,8 @@ from ros_system import RosSystem, wait_until
 from rviz_view import start_rviz
 from scipy import ndimage
 
+pytestmark = pytest.mark.thorough
+
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/soft_body.rviz"
 TORUS = (242, 115, 92)
 ARROW = (217, 26, 26)

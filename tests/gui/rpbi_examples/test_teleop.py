@@ -162,6 +162,7 @@ def test_mouse_moves_the_arm(example, screen, follows):
         follows(-RIGHT, nothing, lambda: screen.run("xdotool", "mouseup", "1"))
 
 
+@pytest.mark.thorough
 def test_joystick_moves_the_arm(example, screen, follows):
     with device(example, screen, "joystick", "virtual:=true"):
         stick, joy = rospy.Publisher("joy/virtual", Joy, queue_size=10), example.listen("joy", Joy)
@@ -174,6 +175,7 @@ def test_joystick_moves_the_arm(example, screen, follows):
         stick.unregister()
 
 
+@pytest.mark.thorough
 def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap = SpacenavDaemon(tmp_path / "spnav.sock")
     with device(example, screen, "spacenav", SPNAV_SOCKET=str(cap.path)):
@@ -183,6 +185,7 @@ def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap.close()
 
 
+@pytest.mark.thorough
 def test_virtual_haptic_device_moves_the_arm(example, screen, follows):
     with device(example, screen, "virtual"):
         window = ("search", "--sync", "--onlyvisible", "--name", "Virtual haptic device")

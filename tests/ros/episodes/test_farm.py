@@ -108,6 +108,7 @@ def test_episodes_are_those_that_a_recorder_would_write(alone):
     }
 
 
+@pytest.mark.thorough
 def test_images_of_cameras_are_recorded_on_request(world, run, tmp_path):
     camera = {"name": "eye", "hz": 20, "intrinsics": {"width": 64, "height": 48}, "object_tf": {"tf_id": "rpbi/eye"}}
     pose = {"tf_id": "rpbi/eye", "position": [0.0, 0.0, 2.0], "rpy": [np.pi, 0.0, 0.0]}
@@ -148,6 +149,7 @@ def test_workers_that_are_killed_cost_their_episode_alone(world, alone, tmp_path
     assert EpisodeFolder(tmp_path / "farm").partial() == []
 
 
+@pytest.mark.thorough
 def test_an_episode_that_kills_its_workers_is_left_out(world, alone, run, tmp_path):
     code, text = run(*words(world, tmp_path, "Kills", 4, jobs=2))
     assert code == 1 and "episode 1: left out: 3 times its process ended (SIGKILL)" in text, text
@@ -157,7 +159,7 @@ def test_an_episode_that_kills_its_workers_is_left_out(world, alone, run, tmp_pa
     assert code == 0 and "3 of 3 episodes are the same" in text, text
 
 
-@pytest.mark.parametrize("way", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("way", [pytest.param(signal.SIGINT, marks=pytest.mark.thorough), signal.SIGKILL])
 def test_a_farm_that_ends_early_goes_on_from_there(world, alone, run, tmp_path, way):
     folder = tmp_path / "farm"
     farm = start(words(world, folder, jobs=2), tmp_path)
@@ -272,6 +274,7 @@ def test_a_node_that_has_something_else_is_named(world):
         assert outcome.stops and outcome.fault.startswith(f"{socket.gethostname()}: {thing}") and not files, outcome
 
 
+@pytest.mark.thorough
 def test_the_policy_of_the_page_makes_a_data_set(run, tmp_path):
     block = re.search(r"```python\n(.*?)```", (ROOT / "docs/farm.md").read_text(), re.DOTALL)
     assert block is not None
@@ -294,6 +297,7 @@ def test_without_ray_the_extra_is_named(world, run, tmp_path, monkeypatch):
     assert code == 1 and "'ray' is not installed: ./rpbi setup farm" in text, text
 
 
+@pytest.mark.thorough
 def test_a_cluster_that_loses_a_node_makes_the_same_episodes(world, alone, run, tmp_path):
     import ray  # noqa: F401 (the extra `farm`)
 

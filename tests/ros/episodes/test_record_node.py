@@ -161,6 +161,7 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     assert f"episode 0: {folder.folder_of(0)}/episode.yaml: cannot be read" in text and "0 of 2 episodes" in text
 
 
+@pytest.mark.thorough
 def test_the_session_of_the_page_with_resets_keys_and_buttons_and_a_changed_urdf(
     ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

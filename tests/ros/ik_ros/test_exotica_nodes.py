@@ -142,6 +142,7 @@ def write_package(folder: Path) -> Path:
     return package / "kuka_lwr_exotica_example.launch"
 
 
+@pytest.mark.thorough
 def test_example_of_the_release_tracks_its_figure(ros, tmp_path):
     launch = write_package(tmp_path)
     tf = ros.listen_to_tf()

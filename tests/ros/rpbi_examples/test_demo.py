@@ -59,6 +59,7 @@ def test_slowness_is_reported_and_is_no_failure(demo):
     assert summary["figures"]["draw_rate_hz"] > 0
 
 
+@pytest.mark.thorough
 def test_its_recording_runs_again(demo):
     out, _ = demo
     replay = ["rosrun", "rpbi_utils", "replay", str(out / "recording.bag"), "--quiet"]

@@ -18,7 +18,10 @@ SPEED = 0.1
 
 
 @pytest.mark.parametrize("example", DEVICE)
-@pytest.mark.parametrize(("mapping", "factor"), [("", 1.0), ("mapping:=scale", math.sqrt(2.0))])
+@pytest.mark.parametrize(
+    ("mapping", "factor"),
+    [("", 1.0), pytest.param("mapping:=scale", math.sqrt(2.0), marks=pytest.mark.thorough)],
+)
 def test_diagonal_has_the_speed_of_an_axis(ros: RosSystem, tmp_path, example: str, mapping: str, factor: float) -> None:
     arguments = [DEVICE[example], "virtual:=true", "headless:=true", f"speed:={SPEED}", *filter(None, [mapping])]
     folder = [f"out:={tmp_path}"] if example == "lfd" else []

@@ -9,6 +9,8 @@ from node_world import Rosout
 from ros_system import RosSystem
 from sensor_msgs.msg import JointState
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def example(ros_master, tmp_path):

@@ -10,6 +10,8 @@ import rospy
 from PIL import Image
 from ros_system import wait_until
 
+pytestmark = pytest.mark.thorough
+
 MEAN = re.compile(r"at a depth of ([\d.]+) mm: ([\d.]+) N on the tool, by stiffness ([\d.]+) N")
 STIFFNESS = 500.0
 TOUCH_HEIGHT_M = 0.135

@@ -15,6 +15,8 @@ from tf2_msgs.msg import TFMessage
 
 from rpbi_examples.ros.run_interpolation import TARGET, VISITS, as_message
 
+pytestmark = pytest.mark.thorough
+
 TIP = "rpbi/kuka_lwr/end_effector_ball"
 WAYPOINTS = "/kuka_lwr/ros_pybullet_interface/end_effector/waypt_traj"
 NEAR_M = 0.01

@@ -44,6 +44,7 @@ def test_a_goal_out_of_reach_is_named(ros, tmp_path):
     assert not (tmp_path / "summary.json").exists()
 
 
+@pytest.mark.thorough
 def test_a_demonstration_is_learned_by_exotica_and_the_dmp_services(ros, tmp_path):
     """A scripted person shows the push; the box is at its goal after an execution from a random start."""
     choice = ("ik:=exotica", "dmp:=server", "goal:=-0.73 0", "real_time_factor:=0.5")
@@ -87,7 +88,12 @@ class Cap:
         self._daemon.press(self.button, is_pressed)
 
 
-@pytest.fixture(params=[("joystick", Gamepad), ("spacenav", Cap)], ids=lambda param: param[0])
+@pytest.fixture(
+    params=[
+        pytest.param(("joystick", Gamepad), id="joystick"),
+        pytest.param(("spacenav", Cap), id="spacenav", marks=pytest.mark.thorough),
+    ]
+)
 def device(request, tmp_path) -> Iterator[tuple[str, Gamepad | Cap]]:
     """The operator of the launch file, and what moves its device."""
     operator, kind = request.param

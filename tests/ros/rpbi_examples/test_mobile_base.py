@@ -46,6 +46,7 @@ def _faced(states, yaw):
     return any(abs(math.remainder(2.0 * math.atan2(quat.z, quat.w) - yaw, 2.0 * math.pi)) < 0.1 for quat in quats)
 
 
+@pytest.mark.thorough
 def test_it_drives_around_the_square_with_every_heading(states):
     for x, y in ((1, -1), (1, 1), (-1, 1), (-1, -1)):
         wait_until(lambda x=x, y=y: _passed(states, CORNER_M * x, CORNER_M * y), f"it passes corner {x}, {y}", SLOW_S)
@@ -93,6 +94,7 @@ def test_robot_state_publisher_supplies_the_links_once(example):
     assert ("rpbi/mobile_base/base_link", "rpbi/world") in found
 
 
+@pytest.mark.thorough
 def test_the_box_in_its_way_is_pushed_along(example, states):
     transforms = example.listen("/tf", TFMessage)
 

@@ -13,6 +13,8 @@ from tf2_msgs.msg import TFMessage
 
 from robot_model.geometry import Pose
 
+pytestmark = pytest.mark.thorough
+
 SLOW_S = 120.0
 FACTOR = {"pybullet_rgbd_example": 1, "pybullet_objects_example": 3}
 """Real-time factor of each example; clouds of 640 by 480 points at three times real time are too much for two cores."""

@@ -62,6 +62,7 @@ def position(ros) -> Callable[[str], tuple[float, float, float] | None]:
     return look
 
 
+@pytest.mark.thorough
 def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ros, position):
     statuses = ros.listen("/robot_safety/status", Status)
     launch(ros, "basic_example_dual_iiwa", real_time_factor=2)
@@ -105,6 +106,7 @@ def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ro
     wait_until(met, "targets that cross the arms are not safe")
 
 
+@pytest.mark.thorough
 def test_panda_works_the_ros_way_and_leads_a_real_one(ros, position):
     real = RealRobot(ros)
     launch(ros, "basic_example_panda", move="false", real_robot="true")
@@ -184,6 +186,7 @@ def test_twin_shows_a_metre_beside_what_the_arm_does(ros, position):
     wait_until(shows_it, "the twin moves as the arm does")
 
 
+@pytest.mark.thorough
 def test_it_wipes_a_table_with_the_force_asked_for(ros):
     states = ros.listen("/rpbi/kuka_lwr/wipe/state", ControllerState)
     contacts = ros.listen("/rpbi/kuka_lwr/contacts", Contacts)

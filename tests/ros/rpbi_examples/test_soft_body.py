@@ -11,6 +11,8 @@ from visualization_msgs.msg import Marker
 
 from ros_pybullet_interface.msg import Contacts
 
+pytestmark = pytest.mark.thorough
+
 SLOW_S = 120.0
 
 

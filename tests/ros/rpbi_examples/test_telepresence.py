@@ -53,6 +53,7 @@ def test_bad_messages_are_refused_by_name_and_the_node_goes_on(ros):
     assert "Traceback" not in ros.output(process)
 
 
+@pytest.mark.thorough
 def test_a_person_is_dressed_from_datagrams_of_a_suit_to_the_outcome(ros, tmp_path):
     """Faster than people would like, so that the test is short; a slow simulator is a slow robot."""
     out = tmp_path / "outcome.json"
@@ -66,6 +67,7 @@ def test_a_person_is_dressed_from_datagrams_of_a_suit_to_the_outcome(ros, tmp_pa
     assert "Traceback" not in ros.output(process)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("guard", [True, False])
 def test_guard_keeps_the_real_robot_off_live_bodies(ros, guard):
     """These are the segments of the person, and what else is there; the robot's own forces have a limit, too."""

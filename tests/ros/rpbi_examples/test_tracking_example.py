@@ -55,6 +55,7 @@ def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not
     assert tracked and all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.02 for p in tracked[::20])
 
 
+@pytest.mark.thorough
 def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
     ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true", "tracker:=april_tags"])
     tf = ros.listen("/tf", TFMessage)
@@ -69,6 +70,7 @@ def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
     assert all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.03 for p in lifted()[10::5])
 
 
+@pytest.mark.thorough
 def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
     """Beside the camera there is Vicon, whose poses are the simulator's but for 0.5 mm and 3 mrad."""
     arguments = ("headless:=true", "tracker:=april_tags", "images:=true")

@@ -58,6 +58,7 @@ def test_the_page_has_all_that_it_takes():
     assert sum(LAUNCH in command for command in COMMANDS) == 1
 
 
+@pytest.mark.thorough
 def test_the_world_is_found_fine_and_has_what_the_page_says(followed):
     _, printed = followed
     assert "world.yaml: fine; 1000 ticks a second" in printed["check world.yaml"]
@@ -68,6 +69,7 @@ def test_the_world_is_found_fine_and_has_what_the_page_says(followed):
     assert position == pytest.approx({"x": 0.5, "y": 0.25, "z": 0.24}, abs=0.002)
 
 
+@pytest.mark.thorough
 def test_the_camera_sees_the_boxes_and_the_ball(followed):
     folder, _ = followed
     with Image.open(folder / "colour.png") as image:
@@ -79,6 +81,7 @@ def test_the_camera_sees_the_boxes_and_the_ball(followed):
         assert len(set(image.convert("RGB").getdata())) > 50
 
 
+@pytest.mark.thorough
 def test_the_box_is_lifted_and_its_path_is_a_table_and_a_plot(followed):
     folder, _ = followed
     path = pd.read_csv(folder / "path.csv", index_col="time")

@@ -59,6 +59,7 @@ def launch(ros: RosSystem, *arguments: str) -> None:
     ros.start(["roslaunch", "rpbi_examples", "basic_example_ur5e.launch", "headless:=true", *arguments])
 
 
+@pytest.mark.thorough
 def test_tool_of_the_arm_and_of_the_real_one_reach_the_target(ros: RosSystem, position) -> None:
     real = RealRobot(ros)
     launch(ros, "real_robot:=true")

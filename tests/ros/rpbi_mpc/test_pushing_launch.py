@@ -61,6 +61,7 @@ def check_display(path, prediction, markers) -> None:
         assert np.hypot(*(np.mean([(each.x, each.y) for each in marker.points[:4]], axis=0) - END)) < 0.02
 
 
+@pytest.mark.thorough
 def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros: RosSystem, tmp_path) -> None:
     status = ros.listen("mpc/status", MpcStatus)
     shown = (ros.listen("mpc/path", Path), ros.listen("mpc/prediction", Path), ros.listen("mpc/markers", MarkerArray))
@@ -83,6 +84,7 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
     check_display(*shown)
 
 
+@pytest.mark.thorough
 def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
     driver = ros.listen("/stand_in/driver_state", DriverState)
     arguments = (*LINE, "real_robot:=true", f"out:={tmp_path}")
@@ -95,6 +97,7 @@ def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ro
     assert is_accurate, output
 
 
+@pytest.mark.thorough
 def test_pushes_are_tried_in_forks_of_the_world(ros: RosSystem) -> None:
     status = ros.listen("mpc/status", MpcStatus)
     arguments = (*LINE, "start_on_init:=false", "controller:=sampling")

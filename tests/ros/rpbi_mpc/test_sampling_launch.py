@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
+import pytest
 import rospy
 from ros_system import wait_until
 from std_srvs.srv import Trigger
 
 from rpbi_examples.costs import GOAL
 from rpbi_mpc.msg import MpcStatus
+
+pytestmark = pytest.mark.thorough
 
 
 def test_the_arm_brings_the_box_to_its_mark(ros):

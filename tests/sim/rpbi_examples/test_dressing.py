@@ -37,6 +37,7 @@ def sleeve_at(cuff: np.ndarray) -> np.ndarray:
     return (corners + cuff)[faces].reshape(-1, 3)
 
 
+@pytest.mark.thorough
 def test_a_person_of_chance_is_dressed():
     """Faster than people would like, so that the test is short; `./rpbi bench dressing` has 20 of them."""
     found = run_trial(0, speed=0.3)

@@ -16,6 +16,8 @@ from rpbi.gym.env import WorldEnv
 from rpbi_examples.gym import ENVIRONMENTS, SCENE_ENVIRONMENTS, train_reach
 
 Action = list[float]
+SHORT_SCENES = {"rpbi/DualArm-v0", "rpbi/Wiping-v0"}
+"""Scenes whose environments are checked in every run; the others take longer."""
 
 
 def towards(task: Any, goal: Any) -> Action:
@@ -119,7 +121,10 @@ def test_nor_with_images_and_random_variation(name):
     env.close()
 
 
-@pytest.mark.parametrize("name", SCENE_ENVIRONMENTS)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in SHORT_SCENES else pytest.param(name, marks=pytest.mark.thorough) for name in SCENE_ENVIRONMENTS],
+)
 def test_nor_in_scenes_whose_robots_move(name):
     env = gymnasium.make(name).unwrapped
     check(env)
@@ -148,6 +153,7 @@ def test_success_is_not_the_rewards(env, monkeypatch):
     assert not info["is_success"]
 
 
+@pytest.mark.thorough
 def test_reaching_is_learned(monkeypatch):
     monkeypatch.setattr(train_reach, "TESTS", 8)
     task = {**load_config("{rpbi_examples}/configs/gym/reach/task.yaml"), "max_actions": 25}

@@ -94,6 +94,7 @@ def test_after_a_cable_was_out_all_goes_on_by_itself(both: TwoComputers, reports
     assert both.simulator.poll() is None
 
 
+@pytest.mark.thorough
 def test_targets_with_20_ms_of_jitter_move_the_robot(
     ros_of_module: RosSystem, both: TwoComputers, reports: Reports
 ) -> None:
@@ -103,7 +104,7 @@ def test_targets_with_20_ms_of_jitter_move_the_robot(
     assert lines()[-1]["lag_s"] < 0.5
 
 
-@pytest.mark.parametrize("side", ["first", "second"])
+@pytest.mark.parametrize("side", ["first", pytest.param("second", marks=pytest.mark.thorough)])
 def test_a_guard_on_either_side_lets_a_swing_through(ros_of_module: RosSystem, both: TwoComputers, side: str) -> None:
     targets = f"/{side}/targets"
     parameters = {

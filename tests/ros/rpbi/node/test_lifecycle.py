@@ -67,7 +67,9 @@ def _takes_signals(process):
     return "python" in os.readlink(here / "exe") and int(blocked.split()[1], 16) >> (signal.SIGINT - 1) & 1
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.1, 0.3, 0.6, 1.0, 1.5])
+@pytest.mark.parametrize(
+    "delay_s", [0.0, 0.6, *(pytest.param(s, marks=pytest.mark.thorough) for s in (0.1, 0.3, 1.0, 1.5))]
+)
 def test_ctrl_c_while_it_starts(ros, tmp_path, delay_s):
     process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA), use_sim_time=True, wait=False, fresh=True)
     wait_until(lambda: _takes_signals(process), "the program begins")
@@ -75,7 +77,10 @@ def test_ctrl_c_while_it_starts(ros, tmp_path, delay_s):
     _interrupt(ros, process)
 
 
-@pytest.mark.parametrize("simulated", [True, False], ids=["sim time", "wall time"])
+@pytest.mark.parametrize(
+    "simulated",
+    [pytest.param(True, id="sim time"), pytest.param(False, id="wall time", marks=pytest.mark.thorough)],
+)
 @pytest.mark.parametrize("state", STATES)
 def test_ctrl_c_in_every_state(ros, tmp_path, state, simulated):
     process = ros.simulator(_config(tmp_path, **STATES[state]), use_sim_time=simulated)

@@ -10,6 +10,9 @@ from pathlib import Path
 BENCHMARKS = Path(__file__).resolve().parents[4] / "dev/benchmarks"
 RUN = """
 import json, soak
+import pytest
+
+pytestmark = pytest.mark.thorough
 soak.CAMERA["intrinsics"].update(width=320, height=240)
 print('results:', json.dumps({one.figure: one.value for one in soak.run(True, 6.0)}))
 """

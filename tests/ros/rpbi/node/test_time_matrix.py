@@ -32,14 +32,37 @@ HZ = {"as fast as it goes": 5}
 hundreds of simulated seconds a second is little on a busy machine; what it drops is not for this test to say."""
 
 
-@pytest.fixture(params=STATES)
-def state(request):
+CLOCKS = {"sim time": True, "wall time": False}
+THOROUGH = {("stopped", "wall time"), ("stepped", "wall time"), ("as fast as it goes", "wall time")}
+THOROUGH |= {("slow", clock) for clock in CLOCKS}
+
+
+def _cases():
+    """Returns each state with each clock; some of them run only with `./rpbi test --all`."""
+    return [
+        pytest.param(
+            (state, CLOCKS[clock]),
+            id=f"{state}, {clock}",
+            marks=[pytest.mark.thorough] if (state, clock) in THOROUGH else [],
+        )
+        for state in STATES
+        for clock in CLOCKS
+    ]
+
+
+@pytest.fixture(params=_cases())
+def case(request):
     return request.param
 
 
-@pytest.fixture(params=[True, False], ids=["sim time", "wall time"])
-def simulated(request):
-    return request.param
+@pytest.fixture
+def state(case):
+    return case[0]
+
+
+@pytest.fixture
+def simulated(case):
+    return case[1]
 
 
 @pytest.fixture

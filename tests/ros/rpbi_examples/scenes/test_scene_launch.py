@@ -35,6 +35,7 @@ def _ends(ros, *arguments):
     return ENDED.findall(ros.output(process))
 
 
+@pytest.mark.thorough
 def test_an_episode_ends_as_in_the_score_and_an_interrupt_ends_all(ros):
     process = ros.start(["roslaunch", "rpbi_examples", "dual_arm.launch", "seed:=4", "noise:=true", *OPTIONS])
     wait_until(lambda: process.poll() is not None or "seed 5" in ros.output(process), "an episode has ended", 240.0)
@@ -66,6 +67,7 @@ def test_without_the_extra_all_ends_with_a_line_that_names_it(ros, tmp_path):
     assert "Traceback" not in output and output.count("FATAL") == 1, output
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("scene", BOUNDS)
 def test_a_scene_does_what_it_is_about(ros, scene):
     ((seed, verdict, _, figures, _),) = _ends(ros, f"{scene}.launch", "seed:=2", "episodes:=1")

@@ -24,6 +24,7 @@ def test_a_policy_that_moves_both_hands_succeeds(env):
     assert observation["goal"] == pytest.approx((*scene.goal.position, *scene.goal.quat_xyzw))
 
 
+@pytest.mark.thorough
 def test_without_pressing_the_box_stays(env, monkeypatch):
     monkeypatch.setattr(dual_arm, "FORCE_N", 2.0)
     result = run_episode(env, 2)

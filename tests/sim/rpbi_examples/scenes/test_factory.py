@@ -94,6 +94,7 @@ class RoughStage(EnvStage):
             self._env.world.act(self.lost, "teleport", Pose((0.9, 0.0, 0.02)))
 
 
+@pytest.mark.thorough
 def test_a_grasp_that_misses_is_tried_again_and_a_part_that_falls_is_left_and_named(env, monkeypatch):
     monkeypatch.setattr(factory, "HELD_M", 1.0)
     monkeypatch.setattr(factory.Factory, "longest_s", 7.0)

@@ -28,6 +28,7 @@ def test_a_thing_without_friction_slips_off_the_palm(env, monkeypatch):
     assert not result.success and result.reason == "the can has fallen"
 
 
+@pytest.mark.thorough
 def test_a_palm_beyond_reach_is_told(env, monkeypatch):
     monkeypatch.setattr(handover, "PLACES_M", ((0.9, -0.2, 1.1), (0.9, -0.2, 1.1)))
     result = run_episode(env, 205)

@@ -30,11 +30,13 @@ def begin(env, seed: int):
     return env.task.scene
 
 
+@pytest.mark.thorough
 def test_a_push_beyond_its_strength_throws_it_over(env):
     assert not stands(env, 2, math.pi, 120.0)
     assert env.world.bodies["talos"].base_pose().position[2] < 0.8
 
 
+@pytest.mark.thorough
 def test_a_target_out_of_reach_is_told_of(env):
     scene = begin(env, 2)
     x, y, z = scene.target.position

@@ -22,6 +22,7 @@ def env():
     found.close()
 
 
+@pytest.mark.thorough
 def test_lanes_that_are_too_wide_leave_stains_which_are_drawn(env, tmp_path, monkeypatch):
     monkeypatch.setattr(wiping, "LANES", 1)
     result = run_episode(env, 203)
