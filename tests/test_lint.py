@@ -1,17 +1,11 @@
 """The code is clean by the settings in pyproject.toml."""
 
-import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
-NODES = sorted(
-    path for packages in ("src", "src/compatibility") for path in ROOT.glob(f"{packages}/*/nodes/*") if path.is_file()
-)
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -32,13 +26,6 @@ def test_files_are_formatted() -> None:
 def test_mypy_finds_nothing() -> None:
     result = run("mypy", "--cache-dir", str(ROOT / ".rpbi" / "mypy"))
     assert result.returncode == 0, result.stdout + result.stderr
-
-
-@pytest.mark.parametrize("node", NODES, ids=lambda node: node.name)
-def test_node_runs_with_the_interpreter_that_has_ros(node: Path) -> None:
-    """Installed, a node keeps its first line: with `env python3`, the first Python on PATH would run it."""
-    assert node.read_text().startswith("#!/usr/bin/python3\n")
-    assert os.access(node, os.X_OK)
 
 
 def test_catkin_lint_finds_nothing_in_packages_and_templates() -> None:

@@ -313,7 +313,7 @@ Waves at somebody.
     assert f"\n## wave\n\n{section}\n## " in (workspace / "docs/commands.md").read_text()
     assert run(workspace, "./rpbi", "wave", "--help").stdout == section
     assert re.search(r"^  wave +Waves at somebody\.$", run(workspace, "./rpbi").stdout, re.MULTILINE)
-    console = [sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"), "wave"]
+    console = [sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"), "wave"]
     assert run(workspace, *console, "--help").stdout == section
     done = run(workspace, *console, "Ada", "--hand", "right", "--angle", "-30deg")
     assert (done.returncode, done.stdout, done.stderr) == (0, "right hand waves at Ada by -0.524 rad\n", "")

@@ -66,7 +66,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def _start(folder: Path, episodes: int, jobs: int) -> subprocess.Popen[Any]:
-    command = [sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"), "farm", WORLD, "--out", str(folder)]
+    command = [sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"), "farm", WORLD, "--out", str(folder)]
     command += ["--policy", "push_policy:Push", "--ticks", str(TICKS), "--episodes", str(episodes)]
     command += ["--jobs", str(jobs)]
     return subprocess.Popen(command, cwd=ROOT / "dev/benchmarks/programs", stderr=subprocess.DEVNULL)

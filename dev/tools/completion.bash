@@ -41,7 +41,7 @@ _rpbi_launch_arguments() {
 _rpbi_objects() (
   # shellcheck disable=SC1091 # catkin writes it
   { source "$1/devel/setup.bash" && ulimit -v 2000000 &&
-    timeout -k 1 5 "$1/.venv/bin/python3" "$1/src/rpbi_utils/nodes/world" list; } 2>/dev/null |
+    timeout -k 1 5 "$1/.venv/bin/python3" "$1/devel/lib/rpbi_utils/world" list; } 2>/dev/null |
     sed 's/ .*//' | _rpbi_plain
 )
 

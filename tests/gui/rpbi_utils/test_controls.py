@@ -109,7 +109,7 @@ class Controls:
         self.screen.run("xdotool", *start, "mousemove", str(column), str(widget.y), "mouseup", "1")
 
 
-CONSOLE = Path(__file__).resolve().parents[3] / "src/custom_ros_tools/nodes/console"
+CONSOLE = Path(__file__).resolve().parents[3] / "devel/lib/custom_ros_tools/console"
 ENDED = re.compile(r"\[rpbi_controls_node-\d+\] process has died \[pid \d+, exit code (\d+),")
 PLACED = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.0, -1.0, 0.0]}
 RUN = ("start", "step", "n_steps", "stop", "reset", "set_factor")

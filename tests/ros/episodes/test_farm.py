@@ -33,7 +33,7 @@ from episodes.ros.verification import verify
 from rpbi_utils import bag_to_images
 
 ROOT = Path(__file__).resolve().parents[3]
-CONSOLE = (sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"))
+CONSOLE = (sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"))
 KILLS = 3
 TICKS, EPISODES = 300, 8
 

@@ -24,7 +24,7 @@ from ik_ros.ros.exotica_setup import synced_frames
 from ik_ros.srv import EXOTica, EXOTicaInfo, JointNames, JointNamesRequest
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "support/programs"
-FIGURE_EIGHT = Path(__file__).parents[3] / "src/compatibility/ik_ros_examples/nodes/figure_eight_node.py"
+FIGURE_EIGHT = Path(__file__).parents[3] / "devel/lib/ik_ros_examples/figure_eight_node.py"
 COSTS = '<Task Task="Pose" Rho="1"/><Task Task="JointVel" Rho="0.5e-3"/>'
 NEAR_M = 2e-3
 

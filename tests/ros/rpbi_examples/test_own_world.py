@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 
 RPBI = f"'{ROOT}/rpbi' launch world.yaml"
-LAUNCH = f"{sys.executable} '{ROOT}/src/custom_ros_tools/nodes/console' launch"
+LAUNCH = f"{sys.executable} '{ROOT}/devel/lib/custom_ros_tools/console' launch"
 """The program of `./rpbi launch`, which is quicker without setting up the workspace."""
 WORLD = f"{LAUNCH} world.yaml"
 ROSLAUNCH = "roslaunch rpbi_examples world.launch config:=world.yaml"

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Float64
 
 WriteBag = Callable[..., Path]
-NODE = Path(__file__).resolve().parents[3] / "src/rpbi_utils/nodes/bag_to_table"
+NODE = Path(__file__).resolve().parents[3] / "devel/lib/rpbi_utils/bag_to_table"
 
 
 def _run(*arguments: object) -> subprocess.CompletedProcess[str]:

@@ -93,7 +93,7 @@ def test_the_examples_run_one_after_the_other(
 
 
 def test_the_command_has_the_options_of_the_page(recording: Path) -> None:
-    command = [sys.executable, str(ROOT / "src/rpbi_utils/nodes/bag_to_table")]
+    command = [sys.executable, str(ROOT / "devel/lib/rpbi_utils/bag_to_table")]
     text = subprocess.run([*command, "--help"], capture_output=True, text=True).stdout
     documented = set(re.findall(r"^\| `(--\w+)", PAGE, flags=re.MULTILINE))
     assert documented == set(re.findall(r"(--\w+)", text)) - {"--help"}

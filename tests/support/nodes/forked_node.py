@@ -24,7 +24,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-SRC = Path(__file__).resolve().parents[3] / "src"
+PROGRAMS = Path(__file__).resolve().parents[3] / "devel/lib"
 PACKAGES = {
     "custom_ros_tools",
     "ik_ros",
@@ -41,18 +41,18 @@ PACKAGES = {
 }
 """ROS packages whose programs may be forked: Python scripts that run a function by `custom_ros_tools.ros.node`."""
 PRELOADED = (
-    "custom_ros_tools/nodes/attach_marker",
-    "custom_ros_tools/nodes/remap_joint_state_to_joint_state",
-    "ik_ros/nodes/ik_setup_node.py",
-    "ik_ros/nodes/ik_solver_node.py",
-    "operator_node/nodes/device_node.py",
-    "operator_node/nodes/mapping_node.py",
-    "ros_pybullet_interface/nodes/ros_pybullet_interface_node.py",
-    "rpbi_examples/nodes/figure_eight_node.py",
-    "rpbi_examples/nodes/ik_example_node.py",
-    "rpbi_utils/nodes/interpolation_node.py",
-    "rpbi_utils/nodes/stand_in_node.py",
-    "safe_robot/nodes/safe_robot_node.py",
+    "custom_ros_tools/attach_marker",
+    "custom_ros_tools/remap_joint_state_to_joint_state",
+    "ik_ros/ik_setup_node.py",
+    "ik_ros/ik_solver_node.py",
+    "operator_node/device_node.py",
+    "operator_node/mapping_node.py",
+    "ros_pybullet_interface/ros_pybullet_interface_node.py",
+    "rpbi_examples/figure_eight_node.py",
+    "rpbi_examples/ik_example_node.py",
+    "rpbi_utils/interpolation_node.py",
+    "rpbi_utils/stand_in_node.py",
+    "safe_robot/safe_robot_node.py",
 )
 """Programs whose modules are imported before; those of others are when they run."""
 NOT_PRELOADED = ("cv2", "matplotlib", "OpenGL", "pygame", "tkinter")
@@ -208,7 +208,7 @@ def run_script(command: list[str]) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for program in PRELOADED:
-        (module,) = re.findall(r'run\("([\w.]+):', (SRC / program).read_text())
+        (module,) = re.findall(r'run\("([\w.]+):', (PROGRAMS / program).read_text())
         importlib.import_module(module)
     importlib.import_module("roslaunch")  # of forked_launch.py
     assert len(os.listdir("/proc/self/task")) == 1 and not set(NOT_PRELOADED) & set(sys.modules)

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-CONSOLE = (sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"))
+CONSOLE = (sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"))
 PR_SET_CHILD_SUBREAPER = 36
 """Has processes whose parent has ended become children of this one, see prctl(2)."""
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"

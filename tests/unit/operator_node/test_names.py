@@ -7,21 +7,21 @@ from pathlib import Path
 
 import pytest
 
-SRC = Path(__file__).resolve().parents[3] / "src"
+PROGRAMS = Path(__file__).resolve().parents[3] / "devel/lib"
 
 
 def what_runs(node: str) -> list[str]:
-    return re.findall(r"^run\(.*\)$", (SRC / node).read_text(), re.MULTILINE)
+    return re.findall(r"^    run\(.*\)$", (PROGRAMS / node).read_text(), re.MULTILINE)
 
 
 @pytest.mark.parametrize(
     ("node", "same_as"),
     [
-        ("operator_node/nodes/joy_remap_node", "joy_remap"),
-        ("operator_node/nodes/interface_logger_node", "operator_interface_logger"),
-        ("compatibility/teleop/nodes/teleop_tf_node.py", "teleop_tf_node.py"),
-        ("ik_ros/nodes/interactive_target_node.py", "interactive_target_node.py"),
+        ("operator_node/joy_remap_node", "joy_remap"),
+        ("operator_node/interface_logger_node", "operator_interface_logger"),
+        ("teleop/teleop_tf_node.py", "teleop_tf_node.py"),
+        ("ik_ros/interactive_target_node.py", "interactive_target_node.py"),
     ],
 )
 def test_either_name_runs_the_same(node, same_as):
-    assert what_runs(node) == what_runs(f"operator_node/nodes/{same_as}") != []
+    assert what_runs(node) == what_runs(f"operator_node/{same_as}") != []

@@ -28,7 +28,7 @@ from rpbi_examples.scenes.scene import SceneResult
 from rpbi_examples.scenes.score import SeedResult, summary, write_failures
 from rpbi_examples.scenes.task import do, make_env, run_episode
 
-CONSOLE = Path(__file__).resolve().parents[4] / "src/custom_ros_tools/nodes/console"
+CONSOLE = Path(__file__).resolve().parents[4] / "devel/lib/custom_ros_tools/console"
 SCENE = "writing_scene:Writing"
 
 

@@ -1,1 +1,8 @@
 """Commands of the console for a running simulator."""
+
+from custom_ros_tools.ros.console import run_console_of
+
+
+def main() -> None:
+    """Runs the command that the first argument names, for the program `world`."""
+    run_console_of(__name__)
