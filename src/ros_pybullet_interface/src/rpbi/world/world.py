@@ -46,8 +46,10 @@ from .start_state import StartState
 
 log = logging.getLogger(__name__)
 
-SHORT_ROW_S = 0.0002
-"""Wall time of idle ticks in a row [s] below which twice as many may follow before the world looks for inputs again."""
+IDLE_ROW_S = 0.0004
+"""Wall time that idle ticks in a row are to take [s] before the world looks for inputs again."""
+MAX_IDLE_ROW = 20
+"""Largest number of them, since the coming ones may take much longer than the last."""
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -110,6 +112,8 @@ class World:
         self.bodies = self._contents.bodies
         self.contacts = self._contents.contacts
         self.attachments = self._contents.attachments
+        self._idle_row = 1
+        """Number of idle ticks in a row, by the time that the last ones took."""
         self._pushed: dict[str, Body] = {}
         """Bodies that external wrenches act on, or acted on in the last tick."""
         self.log = self._contents.log
@@ -469,18 +473,21 @@ class World:
         Returns:
             The number of ticks.
         """
-        if self._pushed or self.attachments.limited or not all(each.is_idle for each in self._stepping):
+        if self._pushed or self.attachments.limited:
             return 0
+        for body in self._stepping:
+            if not body.is_idle:
+                return 0
         mailbox, step, now = self.mailbox, self.pb.advance, time.monotonic
-        done, in_a_row, last = 0, 1, min(ticks, self._sensors.idle_ticks)
+        done, last = 0, min(ticks, self._sensors.idle_ticks)
         begin_s = now_s = now()
         while done < last and now_s < end_s and mailbox.is_empty:
-            in_a_row = int(min(in_a_row, last - done))
-            for _ in range(in_a_row):
+            row = int(min(self._idle_row, last - done))
+            for _ in range(row):
                 step()
-            done += in_a_row
+            done += row
             before_s, now_s = now_s, now()
-            in_a_row = 2 * in_a_row if now_s - before_s < SHORT_ROW_S else max(in_a_row // 2, 1)
+            self._idle_row = max(1, int(min(MAX_IDLE_ROW, row * IDLE_ROW_S / max(now_s - before_s, 1e-9))))
         self.physics_s += now_s - begin_s
         if done:
             self.clock.skip(done)
