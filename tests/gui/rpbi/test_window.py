@@ -100,6 +100,7 @@ TWO_COLOURS = """<robot name="two"><link name="body">
 <material name="blue"><color rgba="0 0 1 1"/></material></visual></link></robot>"""
 
 
+@pytest.mark.thorough
 def test_a_link_has_the_colour_of_its_first_visual(ros, screen, start, tmp_path):
     shutil.copy(Path(pybullet_data.getDataPath()) / "cube.obj", tmp_path / "block.obj")
     (tmp_path / "two.urdf").write_text(TWO_COLOURS)
@@ -114,6 +115,7 @@ def test_a_link_has_the_colour_of_its_first_visual(ros, screen, start, tmp_path)
     wait_until(is_red, "it is red, with its mesh", SLOW_S)
 
 
+@pytest.mark.thorough
 def test_a_world_that_its_window_slows_down_says_so_once(ros, start):
     node = start(
         timeStep=0.001, setAdditionalSearchPath="pybullet_data_path", robots=[ros.write_yaml("arm.yaml", iiwa())]
@@ -124,7 +126,10 @@ def test_a_world_that_its_window_slows_down_says_so_once(ros, start):
     assert ros.output(node).count(told) == 1
 
 
-@pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
+@pytest.mark.parametrize(
+    "running",
+    [pytest.param(True, id="running"), pytest.param(False, id="stopped", marks=pytest.mark.thorough)],
+)
 def test_closed_window_ends_the_node_with_one_line_and_exit_code_1(ros, screen, start, running):
     node = start(
         setAdditionalSearchPath="pybullet_data_path",

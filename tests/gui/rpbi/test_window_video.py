@@ -10,6 +10,7 @@ import signal
 import subprocess
 from pathlib import Path
 
+import pytest
 from pybullet_window import HEIGHT, SLOW_S, WIDTH, floating_ball, window
 from ros_system import wait_until
 
@@ -24,6 +25,7 @@ def taken_by_ffmpeg(node: subprocess.Popen) -> int:
     return 0
 
 
+@pytest.mark.thorough
 def test_window_is_recorded_and_the_video_plays(ros, screen, start):
     video = ros.folder / "window.mp4"
     node = start(

@@ -253,6 +253,7 @@ def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cl
     assert (~differs(picture, bare))[~grown(covered, 2)].mean() > 0.99
 
 
+@pytest.mark.thorough
 def test_marker_display_paints_the_box_where_tf_says_on_a_floor_and_leaves_the_robot_out(show, bare, frames, links):
     box = moved(cube_triangles() * BOX_SIZE_M, frames["rpbi/box"])
 

@@ -141,6 +141,7 @@ def test_the_logger_has_the_signals_of_the_last_second(example, screen):
         screen.run("xdotool", "keyup", "Left")
 
 
+@pytest.mark.thorough
 def test_two_keys_are_as_fast_as_one(example, screen):
     signals = example.listen("operator_node/signal", Float64MultiArray)
     screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync", "keydown", "Left")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 import rosgraph
@@ -13,16 +11,9 @@ from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
 TIP, TARGET, FIGURE = "rpbi/kuka_lwr/end_effector_ball", "rpbi/figure_eight", "rpbi/figure_eight_base"
-SOLVERS = ("kdl", "tasks", "trajectory")  # the last one plans the figure as a whole
-if os.environ.get("IK_EXAMPLE_SOLVERS") == "all":
-    SOLVERS += (
-        "trac_ik",
-        "pybullet",
-        "global",
-        "exotica",
-    )  # some 15 s each; they differ from kdl in nothing that the launch file does
 LEADING = "kdl"
 """The one with `real_robot:=true`."""
+MORE_SOLVERS = ("tasks", "trajectory", "trac_ik", "pybullet", "global", "exotica")
 SPAN_M = 0.35
 """The figure is 0.4 m from end to end."""
 NEAR_M = 0.01
@@ -37,7 +28,9 @@ def poses(listener, frame):
     return stamps_s, np.array([pose_matrix(each.transform) for each in own]).reshape(-1, 4, 4)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    "solver", [LEADING, *(pytest.param(each, marks=pytest.mark.thorough) for each in MORE_SOLVERS)]
+)
 def test_arm_tracks_the_figure(ros, solver):
     moving, still = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
     real = RealRobot(ros) if solver == LEADING else None

@@ -126,6 +126,7 @@ def _processes_with_master(port: str) -> list[str]:
     return found
 
 
+@pytest.mark.thorough
 def test_sigterm_closes_the_bag_and_leaves_no_process(tmp_path):
     out, log = tmp_path / "out", tmp_path / "demo.log"
     command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "600", "--out", str(out)]

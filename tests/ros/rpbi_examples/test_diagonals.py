@@ -17,7 +17,7 @@ DEVICE = {"teleop": "device:=joystick", "lfd": "operator:=joystick"}
 SPEED = 0.1
 
 
-@pytest.mark.parametrize("example", DEVICE)
+@pytest.mark.parametrize("example", ["teleop", pytest.param("lfd", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize(
     ("mapping", "factor"),
     [("", 1.0), pytest.param("mapping:=scale", math.sqrt(2.0), marks=pytest.mark.thorough)],

@@ -33,6 +33,7 @@ FAST = "real_time_factor:=0"
 ORIGIN, TIP = "rpbi/teleop_origin", "rpbi/kuka_lwr/end_effector_ball"
 
 
+@pytest.mark.thorough
 def test_a_goal_out_of_reach_is_named(ros, tmp_path):
     arguments = ("operator:=scripted", "headless:=true", f"out:={tmp_path}", "goal:=-1.6 0", FAST)
     process = ros.start([RPBI, "launch", "lfd", *arguments])
@@ -132,6 +133,7 @@ def test_a_device_demonstrates_in_the_plane(ros, tmp_path, device):
     assert recorded[f"buttons/{stick.button}"].any() and recorded["axes/0"].any()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("guard", [True, False])
 def test_real_robot_follows_until_it_feels_more_than_it_may(ros, tmp_path, guard):
     violations = ros.listen("/real_robot/robot_safety/violation", Violation)

@@ -33,7 +33,9 @@ def test_a_person_stands_in_a_t_pose_and_then_walks(ros):
     assert 0.7 < where(poses.messages[-1])[2] < 1.0
 
 
-@pytest.mark.parametrize(("loop", "more"), [("true", ["--loop"]), ("false", [])])
+@pytest.mark.parametrize(
+    ("loop", "more"), [("true", ["--loop"]), pytest.param("false", [], marks=pytest.mark.thorough)]
+)
 def test_a_recording_is_played(loop, more):
     command = ["roslaunch", "--args", "mvn_player", "rpbi_examples", "mvn.launch", "source:=player", "headless:=true"]
     done = subprocess.run([*command, f"loop:={loop}", "file:=/walks/a.mvn"], capture_output=True, text=True)

@@ -33,7 +33,13 @@ def line_loop():
     return world, plant, LockStep(plant, PushingController(PushingConfig(path=LINE)))
 
 
-@pytest.mark.parametrize(("variation", "most_m"), [(Variation(), 0.005), (UNLIKE, 0.015)], ids=["model", "unlike"])
+@pytest.mark.parametrize(
+    ("variation", "most_m"),
+    [
+        pytest.param(Variation(), 0.005, id="model"),
+        pytest.param(UNLIKE, 0.015, id="unlike", marks=pytest.mark.thorough),
+    ],
+)
 def test_box_is_pushed_along_an_s(variation, most_m):
     trial = run_trial(PushingConfig(path=S), variation)
     assert trial.finished and trial.errors.mean() < most_m
@@ -52,6 +58,7 @@ def test_a_controller_with_the_other_sign_would_fail():
     assert run_trial(config, Variation(), make_controller=lambda _: straight, max_s=6.0).errors.mean() > 0.015
 
 
+@pytest.mark.thorough
 def test_ipopt_alone_does_it_too():
     trial = run_trial(PushingConfig(path=LINE, program=ProgramConfig(solvers=("ipopt",))), Variation(), max_s=2.0)
     assert trial.errors.mean() < 0.005 and all(cycle.status == "solved" for cycle in trial.cycles)

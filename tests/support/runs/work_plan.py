@@ -11,8 +11,19 @@ from typing import Any
 import pytest
 
 TESTS = Path(__file__).resolve().parents[2]
-FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
-"""Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
+FIRST = (
+    "test_lint.py",
+    "ros/rpbi_examples",
+    "ros/episodes",
+    "test_commands.py",
+    "gui",
+    "ros",
+    "unit/safe_robot",
+    "sim/rpbi/world",
+    "sim/rpbi_examples",
+    "sim",
+)
+"""Folders and files that take long: they are begun first, so that no worker is left alone with one at the end."""
 
 QUICK_FOLDERS = ("unit", "sim")
 """Folders whose tests are quick, as those of the top are; elsewhere those with the mark."""

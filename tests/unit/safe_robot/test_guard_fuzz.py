@@ -25,7 +25,7 @@ SEED, STEPS = 11, 8
 """A climb that finds a braking inside the margin, if there is one."""
 
 
-@pytest.mark.parametrize("policy", ["limit", "reject"])
+@pytest.mark.parametrize("policy", ["limit", pytest.param("reject", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("scene, count", [(TWO, 1200), (SEVEN, 300)], ids=["two", "seven"])
 def test_no_adversary_gets_the_robot_out_of_limits_or_into_anything(scene, count, policy):
     report = fuzz(scene, scene.guard(policy), Oracle(scene), count, np.random.default_rng(1))
@@ -36,7 +36,10 @@ def test_no_adversary_gets_the_robot_out_of_limits_or_into_anything(scene, count
     assert policy == "reject" or scene is SEVEN or report.nearest_m < MARGIN_M + 0.002
 
 
-@pytest.mark.parametrize("scene, bad", [*((TWO, bad) for bad in (*LIMITS, "collision")), (SEVEN, "collision")])
+@pytest.mark.parametrize(
+    "scene, bad",
+    [*((TWO, bad) for bad in (*LIMITS, "collision")), pytest.param(SEVEN, "collision", marks=pytest.mark.thorough)],
+)
 def test_the_oracle_finds_what_a_bad_guard_lets_through(scene, bad):
     guard = scene.guard("limit", **{key: 1.5 * most for key, most in LIMITS.items() if key == bad})
     guard.checks[:] = [check for check in guard.checks if bad != "collision" or check.name != "environment"]

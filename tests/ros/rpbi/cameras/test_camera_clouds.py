@@ -55,6 +55,7 @@ def test_cloud_is_organised_and_agrees_with_the_images_of_its_frame(ros):
     assert top[:, 2] == pytest.approx(HEIGHT_M - 0.2, abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_several_cameras_have_their_own_topics_sizes_and_rates(ros):
     small = {**CAMERA, "name": "small", "hz": 10, "intrinsics": {**CAMERA["intrinsics"], "width": 80, "height": 60}}
     small["object_tf"] = {"tf_id": "rpbi/other"}

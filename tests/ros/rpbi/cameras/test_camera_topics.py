@@ -6,6 +6,7 @@ import os
 import signal
 
 import numpy as np
+import pytest
 import rosbag
 import rosgraph
 import rospy
@@ -48,6 +49,7 @@ def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_
     assert stamps_ns == sorted(set(stamps_ns))
 
 
+@pytest.mark.thorough
 def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, placed):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     colour = ros.listen(COLOUR, Image)
@@ -103,6 +105,7 @@ def _node_process(simulator):
     return nodes[0] if nodes else simulator.pid
 
 
+@pytest.mark.thorough
 def test_a_recorder_that_stands_still_misses_no_image(ros, tmp_path, placed):
     """As many bytes come meanwhile as no socket takes; a viewer would be sent the newest two."""
     camera = {**CAMERA, "hz": 20, "intrinsics": {**CAMERA["intrinsics"], "width": 640, "height": 480}}

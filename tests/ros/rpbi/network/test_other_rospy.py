@@ -32,6 +32,7 @@ SENDERS = {
         "new_connections = self.connections",
     ),
 }
+SENDER, *MORE_SENDERS = SENDERS
 """Parts that are called otherwise or are otherwise, as regular expressions over all of rospy."""
 MASTER_PARTS = {"RegManager": "MasterLink", "get_param_server_cache": "parameter_cache"}
 
@@ -58,7 +59,7 @@ def _lines(ros, process, text: str) -> list[str]:
     return [line for line in ros.output(process).splitlines() if text in line]
 
 
-@pytest.mark.parametrize("part", SENDERS)
+@pytest.mark.parametrize("part", [SENDER, *(pytest.param(part, marks=pytest.mark.thorough) for part in MORE_SENDERS)])
 def test_the_simulator_sends_by_ordinary_publishers(ros, tmp_path, part):
     environment = _other_rospy(tmp_path, SENDERS[part])
     process = ros.simulator(_config(tmp_path), use_sim_time=True, **environment)

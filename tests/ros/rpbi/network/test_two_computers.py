@@ -165,6 +165,7 @@ def said(ros_of_module: RosSystem, both: TwoComputers) -> dict[str, Callable[[],
     return found
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", FAULTS)
 def test_an_address_by_which_others_cannot_reach_a_node_is_one_line(
     said: dict[str, Callable[[], str]], case: str

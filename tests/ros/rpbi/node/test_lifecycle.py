@@ -116,6 +116,7 @@ def test_rosnode_kill_ends_it(ros, tmp_path):
     assert "Traceback" not in ros.output(process), ros.output(process)
 
 
+@pytest.mark.thorough
 def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
     process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
     published = ("publishes", "/rpbi/camera/colour/image")

@@ -87,6 +87,7 @@ def _heights(transforms, frame="rpbi/parcel"):
     ]
 
 
+@pytest.mark.thorough
 def test_its_launch_file_carries_a_parcel_past_the_sensor_and_pushes_it_off(ros, lab):
     rospy.wait_for_service("/next_parcel", 60.0)  # the pusher is up
     _stand_at_the_start(ros)
@@ -115,6 +116,7 @@ def test_its_launch_file_carries_a_parcel_past_the_sensor_and_pushes_it_off(ros,
     assert [line for line in complaints if "too slow" not in line] == []
 
 
+@pytest.mark.thorough
 def test_its_objects_come_and_go_and_a_reset_brings_back_the_first_ones(ros, lab, workspace):
     assert objects(ros) == {"floor": "collision", "parcel": "dynamic", "pusher": "robot", "belt": CONVEYOR}
     text = {"name": "second", "type": CONVEYOR, "size": [1.0, 1.0, 0.1], "position": [0.0, 2.0, 1.0]}
@@ -142,6 +144,7 @@ def test_its_objects_come_and_go_and_a_reset_brings_back_the_first_ones(ros, lab
     hashes.wait_for(2)
 
 
+@pytest.mark.thorough
 def test_a_wrong_object_is_refused_with_all_reasons(ros, lab):
     wrong = {"name": "second", "type": CONVEYOR, "size": 1, "position": [0, 0, 1], "sensors": [{"type": "nowhere:X"}]}
     answer = add(ros, PybulletObject.DYNAMIC, wrong)
@@ -151,6 +154,7 @@ def test_a_wrong_object_is_refused_with_all_reasons(ros, lab):
     assert "second" not in objects(ros)
 
 
+@pytest.mark.thorough
 def test_its_own_topic_moves_its_object_and_refuses_nonsense(ros, lab):
     rosout = Rosout(ros)
     _stand_at_the_start(ros)
@@ -171,6 +175,7 @@ def test_its_own_topic_moves_its_object_and_refuses_nonsense(ros, lab):
     publisher.unregister()
 
 
+@pytest.mark.thorough
 def test_it_is_seen_by_cameras_and_in_rviz(ros, lab, placed):
     answer = ros.call("/rpbi/add_rgbd_sensor", SetString, yaml.safe_dump(CAMERA))
     assert answer.success, answer.message
@@ -184,6 +189,7 @@ def test_it_is_seen_by_cameras_and_in_rviz(ros, lab, placed):
     assert (belt.scale.x, belt.scale.y, belt.scale.z) == pytest.approx((2.0, 0.4, 0.1))
 
 
+@pytest.mark.thorough
 def test_it_is_checked_and_tested_without_a_master(workspace):
     check = "rosrun ros_pybullet_interface check_world.py"
     told = _do(workspace, f"{check} '{{{NAME}}}/configs/lab.yaml'")
@@ -198,6 +204,7 @@ def test_it_is_checked_and_tested_without_a_master(workspace):
     assert f"belt.yaml: type: '{NAME}.conveyor' has no 'Conveyer'; did you mean 'Conveyor'?" in told
 
 
+@pytest.mark.thorough
 def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
     belt = workspace / "src" / NAME / "configs" / "belt.yaml"
     process = ros.simulator({"objects": [str(belt)]}, wait=False)

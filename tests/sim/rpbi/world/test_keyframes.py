@@ -61,7 +61,12 @@ def heap(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("session", "seed"), [(sleeping_session, 7006), (sleeping_session, 7041), (streaming_session, 101)]
+    ("session", "seed"),
+    [
+        (sleeping_session, 7006),
+        pytest.param(sleeping_session, 7041, marks=pytest.mark.thorough),
+        (streaming_session, 101),
+    ],
 )
 def test_all_ways_from_a_keyframe_are_the_same(tmp_path, session, seed):
     world = session.build(tmp_path, seed)
@@ -213,7 +218,7 @@ def test_a_keyframe_is_that_of_the_same_files_elsewhere(tmp_path):
         world.close()
 
 
-@pytest.mark.parametrize("jobs", [1, 2, 3])
+@pytest.mark.parametrize("jobs", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_parts_of_a_recording_agree_in_any_number_of_processes(session, jobs):
     groups = groups_of(session.parts(), jobs)
     assert len(groups) == jobs

@@ -72,7 +72,7 @@ def arm(tmp_path, monkeypatch):
     world.close()
 
 
-@pytest.mark.parametrize("seed", [301, 302, SLEEPY])
+@pytest.mark.parametrize("seed", [301, pytest.param(302, marks=pytest.mark.thorough), SLEEPY])
 def test_a_session_of_everything_goes_on_the_same_in_all_ways(tmp_path, seed):
     if seed == SLEEPY:
         world = sleeping_session.build(tmp_path, seed)
