@@ -26,7 +26,7 @@ time.sleep(1000)
 """
 
 
-def test_a_child_outlives_the_thread_that_starts_it_and_not_a_parent_that_is_killed():
+def test_child_outlives_its_starting_thread_but_not_a_killed_parent():
     parent = subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True)
     assert parent.stdout is not None
     child, control, *codes = parent.stdout.readline().split()

@@ -33,7 +33,7 @@ def test_packages_of_this_workspace_are_found_where_nothing_is_sourced(monkeypat
     assert ros_package_path("rpbi_examples") == str(sources / "rpbi_examples")
 
 
-def test_a_package_on_ros_package_path_comes_before_that_of_this_workspace(package: Path) -> None:
+def test_ros_package_path_precedes_packages_of_this_workspace(package: Path) -> None:
     other = package.parent / "rpbi_examples"
     other.mkdir()
     (other / "package.xml").write_text((package / "package.xml").read_text().replace("my_robot", "rpbi_examples"))
@@ -58,7 +58,7 @@ def test_unknown_package_is_named_with_a_suggestion(package: Path) -> None:
         replace_package("{my_robt}/a.yaml")
 
 
-def test_unknown_package_with_no_near_name_tells_where_it_was_sought(package: Path) -> None:
+def test_unknown_package_without_similar_name_reports_the_searched_path(package: Path) -> None:
     with pytest.raises(ConfigError, match=f"unknown ROS package 'zebra' .ROS_PACKAGE_PATH is {package.parent}"):
         replace_package("package://zebra/a.yaml")
 
@@ -109,7 +109,7 @@ LONG = f"1{':59' * 60}"[:57]
         ("a: \x00", "w.yaml: is not YAML: unacceptable character #x0000: special characters are not allowed"),
     ],
 )
-def test_faulty_yaml_is_told_with_line_and_column(text: str, told: str) -> None:
+def test_faulty_yaml_is_reported_with_line_and_column(text: str, told: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load_configs(text, "w.yaml")
     assert str(caught.value).replace("\\t", "\\\\t") == told
@@ -133,13 +133,13 @@ def test_merged_key_may_be_overridden() -> None:
 
 
 @pytest.mark.parametrize(("name", "told"), [("none.yaml", "no such file or directory"), ("folder", "is a directory")])
-def test_unreadable_file_is_told(tmp_path: Path, name: str, told: str) -> None:
+def test_unreadable_file_is_reported(tmp_path: Path, name: str, told: str) -> None:
     (tmp_path / "folder").mkdir()
     with pytest.raises(ConfigError, match=f"^{tmp_path / name}: {told}$"):
         load_config(str(tmp_path / name))
 
 
-def test_file_that_is_no_text_is_told(tmp_path: Path) -> None:
+def test_file_that_is_not_text_is_reported(tmp_path: Path) -> None:
     (tmp_path / "image.yaml").write_bytes(b"\x89PNG\xff\xfe")
     with pytest.raises(ConfigError, match="is not UTF-8 text"):
         load_config(str(tmp_path / "image.yaml"))

@@ -82,7 +82,7 @@ def test_who_comes_back_while_its_last_connection_ends_is_served(topic, is_mende
     [(True, 1), (True, 2), (False, 1)],
     ids=["mended", "mended, under the lock", "rospy by itself"],
 )
-def test_who_comes_while_a_lost_connection_is_looked_for_is_served(topic, is_mended, call, monkeypatch):
+def test_connection_made_during_search_for_a_lost_one_is_served(topic, is_mended, call, monkeypatch):
     """The new connection gets the file of the lost one right after a call that has found that to be lost."""
     lost = topic.connect("/viewer")
     topic.ends[0].close()

@@ -75,12 +75,12 @@ def test_wrong_words_end_with_2_after_the_usage(capsys, line, message):
     assert capsys.readouterr().err.endswith(message)
 
 
-def test_an_error_is_a_line_with_the_name_of_the_command(capsys):
+def test_error_is_one_line_with_the_name_of_the_command(capsys):
     assert Command(push).run(["wall"]) == 1
     assert capsys.readouterr().err == "push: the wall stays\n"
 
 
-def test_raw_words_are_passed_on_and_a_number_is_the_exit_code(capsys):
+def test_raw_arguments_are_passed_and_integers_become_the_exit_code(capsys):
     assert Command(echo).run(["-x", "__name:=y", "--zed=1"]) == 3
     assert capsys.readouterr().out == "-x __name:=y --zed=1\n"
 
@@ -166,7 +166,7 @@ run_command("builtins:print", lambda _: command())
 
 
 @pytest.mark.parametrize("block", ["with late_imports():", "if True:"])
-def test_ctrl_c_ends_a_command_that_imports_a_library_which_swallows_it(block):
+def test_ctrl_c_ends_a_command_despite_imports_that_swallow_it(block):
     command = [sys.executable, "-c", IMPORTS.replace("WITH", block)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60.0)
     if "late" in block:

@@ -26,12 +26,12 @@ def test_missing_joints_are_all_named_and_shift_nothing() -> None:
 
 
 @pytest.mark.parametrize("ns", ["left", "left/"])
-def test_namespace_is_looked_up_in_the_message_and_not_handed_on(ns: str) -> None:
+def test_namespace_is_used_for_lookup_and_removed_from_the_result(ns: str) -> None:
     values = JointValues.of(["right/a", "left/b", "left/a"], [1.0, 2.0, 3.0])
     assert values.in_order(["a", "b"], ns) == JointValues(("a", "b"), (3.0, 2.0))
 
 
-def test_joint_that_is_missing_in_a_namespace_is_named_with_it() -> None:
+def test_joint_missing_in_a_namespace_is_named_with_it() -> None:
     with pytest.raises(MissingJointsError, match="^no values for joint 'left/a': it has a$"):
         JointValues.of(["a"], [1.0]).in_order(["a"], "left")
 

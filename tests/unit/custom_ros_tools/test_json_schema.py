@@ -61,7 +61,7 @@ def problems(**data: object) -> list[str]:
         {"is_on": True, "at": None, "inner": None, "gains": [1, 2.5]},
     ],
 )
-def test_schema_takes_what_the_model_takes(data: dict[str, object]) -> None:
+def test_schema_accepts_values_that_the_model_accepts(data: dict[str, object]) -> None:
     Outer.parse({"name": "a", **data}, "a.yaml")
     assert problems(**data) == []
 
@@ -79,13 +79,13 @@ def test_schema_takes_what_the_model_takes(data: dict[str, object]) -> None:
         {"other": 1},
     ],
 )
-def test_schema_refuses_what_the_model_refuses(data: dict[str, object]) -> None:
+def test_schema_refuses_values_that_the_model_refuses(data: dict[str, object]) -> None:
     with pytest.raises(ConfigError, match=next(iter(data))):
         Outer.parse({"name": "a", **data}, "a.yaml")
     assert problems(**data)
 
 
-def test_mapping_stands_once_and_its_key_has_a_description_of_its_own() -> None:
+def test_mapping_is_defined_once_and_each_key_keeps_its_description() -> None:
     inner = SCHEMA["properties"]["inner"]
     assert inner["description"] == "What is inside."
     assert mapping_in(inner, SCHEMA) == {"$ref": "#/$defs/Inner"}
@@ -99,20 +99,20 @@ class Other(ConfigModel):
     inners: ListOf[Inner] = Field((), description="Several.")
 
 
-def test_schemas_of_several_files_call_the_same_mapping_the_same_and_have_no_more_than_they_refer_to() -> None:
+def test_schemas_of_several_files_share_mappings_without_unused_ones() -> None:
     both = json_schemas({"outer": Outer, "other": Other, "inner": Inner})
     assert both["outer"] == SCHEMA
     assert both["other"]["$defs"] == SCHEMA["$defs"]
     assert "$defs" not in both["inner"]
 
 
-def test_types_of_a_union_are_told_in_one_schema_where_that_says_the_same() -> None:
+def test_equivalent_types_of_a_union_share_one_schema() -> None:
     assert SCHEMA["properties"]["hz"]["type"] == "number"
     assert SCHEMA["properties"]["at"]["type"] == ["array", "null"]
     assert [each["type"] for each in SCHEMA["properties"]["gains"]["anyOf"]] == ["array", "number"]
 
 
-def test_what_no_schema_can_say_is_left_to_the_model() -> None:
+def test_types_without_a_schema_are_left_to_the_model() -> None:
     class Odd(ConfigModel):
         """A model of something that JSON does not have."""
 
@@ -124,12 +124,12 @@ def test_what_no_schema_can_say_is_left_to_the_model() -> None:
         Odd.parse({}, "odd.yaml")
 
 
-def test_editors_are_not_told_to_type_in_defaults_that_say_nothing() -> None:
+def test_meaningless_defaults_are_omitted_for_editors() -> None:
     assert "default" not in SCHEMA["properties"]["at"]
     assert SCHEMA["properties"]["hz"]["default"] == 50.0
 
 
-def test_unit_is_that_of_the_numbers_in_a_value() -> None:
+def test_unit_applies_to_numbers_inside_a_value() -> None:
     properties = SCHEMA["properties"]
     assert [unit_in(properties[key]) for key in ("name", "hz", "at")] == [None, "Hz", "m"]
     assert unit_in(SCHEMA["$defs"]["Inner"]["properties"]["range"]) == "m"

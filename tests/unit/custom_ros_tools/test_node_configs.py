@@ -60,7 +60,7 @@ def test_mesh_is_named_as_rviz_finds_it(written: str, uri: str) -> None:
     assert marker(type="mesh_resource", mesh_resource=written).mesh_uri == uri
 
 
-def test_numbers_of_a_joint_state_are_positions_in_their_own_order_by_default() -> None:
+def test_joint_state_numbers_are_positions_in_message_order_by_default() -> None:
     assert FloatArrayConfig() == FloatArrayConfig(joint_names=None, field="position")
 
 
@@ -108,7 +108,7 @@ def test_numbers_of_a_joint_state_are_positions_in_their_own_order_by_default() 
         (RateParameters, {"hz": -1.0}, "hz: must be > 0 [Hz], got -1"),
     ],
 )
-def test_faulty_configuration_is_told(model: type[ConfigModel], data: dict[str, Any], told: str) -> None:
+def test_faulty_configuration_is_reported(model: type[ConfigModel], data: dict[str, Any], told: str) -> None:
     with pytest.raises(ConfigError) as caught:
         model.parse(data, "~config")
     assert told in str(caught.value)

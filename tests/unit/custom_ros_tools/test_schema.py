@@ -118,17 +118,17 @@ def problems(**data: Any) -> list[str]:
         ("frame", "/a", "frame: a TF frame has no spaces and neither starts nor ends with '/', got '/a'"),
     ],
 )
-def test_fault_is_told_with_key_path_expectation_and_find(key: str, value: Any, expected: str) -> None:
+def test_fault_is_reported_with_key_path_expected_and_given_value(key: str, value: Any, expected: str) -> None:
     assert problems(**{key: value}) == [expected]
 
 
-def test_missing_key_tells_what_is_expected() -> None:
+def test_missing_key_is_reported_with_its_expected_value() -> None:
     with pytest.raises(ConfigError) as caught:
         Camera.parse({}, "camera.yaml")
     assert str(caught.value) == "camera.yaml: hz: missing, expected a number [Hz]"
 
 
-def test_all_faults_are_told_at_once() -> None:
+def test_all_faults_are_reported_at_once() -> None:
     assert problems(hz=-1, lens={"fov": "wide", "rang": 1}, count="x", extra=1) == [
         "hz: must be > 0 [Hz], got -1",
         "lens.fov: expected a number [deg], got text 'wide'",
@@ -168,7 +168,7 @@ def test_whole_number_too_large_for_a_float_is_refused() -> None:
     assert len(problems(hz=10**400)) == 1
 
 
-def test_what_is_written_as_pybullet_users_do_is_accepted() -> None:
+def test_values_written_as_pybullet_users_do_are_accepted() -> None:
     camera = Camera.parse({"hz": 30, "on": 0, "position": [1, 2, 3], "quat": [0, 0, 2, 0]}, "f")
     assert (camera.hz, camera.on) == (30.0, False)
     assert isinstance(camera.hz, float)
@@ -191,7 +191,7 @@ def test_model_cannot_be_changed() -> None:
         camera.hz = 2.0
 
 
-def test_model_survives_pickling_with_what_was_written() -> None:
+def test_model_survives_pickling_with_only_the_written_keys() -> None:
     camera = Camera.parse({"hz": 1, "lens": {"fov": 30}}, "f")
     again = pickle.loads(pickle.dumps(camera))
     assert again == camera
@@ -211,7 +211,7 @@ def test_json_schema_carries_units_and_descriptions() -> None:
     assert schema["additionalProperties"] is False
 
 
-def test_a_quaternion_that_was_normalised_once_stays_as_it_is_to_the_last_bit():
+def test_normalised_quaternion_is_bitwise_unchanged_by_another_normalisation():
     class Turned(ConfigModel):
         quat: Quat
 

@@ -74,7 +74,7 @@ def is_closed(connection: socket.socket) -> bool:
         return True
 
 
-def test_those_who_say_what_they_want_are_served_beside_those_who_do_not(node, connect):
+def test_complete_headers_are_served_while_silent_clients_are_connected(node, connect):
     silent = [connect(said) for said in (b"", b"\x10", header()[:-1])]
     for count in range(1, 20):
         connect(header(count))
@@ -84,7 +84,7 @@ def test_those_who_say_what_they_want_are_served_beside_those_who_do_not(node, c
     assert sorted(node.heard(22)[19:]) == sorted((header(30), header(0x10), header()))
 
 
-def test_a_header_that_is_larger_than_what_the_kernel_keeps_comes_through(node, connect):
+def test_header_larger_than_the_peeked_size_is_received(node, connect):
     connect(header(4 * PEEKED))
     assert node.heard(1)[0] == header(4 * PEEKED)[:PEEKED]
 

@@ -29,13 +29,13 @@ def test_roll_pitch_yaw_and_quaternion_say_the_same() -> None:
         ("0 0 0 0 0 0 /world box", "arguments: parent: a TF frame has no spaces"),
     ],
 )
-def test_faulty_arguments_are_told(arguments: str, told: str) -> None:
+def test_faulty_arguments_are_reported(arguments: str, told: str) -> None:
     with pytest.raises(ConfigError) as caught:
         StaticTransform.from_arguments(arguments.split())
     assert told in str(caught.value)
 
 
-def test_faults_of_numbers_and_frames_are_told_together() -> None:
+def test_faults_of_numbers_and_frames_are_reported_together() -> None:
     with pytest.raises(ConfigError) as caught:
         StaticTransform.from_arguments("1 up nan 0 0 0 0 /world box".split())
     assert [problem.key for problem in caught.value.problems] == ["y", "", "parent", "position[2]"]

@@ -23,7 +23,7 @@ def folder_of(process: subprocess.Popen[str]) -> Path:
     return Path(process.stdout.readline().strip())
 
 
-def test_what_a_killed_process_left_goes_when_the_next_one_starts_and_nothing_else(tmp_path: Path) -> None:
+def test_only_folders_of_killed_processes_are_removed_at_start(tmp_path: Path) -> None:
     (tmp_path / "rpbi-of-somebody").mkdir()
     killed = start(tmp_path, "import os, signal; os.kill(os.getpid(), signal.SIGKILL)")
     left = folder_of(killed)

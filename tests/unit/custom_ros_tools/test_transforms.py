@@ -63,7 +63,7 @@ def test_quarter_turn_about_z_takes_x_to_y() -> None:
         ([0, 0], r"orientation: expected roll, pitch, yaw or a quaternion x, y, z, w, got shape \(2,\)"),
     ],
 )
-def test_what_is_no_orientation_is_refused(orientation: list, told: str) -> None:
+def test_invalid_orientation_is_refused(orientation: list, told: str) -> None:
     with pytest.raises(ValueError, match=told):
         quat_of(orientation)
 

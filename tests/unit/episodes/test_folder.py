@@ -64,7 +64,7 @@ def test_a_label_is_changed_and_the_rest_stays(tmp_path: Path) -> None:
     assert (episode.label, episode.seeds, episode.topics) == ("success", "7", TOPICS)
 
 
-def test_what_is_not_there_or_not_readable_is_named(tmp_path: Path) -> None:
+def test_missing_or_unreadable_episodes_are_named(tmp_path: Path) -> None:
     folder = EpisodeFolder(tmp_path)
     _record(folder)
     with pytest.raises(EpisodeError, match="no episode 5; there are 0"):

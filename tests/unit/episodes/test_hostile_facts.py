@@ -129,7 +129,7 @@ def test_copies_are_laid_out_below_the_folder_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("description", ["", "[]", "{}", _description(files=[]), _description(objects=[{}])])
-def test_what_is_no_description_is_rejected(tmp_path: Path, description: str) -> None:
+def test_invalid_description_is_rejected(tmp_path: Path, description: str) -> None:
     with pytest.raises(ConfigError, match="rpbi/world_description"):
         store_files(description, tmp_path)
 

@@ -40,7 +40,7 @@ def test_arrows_are_bounded_by_fewer_times(scene: PageScene) -> None:
     assert few.with_few_arrows() is few and scene.all_notes == ["a note"]
 
 
-def test_a_page_that_is_too_large_is_built_with_fewer_times(scene: PageScene) -> None:
+def test_too_large_page_is_built_with_fewer_times(scene: PageScene) -> None:
     page, shown = page_of(scene)
     assert len(page.encode()) < MAX_BYTES and 10 < len(shown.times) < TIMES
     note, rate = shown.all_notes

@@ -56,7 +56,7 @@ def test_an_answer_outside_limits_is_brought_in_and_no_success(ask):
     assert "misses its target by" in solution.message
 
 
-def test_a_wrong_answer_is_a_failure_and_tells_how_far_off_it_is(ask):
+def test_wrong_answer_fails_with_its_distance_from_the_target(ask):
     solution = ask((0.2, 1.0, -0.4))
     assert not solution.success
     assert (solution.position_error_m, solution.orientation_error_rad) == pytest.approx((0.0, 0.5), abs=1e-9)
@@ -64,13 +64,13 @@ def test_a_wrong_answer_is_a_failure_and_tells_how_far_off_it_is(ask):
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_what_is_not_finite_is_no_answer(ask, bad):
+def test_non_finite_answer_is_rejected(ask, bad):
     solution = ask((0.2, bad, -0.9), start=(0.1, 0.2, 0.3))
     assert not solution.success and solution.positions == (0.1, 0.2, 0.3)
     assert ask((0.2, bad, -0.9), TRUTH).success
 
 
-def test_without_an_answer_the_start_is_told(ask):
+def test_failed_solution_returns_the_start(ask):
     solution = ask(start=(0.1, 0.2, 0.3))
     assert not solution.success and solution.positions == (0.1, 0.2, 0.3)
 

@@ -198,7 +198,7 @@ def test_groups_of_the_srdf_choose_the_joints(tmp_path):
         ({"links": "<Link>" * 200 + "</Link>" * 200}, "at most 100 levels"),
     ],
 )
-def test_what_cannot_be_expressed_is_rejected_by_name(tmp_path, changes, message):
+def test_unsupported_problems_are_rejected_by_name(tmp_path, changes, message):
     path = write_problem(tmp_path, **changes)
     with pytest.raises(ConfigError, match=f"(?s){message}") as error:
         make(path)

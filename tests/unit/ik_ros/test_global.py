@@ -19,7 +19,7 @@ UP, DOWN = (0.2, 1.0, -0.9), (1.2, -1.0, 0.1)
 
 
 @pytest.mark.parametrize(("start", "best", "other"), [(UP, UP, DOWN), (DOWN, DOWN, UP)])
-def test_both_elbows_are_found_and_the_one_nearer_to_the_start_comes_first(tmp_path, start, best, other):
+def test_both_elbow_solutions_are_found_nearest_to_the_start_first(tmp_path, start, best, other):
     arm = _arm(tmp_path)
     near = dict(zip(arm.joint_names, [0.8 * position for position in start]))
     solution = arm.solve(IKProblem(target=arm.chain.pose(UP), start=near))
@@ -29,7 +29,7 @@ def test_both_elbows_are_found_and_the_one_nearer_to_the_start_comes_first(tmp_p
     assert solution.alternatives[0] == pytest.approx(other, abs=0.01)
 
 
-def test_the_one_whose_joints_are_farther_from_their_limits_comes_first_if_so_asked(tmp_path):
+def test_ranking_by_middle_of_limits_puts_that_solution_first(tmp_path):
     arm = _arm(tmp_path, rank_by="middle_of_limits")
     for start in (UP, DOWN):
         solution = arm.solve(IKProblem(target=arm.chain.pose(UP), start=dict(zip(arm.joint_names, start))))
@@ -37,7 +37,7 @@ def test_the_one_whose_joints_are_farther_from_their_limits_comes_first_if_so_as
         assert [pytest.approx(DOWN, abs=0.01)] == list(solution.alternatives)
 
 
-def test_no_more_are_told_than_asked_for(tmp_path):
+def test_at_most_the_requested_number_of_alternatives_is_returned(tmp_path):
     arm = _arm(tmp_path, most=1)
     assert arm.solve(IKProblem(target=arm.chain.pose(UP))).alternatives == ()
 
@@ -55,7 +55,7 @@ def test_distinct_means_distinct(tmp_path):
         assert all(max(abs(a - b) for a, b in zip(q, other)) > 0.4 for other in found[:i])
 
 
-def test_without_a_solution_the_best_is_told(tmp_path):
+def test_best_attempt_is_returned_without_a_solution(tmp_path):
     arm = _arm(tmp_path)
     x, y, z = 2.0, 0.0, 0.0
     solution = arm.solve(IKProblem(target=arm.chain.pose(UP)._replace(position=(x, y, z))))

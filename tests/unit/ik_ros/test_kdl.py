@@ -69,7 +69,7 @@ def test_a_path_is_followed_without_jumps_along_a_limit_too(lwr):
     assert highest > 2.96, "it did not get to the limit"
 
 
-def test_a_start_outside_limits_is_brought_in_and_told_once(lwr, caplog):
+def test_start_outside_limits_is_moved_inside_and_reported_once(lwr, caplog):
     with caplog.at_level(logging.WARNING, "ik_ros"):
         for position in (5.0, 5.0, 0.5, 5.0):
             start = _start(lwr, [0.0, position, 0.0, -1.2, 0.0, 0.8, 2.96700001])
@@ -79,7 +79,7 @@ def test_a_start_outside_limits_is_brought_in_and_told_once(lwr, caplog):
     ], "once for a stream, and rounding of a limit is not worth a word"
 
 
-def test_joints_of_the_robot_that_are_not_in_the_chain_are_no_error(lwr):
+def test_start_may_contain_robot_joints_outside_the_chain(lwr):
     wrist = make_solver("kdl", {"urdf_filename": str(LWR), "base_link": "lwr_arm_3_link", "tip_link": "lwr_arm_7_link"})
     assert wrist.joint_names == tuple(f"lwr_arm_{index}_joint" for index in range(3, 7))
     target = wrist.chain.pose([0.1, 0.2, 0.3, 0.4])
@@ -103,7 +103,7 @@ def test_joints_without_a_start_begin_in_the_middle(lwr):
         (50, {"target": Pose((1.1, 0.0, 0.31))}, 10),
     ],
 )
-def test_fewer_starts_are_made_where_they_are_slow_or_of_no_use(lwr, restarts, asked, starts):
+def test_fewer_restarts_are_made_where_slow_or_useless(lwr, restarts, asked, starts):
     problem = IKProblem(**{"target": lwr.chain.pose(ELBOW), **asked})
     far = [-2.0, -1.0, 2.0, 1.0, 2.0, -1.0, 2.0]
     assert len(list(lwr.candidates(problem, Goal(problem), far, restarts))) == starts
@@ -114,7 +114,7 @@ def test_a_problem_without_target_is_refused(lwr):
         lwr.solve(IKProblem(start=_start(lwr)))
 
 
-def test_a_target_beyond_reach_is_said_to_be_and_the_best_is_the_arm_stretched_towards_it(lwr):
+def test_unreachable_target_is_reported_and_the_arm_stretches_towards_it(lwr):
     target = Pose((3.0, 0.0, 0.31))
     solution = lwr.solve(IKProblem(target=target, rotation_tolerance=(4.0, 4.0, 4.0), start=_start(lwr)))
     assert not solution.success
@@ -135,7 +135,7 @@ def test_other_seeds_may_lead_elsewhere_but_equal_ones_do_not(lwr):
 
 
 @pytest.mark.parametrize("free", ["x", "y", "z"])
-def test_a_link_may_turn_about_an_axis_with_a_tolerance_of_pi_and_only_about_that(lwr, free):
+def test_tolerance_of_pi_frees_rotation_about_that_axis_only(lwr, free):
     generator = random.Random(1)
     tolerance = tuple(4.0 if axis == free else 0.0 for axis in "xyz")
     solved = 0
@@ -184,7 +184,7 @@ def test_position_tolerances_are_along_the_axes_of_the_target(tmp_path):
     assert x < -0.1, "it had to make use of the tolerance"
 
 
-def test_a_joint_without_limits_takes_the_turn_that_is_nearest_to_the_start(tmp_path):
+def test_joint_without_limits_takes_the_turn_nearest_to_the_start(tmp_path):
     arm = planar_arm(tmp_path, "continuous", "")
     assert math.isinf(arm.upper[2])
     target = arm.chain.pose([0.3, 1.0, 20.4])
@@ -193,7 +193,7 @@ def test_a_joint_without_limits_takes_the_turn_that_is_nearest_to_the_start(tmp_
     assert solution.positions == pytest.approx((0.3, 1.0, 20.4), abs=1e-3)
 
 
-def test_a_joint_that_mimics_another_goes_along_and_is_not_solved_for(tmp_path):
+def test_mimic_joint_follows_its_joint_and_is_not_solved_for(tmp_path):
     arm = planar_arm(tmp_path, more=LIMITED + '<mimic joint="elbow" multiplier="-2" offset="0.1"/>')
     assert arm.joint_names == ("shoulder", "elbow")
     assert (arm.lower[1], arm.upper[1]) == (pytest.approx(-1.45), pytest.approx(1.55)), "so that the wrist is within 3"
@@ -241,7 +241,7 @@ def test_pybullet_refuses_tolerances_that_it_cannot_make_use_of(tmp_path, field)
 
 
 @pytest.mark.parametrize(("solver", "options"), [("trac_ik", {"timeout": 5.0}), ("pybullet", {})])
-def test_what_counts_as_reached_anyway_is_no_tolerance(tmp_path, solver, options):
+def test_tolerances_below_the_default_are_accepted(tmp_path, solver, options):
     arm = planar_arm(tmp_path, solver=solver, **options)
     small = IKProblem(
         target=arm.chain.pose([0.3, 0.5, 0.2]), position_tolerance=(1e-5,) * 3, rotation_tolerance=(1e-3,) * 3
@@ -254,7 +254,7 @@ def test_what_counts_as_reached_anyway_is_no_tolerance(tmp_path, solver, options
     [{"rotation_tolerance": (10.0, 10.0, 10.0)}, {"position_tolerance": (0.3,) * 3}],
     ids=["any orientation", "a box"],
 )
-def test_targets_with_tolerances_are_solved_for_by_trac_ik_as_by_kdl(tmp_path, field):
+def test_trac_ik_solves_targets_with_tolerances_as_kdl_does(tmp_path, field):
     problem = IKProblem(target=Pose((0.3, 0.3, 0.0), (1.0, 0.0, 0.0, 0.0)), start={"elbow": 0.5}, **field)
     solutions = [planar_arm(tmp_path, solver=solver).solve(problem) for solver in ("trac_ik", "kdl")]
     assert solutions[0] == solutions[1]
@@ -268,7 +268,7 @@ def test_pybullet_goes_to_a_position_in_any_orientation(tmp_path):
     assert solution.success, solution.message
 
 
-def test_pybullet_takes_its_own_options_and_names_those_that_do_not_fit(tmp_path):
+def test_pybullet_accepts_its_own_options_and_reports_wrong_lengths(tmp_path):
     rest = {"lowerLimits": [-1.0] * 3, "upperLimits": [1.0] * 3, "jointRanges": [2.0] * 3, "resetPoses": [0.1] * 3}
     arm = planar_arm(tmp_path, solver="pybullet", **rest)
     assert arm.upper == (1.0, 1.0, 1.0)

@@ -14,7 +14,7 @@ LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.u
 OPTIONS = {"urdf_filename": str(LWR), "base_link": "lwr_arm_0_link", "tip_link": "end_effector_ball"}
 
 
-def test_an_unknown_solver_is_named_with_the_known_ones_and_the_one_that_was_meant():
+def test_unknown_solver_is_reported_with_known_names_and_a_suggestion():
     with pytest.raises(UnknownNameError, match=r"unknown solver 'tracik': known are kdl, .*did you mean 'trac_ik'"):
         make_solver("tracik", OPTIONS)
 
@@ -34,7 +34,7 @@ def test_a_class_of_another_package_serves_where_a_name_does():
         (":KdlSolver", "solver ':KdlSolver': expected a name like 'my_package.my_module:MyClass'"),
     ],
 )
-def test_a_class_that_is_not_there_or_no_solver_is_named(name, message):
+def test_missing_class_or_class_that_is_no_solver_is_named(name, message):
     with pytest.raises(ConfigError, match=message):
         SOLVERS.configured(name)
 
@@ -74,7 +74,7 @@ def test_packages_in_the_file_name_are_resolved(monkeypatch):
         assert len(make_solver("kdl", OPTIONS | {"urdf_filename": name}).joint_names) == 7
 
 
-def test_a_library_that_is_missing_costs_nothing_until_its_solver_is_asked_for():
+def test_missing_library_matters_only_when_its_solver_is_requested():
     program = f"""
 import sys
 sys.modules["pytracik"] = None

@@ -70,7 +70,7 @@ def test_a_failure_leads_nowhere(solver):
     assert solver.starts[-1] == {"shoulder": 0.3, "elbow": 0.4}
 
 
-def test_continuity_begins_at_the_first_start_and_goes_no_faster_than_the_joints(solver, smooth):
+def test_continuity_begins_at_the_first_start_within_joint_velocities(solver, smooth):
     first = smooth.solve(at(0.5, 0.0, shoulder=-0.5, elbow=0.2), 10.0)
     assert first.positions == (-0.5, 0.2) and "0% of the way" in first.message
     second = smooth.solve(at(0.5, 0.0, shoulder=0.9, elbow=0.9), 10.01)
@@ -84,7 +84,7 @@ def test_continuity_begins_within_limits(smooth):
     assert smooth.solve(at(0.5, 0.0, shoulder=-7.0, elbow=1.2), 1.0).positions == (-1.0, 1.0)
 
 
-def test_continuity_refuses_to_begin_at_some_joints_and_makes_nothing_up(solver, smooth):
+def test_continuity_refuses_a_start_that_lacks_joints(solver, smooth):
     for start in ({"finger": 0.02}, {"shoulder": 0.4}):
         with pytest.raises(ValueError, match=r"start: continuity begins there.* lacks .*elbow"):
             smooth.solve(at(0.5, 0.5, **start), 1.0)
@@ -108,7 +108,7 @@ def test_a_restarted_stream_begins_at_the_next_start(smooth):
 
 
 @pytest.mark.parametrize("hold", [True, False])
-def test_without_a_solution_targets_go_on_to_the_last_one_if_asked_to(solver, hold):
+def test_hold_continues_to_the_last_target_without_a_solution(solver, hold):
     config = JointRateLimiterConfig(hold=hold)
     stream = ProblemStream(solver, JointRateLimiter(config, JOINTS, solver.velocity_limits))
     nowhere = IKProblem()

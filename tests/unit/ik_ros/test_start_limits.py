@@ -8,7 +8,7 @@ from ik_ros.solver import StartLimits
 from robot_model.limits import Limits
 
 
-def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):
+def test_each_joint_outside_limits_is_reported_once(caplog):
     starts = StartLimits(("a", "b"), Limits((-1.0, -1.0), (1.0, 1.0), (False, False)))
     with caplog.at_level(logging.WARNING, "ik_ros"):
         for start, inside in [

@@ -99,7 +99,7 @@ def test_jacobian_is_the_derivative_of_the_values(tmp_path, kind, floating):
     assert checked > 20
 
 
-def test_jacobian_of_balance_is_that_of_the_centre_of_mass_over_feet_that_stand(tmp_path):
+def test_jacobian_of_balance_follows_centre_of_mass_over_supporting_feet(tmp_path):
     robot = robot_with_shapes(tmp_path, floating=False)
     task = make_task(robot, "com_in_support")
     q = random_configuration(robot, 1)
@@ -113,7 +113,7 @@ def test_jacobian_of_balance_is_that_of_the_centre_of_mass_over_feet_that_stand(
         assert (task.rows(ahead).values - rows.values) / 1e-6 == pytest.approx(rows.jacobian[:, i], abs=1e-4)
 
 
-def test_values_of_a_pose_are_how_far_off_it_is_along_and_about_the_axes_of_the_goal(tmp_path):
+def test_values_of_a_pose_task_are_errors_in_goal_axes(tmp_path):
     robot = robot_with_shapes(tmp_path, floating=False)
     q = random_configuration(robot, 3)
     robot.update(q)
@@ -174,7 +174,7 @@ def test_limits_on_speed_are_around_the_previous_solution(tmp_path):
     assert task.rows(q).beyond() == pytest.approx([0.5 - 0.2 - 0.01])
 
 
-def test_limits_on_acceleration_are_around_where_the_last_two_solutions_lead(tmp_path):
+def test_acceleration_limits_extrapolate_from_the_last_two_solutions(tmp_path):
     robot = robot_with_shapes(tmp_path, floating=False)
     task = make_task(robot, "acceleration_limits")
     q = robot.configuration({"left_1": 0.5})
@@ -206,7 +206,7 @@ def test_frames_away_from_the_root_can_be_the_base(tmp_path):
 
 
 @pytest.mark.parametrize("floating", [False, True])
-def test_the_centre_of_mass_is_that_of_all_links(tmp_path, floating):
+def test_centre_of_mass_includes_all_links(tmp_path, floating):
     robot = robot_with_shapes(tmp_path, floating)
     q = random_configuration(robot, 2)
     robot.update(q)

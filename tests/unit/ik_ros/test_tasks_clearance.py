@@ -63,7 +63,7 @@ def test_distances_agree_with_pybullet(client, first, second):
 
 
 @pytest.mark.parametrize("kinds", [("sphere", "box"), ("box", "box"), ("sphere", "sphere"), ("capsule", "capsule")])
-def test_shapes_in_the_same_place_have_a_way_out(kinds):
+def test_coinciding_shapes_have_a_direction_of_separation(kinds):
     shapes = [placed(kind, np.zeros(3), np.eye(3)) for kind in kinds]
     found = clearance(*shapes[0], *shapes[1])
     assert found.distance < -0.05

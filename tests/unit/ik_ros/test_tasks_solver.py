@@ -92,7 +92,7 @@ def test_frames_on_links_reach_as_links_do():
     assert max(map(abs, (*off.position, *off.quat_xyzw[:3]))) < 1e-3
 
 
-def test_targets_out_of_reach_fail_with_words_and_the_best_within_limits():
+def test_unreachable_target_fails_with_message_and_best_pose_within_limits():
     solution = iiwa(restarts=3).solve(IKProblem(target=Pose((3.0, 0.0, 0.0))))
     assert not solution.success
     assert solution.message.startswith("'reach' is off by ")
@@ -109,7 +109,7 @@ def test_equal_problems_have_equal_answers():
     assert answers[0] == answers[1] == [first.solve(problem) for problem in problems]
 
 
-def test_tolerances_of_problems_are_along_and_about_the_axes_of_the_target():
+def test_problem_tolerances_are_in_the_axes_of_the_target():
     solver = iiwa()
     target = pose_of(solver, IIWA_TIP, (0.3, 0.6, 0.2, -1.0, 0.4, 0.5, 0.1))
     far = Pose((target.position[0], target.position[1], target.position[2] + 2.0), (0.0, 0.0, 0.0, 1.0))
@@ -121,7 +121,7 @@ def test_tolerances_of_problems_are_along_and_about_the_axes_of_the_target():
     assert np.hypot(reached.position[0] - far.position[0], reached.position[1] - far.position[1]) < 1.1e-3
 
 
-def test_costs_give_way_to_constraints_and_those_that_are_not_required_do_not_matter(urdf):
+def test_constraints_outrank_costs_and_optional_costs_may_fail(urdf):
     text = """
       constraints: [{name: hand, type: frame_position, frame: left_hand, goal: [0.0, 0.3, 0.7]}]
       costs: [{name: wish, type: frame_position, frame: left_hand, goal: [0.0, 0.3, 5.0], weight: 10.0}]
@@ -150,7 +150,7 @@ def test_weights_decide_between_costs(urdf):
         assert pose_of(solver, "left_arm", solution.positions).position[2] == pytest.approx(height, abs=0.01)
 
 
-def test_goals_of_problems_replace_those_of_the_formulation_for_one_time(urdf):
+def test_goals_of_a_problem_replace_formulation_goals_once(urdf):
     solver = make(urdf, "constraints: [{name: bend, type: posture, goal: {left_1: 0.5}}]")
     index = solver.joint_names.index("left_1")
     for goals, expected in (({}, 0.5), ({"bend": [0.9]}, 0.9), ({}, 0.5)):
@@ -158,7 +158,7 @@ def test_goals_of_problems_replace_those_of_the_formulation_for_one_time(urdf):
         assert solution.success and solution.positions[index] == pytest.approx(expected, abs=1e-3)
 
 
-def test_only_chosen_joints_move_and_the_others_stay_at_the_start(urdf):
+def test_only_chosen_joints_move_and_others_keep_the_start(urdf):
     solver = make(
         urdf,
         "{joints: [right_2, left_1], costs: [{name: reach, type: frame_position, frame: left_hand, axes: [z]}]}",
@@ -169,7 +169,7 @@ def test_only_chosen_joints_move_and_the_others_stay_at_the_start(urdf):
         assert solution.success, solution.message
 
 
-def test_limits_on_speed_hold_from_solution_to_solution_and_the_target_is_reached_in_several(urdf):
+def test_speed_limits_hold_between_solutions_until_the_target_is_reached(urdf):
     solver = make(
         urdf,
         """
@@ -261,7 +261,7 @@ def test_questions_that_make_no_sense_are_refused(problem, error, words):
         "type: closeness",
     ],
 )
-def test_previous_solutions_that_lack_a_joint_are_refused_since_limits_would_vanish(urdf, task):
+def test_previous_solutions_that_lack_a_joint_are_refused(urdf, task):
     solver = make(urdf, f"constraints: [{{name: slow, {task}}}]")
     whole = dict.fromkeys(solver.joint_names, 0.1)
     part = {name: position for name, position in whole.items() if name != "left_1"}
@@ -328,7 +328,7 @@ def test_poses_may_be_expressed_in_any_link(urdf, base):
         assert com_from_base == pytest.approx((to_base @ Pose(tuple(com))).position, abs=1e-6)
 
 
-def test_a_hand_gets_where_it_shall_be_in_the_other_hand(urdf):
+def test_hand_reaches_a_pose_relative_to_the_other_hand(urdf):
     task = "{costs: [{name: reach, type: frame_pose, frame: right_hand}], base_frame: left_hand}"
     solver, from_root = make(urdf, task), make(urdf, "costs: [{name: stay, type: closeness}]")
     target = pose_of(solver, "right_hand", [0.3, -0.4, 0.5, 0.2, 0.6])
@@ -362,7 +362,7 @@ def test_tasks_of_users_are_named_by_module_and_class(urdf):
     assert (positions["left_1"], positions["left_2"]) == pytest.approx((-0.1, -0.2), abs=2e-3)
 
 
-def test_what_a_task_of_a_user_refuses_is_told_with_its_place(urdf):
+def test_errors_of_user_tasks_are_reported_with_their_place(urdf):
     task = "{name: upright, type: 'level_task:Level', frame: left_hnd}"
     with pytest.raises(ConfigError, match=r"costs\[0\]: unknown link 'left_hnd'.*; did you mean 'left_hand'"):
         make(urdf, f"costs: [{task}]")
@@ -372,7 +372,7 @@ def test_what_a_task_of_a_user_refuses_is_told_with_its_place(urdf):
     ("module", "library", "extra"),
     [("tasks", "pinocchio", "ik"), ("tasks", "daqp", "ik"), ("trajectory", "casadi", "mpc")],
 )
-def test_a_missing_extra_is_named_with_what_to_type(monkeypatch, module, library, extra):
+def test_missing_extra_is_reported_with_its_install_command(monkeypatch, module, library, extra):
     monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.delitem(sys.modules, f"ik_ros.solvers.{module}", raising=False)
     with pytest.raises(MissingDependency, match=f"'{library}' is not installed: ./rpbi setup {extra}"):
@@ -382,7 +382,7 @@ def test_a_missing_extra_is_named_with_what_to_type(monkeypatch, module, library
 @pytest.mark.parametrize(
     "target", [(0.5, 0.2, 1.0), (0.6, 0.1, 0.7), (0.5, 0.3, 0.4), (0.0, 0.6, 1.2), (0.3, 0.3, 1.7), (0.9, 0.2, 1.0)]
 )
-def test_talos_reaches_with_both_feet_fixed_and_its_centre_of_mass_over_them(target):
+def test_talos_reaches_with_fixed_feet_and_centre_of_mass_above(target):
     solver = make_solver("tasks", load_config(str(TALOS)), str(TALOS))
     assert isinstance(solver, TasksSolver)
     solution = solver.solve(IKProblem(target=Pose(target), goals={"look": target}))
@@ -404,7 +404,7 @@ def test_talos_reaches_with_both_feet_fixed_and_its_centre_of_mass_over_them(tar
     assert data.oMf[robot.model.getFrameId("gripper_left_base_link")].translation == pytest.approx(target, abs=1e-3)
 
 
-def test_talos_keeps_its_balance_when_the_target_is_out_of_reach():
+def test_talos_stays_balanced_when_the_target_is_unreachable():
     solver = make_solver("tasks", load_config(str(TALOS)), str(TALOS))
     solution = solver.solve(IKProblem(target=Pose((1.5, 0.0, 1.0))))
     assert not solution.success
@@ -412,7 +412,7 @@ def test_talos_keeps_its_balance_when_the_target_is_out_of_reach():
     assert "balance" not in solution.message
 
 
-def test_joints_that_do_not_move_are_passed_over_as_joint_states_have_them_too():
+def test_fixed_joints_of_joint_states_are_ignored():
     solver = make("{rpbi_examples}/robots/kuka_lwr.urdf", "costs: [{name: stay, type: closeness}]")
     assert "base_joint" not in solver.joint_names
     start = {"lwr_arm_1_joint": 0.3, "base_joint": 0.0}

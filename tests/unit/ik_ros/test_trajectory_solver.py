@@ -108,7 +108,7 @@ def test_limits_on_speed_and_acceleration_hold_all_along(kinematics):
     assert np.abs(np.diff(velocities, axis=0)).max() / 0.001 <= 3.0 + 1e-6
 
 
-def test_limits_on_speed_are_those_of_the_urdf_unless_options_say_otherwise(kinematics):
+def test_velocity_limits_come_from_the_urdf_unless_options_override_them(kinematics):
     target = kinematics.forward((0.9, 0.8, 0.1, -1.0, 0.2, 0.6, 0.3), TIP)
     for limits, most in (({}, 10.0), ({"velocity_limits": dict.fromkeys(JOINTS, 60.0)}, 60.0)):
         solution = iiwa(**limits, sample_s=0.001).solve(IKProblem(start=start(), waypoints=(Waypoint(0.04, target),)))

@@ -15,7 +15,7 @@ LEARNED = {name: make_primitive(name, {}).learn([reach(seed) for seed in range(3
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_force_moves_the_motion_as_a_spring_does_and_no_force_lets_it_back(name):
+def test_force_deflects_the_motion_like_a_spring_until_it_ends(name):
     goal, force = reach().points[-1], ForceCoupling(stiffness=[200.0] * 3 + [10.0] * 3)
     execution = LEARNED[name].begin(goal=goal, duration_s=2.0)
     force.force = [0.0, 0.0, 10.0, 0.0, 1.0, 0.0]
@@ -30,7 +30,7 @@ def test_a_force_moves_the_motion_as_a_spring_does_and_no_force_lets_it_back(nam
     assert execution.is_at_goal()
 
 
-def test_a_rhythm_gives_way_too():
+def test_rhythm_yields_to_a_force():
     primitive, force = make_primitive("rhythmic_dmp", {}).learn(stir()), ForceCoupling(100.0, [5.0, 0, 0, 0, 0, 0])
     pushed, free = primitive.plan(couplings=[force]), primitive.plan()
     assert (pushed.positions - free.positions)[-100:, 0] == pytest.approx(0.05, abs=1e-4)
@@ -38,7 +38,7 @@ def test_a_rhythm_gives_way_too():
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("seed", range(6))
-def test_an_obstacle_near_the_way_is_avoided_and_the_goal_reached(name, seed):
+def test_obstacle_near_the_path_is_avoided_and_the_goal_reached(name, seed):
     rng = np.random.default_rng(seed)
     free = LEARNED[name].plan(dt_s=0.02)
     center = free.positions[rng.integers(30, 70) * len(free.times) // 100] + rng.normal(0.0, 0.01, 3)

@@ -43,7 +43,7 @@ def changed(array: np.ndarray, index: object, value: object) -> np.ndarray:
         ((TIMES, PATH, None, ("a", "b", "a")), "one column for each of a, b, a"),
     ],
 )
-def test_what_is_wrong_is_named(arguments, text):
+def test_invalid_demonstrations_are_refused_with_a_reason(arguments, text):
     with pytest.raises(DemonstrationError, match=text):
         Demonstration.of(*arguments)
 

@@ -43,7 +43,7 @@ def test_a_primitive_is_read_as_it_was_saved(name, tmp_path):
         (lambda data: data.update(more=1), "more: unknown key 'more'"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_named(change, text, tmp_path):
+def test_faults_in_a_file_are_named(change, text, tmp_path):
     path = tmp_path / "it.yaml"
     save(make_primitive("dmp", {}).learn(SHOWN["dmp"]), path)
     data = yaml.safe_load(path.read_text())
@@ -53,7 +53,7 @@ def test_what_is_wrong_in_a_file_is_named(change, text, tmp_path):
         load(path)
 
 
-def test_what_was_not_learned_is_not_saved(tmp_path):
+def test_primitive_that_learned_nothing_is_not_saved(tmp_path):
     (tmp_path / "it.yaml").write_text("before")
     with pytest.raises(NotLearnedError):
         save(make_primitive("dmp", {}), tmp_path / "it.yaml")

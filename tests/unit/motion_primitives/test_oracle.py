@@ -64,7 +64,7 @@ def test_orientations_to_a_fixed_goal():
     assert found == pytest.approx(signs * wxyz[:, [1, 2, 3, 0]], abs=1e-6)
 
 
-def test_what_is_learned_for_a_fixed_goal():
+def test_forcing_terms_of_a_fixed_goal_equal_the_oracles():
     """Forcing terms are compared: of weights that hardly count at the end, both libraries have other ones."""
     shown = of_oracle("demonstration")
     demonstration = Demonstration.of(shown["times"], shown["positions"], shown["quats_xyzw"])

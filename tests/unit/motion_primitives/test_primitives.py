@@ -89,7 +89,7 @@ def test_the_path_does_not_depend_on_the_duration(name):
 
 @pytest.mark.parametrize("name", DISCRETE)
 @pytest.mark.parametrize("progress", [0.1, 0.5, 0.8])
-def test_another_goal_on_the_way(name, progress):
+def test_goal_can_change_during_the_motion(name, progress):
     goal = [0.6, 0.2, 0.5, 0.0, math.sin(0.4), 0.0, math.cos(0.4)]
     execution, states = LEARNED[name].begin(goal=SHOWN[0].points[-1], duration_s=5.0), []
     for step in range(525):
@@ -169,7 +169,7 @@ def test_via_points_are_passed():
         check_velocities(plan, 5e-3)
 
 
-def test_a_via_point_leaves_less_freedom_near_it_and_none_at_it():
+def test_via_point_reduces_the_spread_near_it():
     primitive, looks = LEARNED["promp"], np.linspace(0.0, 1.0, 21)
     given = primitive.conditioned([ViaPoint(0.5, SHOWN[1].points[500], 1e-4)])
     free, left = primitive.stds(looks), primitive.stds(looks, given)
@@ -177,7 +177,7 @@ def test_a_via_point_leaves_less_freedom_near_it_and_none_at_it():
     assert left[10] == pytest.approx(1e-4, rel=0.01) and (left[9] < 0.9 * free[9]).all()
 
 
-def test_the_spread_is_that_of_the_demonstrations():
+def test_spread_equals_that_of_the_demonstrations():
     free = make_primitive("promp", {"prior": 1e-6}).learn(SHOWN)
     shown = np.std([each.points[500, :3] for each in SHOWN], axis=0)
     assert free.stds([0.5])[0, :3] == pytest.approx(shown, rel=0.05)
@@ -270,7 +270,7 @@ def test_a_rhythm_is_found_from_anywhere():
     assert plan.positions[-100:] == pytest.approx(STIRRING.plan(duration_s=8.5).positions[-100:], abs=1e-4)
 
 
-def test_the_rhythm_changes_on_the_way():
+def test_rhythm_can_change_during_the_motion():
     execution = STIRRING.begin(duration_s=60.0)
     for _ in range(200):
         execution.step(0.01)

@@ -20,7 +20,7 @@ REQUEST = {
 }  # fmt: skip
 
 
-def test_what_is_learned_is_the_formula_of_the_release():
+def test_learned_function_follows_the_formula_of_the_release():
     assert TAU == 2.0 and len(PRIMITIVES) == 2 and PRIMITIVES[0].f_domain == tuple(TIMES / 2.0)
     index, k, d = 40, 100.0, 20.0
     t, h = TIMES[index], TIMES[1]
@@ -38,7 +38,7 @@ def test_a_demonstration_is_repeated():
     assert found.velocities[1:98] == pytest.approx(np.gradient(SHOWN, TIMES, axis=0)[2:99], abs=0.01)
 
 
-def test_a_plan_goes_on_until_it_is_at_another_goal():
+def test_plan_continues_until_it_reaches_another_goal():
     goal = [0.5, 1.0]
     found = plan(PRIMITIVES, **{**REQUEST, "goal": goal, "tau": 4.0})
     assert found.is_at_goal and found.times[-1] >= 4.0
@@ -56,7 +56,7 @@ def test_segments_and_starts_in_the_middle():
     assert rest.positions[-1] == pytest.approx(whole.positions[-1], abs=0.02)
 
 
-def test_the_start_velocity_is_that_of_the_plan():
+def test_plan_begins_with_the_requested_velocity():
     found = plan(PRIMITIVES, **{**REQUEST, "x_dot_0": [1.0, 0.0], "tau": 4.0, "dt": 1e-3, "integrate_iter": 1})
     assert (found.positions[0] - SHOWN[0])[0] / 1e-3 == pytest.approx(1.0)
 

@@ -36,7 +36,7 @@ def test_hips_shoulders_and_neck_are_where_the_tables_have_them(height_m):
     assert width["LeftUpperArm"] - width["RightUpperArm"] == pytest.approx(2 * 0.129)
 
 
-def test_every_segment_but_the_pelvis_has_a_joint_and_left_mirrors_right():
+def test_every_segment_but_pelvis_has_a_joint_left_mirrors_right():
     assert [joint.child for joint in JOINTS] == list(SEGMENTS[1:])
     assert len(set(HINGES)) == len(HINGES) == 66
     assert [joint.parent for joint in JOINTS] == [SEGMENTS[parent] for parent in PARENTS[1:]]
@@ -48,12 +48,12 @@ def test_every_segment_but_the_pelvis_has_a_joint_and_left_mirrors_right():
             assert (low, high) == (other if hinge.endswith("y") else (-other[1], -other[0]))
 
 
-def test_the_shipped_file_is_what_the_function_returns():
+def test_shipped_urdf_equals_the_generated_one():
     shipped = Path(replace_package("{rpbi_examples}/robots/human_model.urdf")).read_text()
     assert shipped == human_urdf(1.75, 75.0)
 
 
-def test_lengths_come_back_from_the_urdf_and_from_any_pose_of_a_suit():
+def test_segment_lengths_are_recovered_from_urdf_and_any_suit_pose():
     offsets = segment_offsets(1.62)
     assert urdf_offsets("her", human_urdf(1.62, 60.0)) == pytest.approx(offsets, abs=1e-6)
     random = np.random.default_rng(1)
@@ -78,7 +78,7 @@ def test_a_body_is_made_for_measured_lengths():
         ((1.75, 75.0, np.ones((22, 3))), "expected 23 x 3 finite numbers"),
     ),
 )
-def test_nobody_is_so(arguments, message):
+def test_impossible_height_or_mass_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         human_urdf(*arguments)
 

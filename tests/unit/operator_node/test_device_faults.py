@@ -124,7 +124,7 @@ def played(device: Gamepad) -> tuple[DeviceFeed, list[Reading]]:
 
 
 @pytest.mark.parametrize("seed, name", enumerate(FAULTS))
-def test_each_fault_is_named_and_what_is_right_counts_on(seed, name, caplog):
+def test_each_fault_is_named_and_valid_readings_continue(seed, name, caplog):
     """Where, when and how often is up to the seed."""
     generator, (spoil, reason) = random.Random(seed), FAULTS[name]
     says: list[Any] = moved(generator)
@@ -158,7 +158,7 @@ def test_a_sound_device_has_no_fault():
     ],
     ids=["stuck", "swapped", "button stuck"],
 )
-def test_what_is_never_at_rest_moves_nothing_and_is_told(stuck, held, caplog):
+def test_device_never_at_rest_moves_nothing_and_is_reported(stuck, held, caplog):
     feed, published = played(Gamepad([stuck] * 10))
     assert published == [Reading((0.0, 0.0, 1.0), (0, 0))] and ", ".join(feed.held) == held
     feed._held_warning_due_s -= HELD_S
@@ -204,7 +204,7 @@ def test_a_full_scale_that_is_too_small_is_named():
     assert device._refused == ["a motion beyond full_scale, which is cut off there"] and device._motion[1] == -1.0
 
 
-def test_a_device_that_is_cut_while_it_is_held_comes_back_at_rest():
+def test_device_disconnected_while_held_returns_at_rest():
     says = [Reading((0.0, 0.0, 1.0), (0, 0)), Reading((0.08, 0.0, 1.0), (0, 0)), DeviceError("gamepad", "cut")]
     says += [Reading((0.8, 0.0, 1.0), (1, 0))]
     feed, published = played(Gamepad(says))

@@ -73,7 +73,7 @@ def at(x: float, y: float = 0.0, a: int = 0) -> Reading:
     return Reading((x, y), (a,))
 
 
-def test_what_changes_is_handed_on_and_what_does_not_is_not():
+def test_only_changed_readings_are_published():
     _, published = played(Tape(at(0), at(0), at(0.5), at(0.5), at(0.5, 0, 1), at(0)))
     assert published == [at(0), at(0.5), at(0.5, 0, 1), at(0)]
 
@@ -91,7 +91,7 @@ def test_what_changes_is_handed_on_and_what_does_not_is_not():
         (Reading((0.0, 0.0), ()), "a reading whose number of buttons differs from the 1 of the device"),
     ],
 )
-def test_a_reading_that_makes_no_sense_is_counted_and_the_last_good_one_counts_on(bad, reason, caplog):
+def test_invalid_reading_is_counted_and_the_last_valid_one_kept(bad, reason, caplog):
     with caplog.at_level(logging.WARNING, "operator_node"):
         feed, published = played(Tape(at(0), at(0.3), bad, bad, at(0.4)))
     assert published == [at(0), at(0.3), at(0.4)]
@@ -100,13 +100,13 @@ def test_a_reading_that_makes_no_sense_is_counted_and_the_last_good_one_counts_o
     assert warning.startswith(f"tape: refused: {reason}")
 
 
-def test_what_the_device_refused_itself_is_counted_and_read_on():
+def test_readings_refused_by_the_device_are_counted_and_reading_continues():
     feed, published = played(Tape(at(0), at(0)._replace(refused=("torn", "torn")), at(0.2)._replace(refused=("torn",))))
     assert feed.refused == {"torn": 3}
     assert [reading.axes for reading in published] == [(0, 0), (0.2, 0)]
 
 
-def test_an_axis_or_button_that_is_held_at_the_start_stays_at_rest_until_it_was_there():
+def test_input_held_at_start_counts_as_rest_until_released():
     """Each for itself; in passing rest by leaps it is not there."""
     tape = [at(0.9, 0.0, 1), at(-0.8, 0.6, 1), at(0.9 * AT_REST, 0.7, 0), at(0.5, 0.8, 1)]
     _, published = played(Tape(*tape))
@@ -140,7 +140,7 @@ def test_no_start_reset_or_return_jumps():
 @pytest.mark.parametrize(
     "failure", (DeviceError("tape", "cut"), RuntimeError("torn"), OSError(5, "input/output error"))
 )
-def test_whatever_it_raises_it_comes_to_rest_and_is_opened_again(failure, caplog):
+def test_failing_device_returns_to_rest_and_is_opened_again(failure, caplog):
     device = Tape(at(0), at(0.5), failure, at(0), at(0.2))
     feed, published = feed_of(device)
     with caplog.at_level(logging.INFO, "operator_node"):
@@ -179,14 +179,14 @@ def test_a_missing_library_is_an_error():
         feed.step(0.0)
 
 
-def test_what_the_person_closes_is_over():
+def test_device_closed_by_its_person_ends_the_feed():
     device = Tape(at(0), at(1), DeviceClosedError("tape", "its window was closed"))
     feed, published = feed_of(device)
     feed.run(lambda: False, STEP_S)
     assert published[-1] == at(0) and device.closed == 1 and feed.problem == "closed"
 
 
-def test_a_reading_is_repeated_at_a_rate_and_its_events_are_not():
+def test_reading_is_repeated_at_a_rate_without_its_events():
     device = Tape(at(0), at(0.5)._replace(events=("click",)))
     feed, published = feed_of(device, autorepeat_rate=200.0)
     for _ in tries("it is repeated"):
@@ -197,13 +197,13 @@ def test_a_reading_is_repeated_at_a_rate_and_its_events_are_not():
     assert [reading.events for reading in published if reading.events] == [("click",)]
 
 
-def test_motions_within_the_interval_are_one_reading_and_buttons_wait_for_nothing():
+def test_motions_within_the_interval_are_merged_but_buttons_are_immediate():
     tape = [at(0), at(0.1), at(0.2), at(0.3), at(0.3, 0, 1), at(0.4, 0, 1), at(0.5, 0, 0)]
     _, published = played(Tape(*tape), coalesce_interval=10.0)
     assert published == [at(0), at(0.3, 0, 1), at(0.5, 0, 0)]
 
 
-def test_what_is_posted_is_done_in_the_feeds_thread_and_may_fail(caplog):
+def test_posted_calls_run_in_the_feed_and_may_fail(caplog):
     feed, _ = played(Tape(at(0)))
     done = []
     feed.post(lambda: 1 / 0)

@@ -24,7 +24,7 @@ def angle(a: AvatarPose, b: AvatarPose) -> float:
     return (Rotation.from_quat(a.quat_xyzw).inv() * Rotation.from_quat(b.quat_xyzw)).magnitude()
 
 
-def test_no_step_is_larger_than_speed_times_time_at_start_and_reconnect():
+def test_no_step_exceeds_speed_times_time_at_start_or_reconnect():
     random = np.random.default_rng(0)
     for _ in range(300):
         engagement = Engagement(JOINT_SPEED, SPEED, ANGULAR_SPEED)

@@ -46,7 +46,7 @@ def test_a_force_fades_before_it_ends():
     assert max(a - b for a, b in zip(forces, forces[1:])) < 0.5 * forces[0]
 
 
-def test_forces_are_clamped_and_grow_no_faster_than_the_slew_limit():
+def test_forces_are_clamped_and_obey_the_slew_limit():
     rig, draw = Rig(slew_n_per_s=500.0, passivity=False), random.Random(1)
     last = (0.0, 0.0, 0.0)
     for tick in range(2000):
@@ -59,7 +59,7 @@ def test_forces_are_clamped_and_grow_no_faster_than_the_slew_limit():
         last = force
 
 
-def test_limiter_refuses_what_is_not_finite():
+def test_limiter_replaces_non_finite_forces_by_zero():
     limiter = ForceLimiter(10.0, 1000.0)
     for force in ((math.nan, 0.0, 0.0), (math.inf, 1.0, 0.0), (1e300, 1e300, 0.0)):
         assert limiter.limited(force, 0.001) == (0.0, 0.0, 0.0)
@@ -91,7 +91,7 @@ def test_nothing_jumps_at_start_reset_and_return():
             last = way
 
 
-def test_the_clutch_moves_the_tool_only_while_its_button_is_held():
+def test_clutch_moves_the_tool_only_while_its_button_is_held():
     rig = Rig(clutch_button=0)
     held = 0
 
@@ -131,7 +131,7 @@ def test_axes_are_turned_there_and_back():
     assert rig.controller.force == pytest.approx((1.0, 0.0, 0.0), abs=1e-3)
 
 
-def test_a_controller_goes_on_from_where_another_got_to():
+def test_controller_continues_from_the_displacement_of_its_predecessor():
     way = (0.02, 0.03, -0.04)
     config = ForceFeedbackConfig(yaw_deg=90.0, motion_scale=(2.0, 0.5, 1.0))
     controller = HapticController(config, DEVICE, 1.0 / DT_S, way)
@@ -151,6 +151,6 @@ def test_a_controller_goes_on_from_where_another_got_to():
         (ScriptedConfig, {"max_force_n": 0.0}, "max_force_n"),
     ],
 )
-def test_wrong_options_are_told(model, options, told):
+def test_wrong_options_are_reported(model, options, told):
     with pytest.raises(ConfigError, match=told):
         model.parse(options, "test")

@@ -62,7 +62,7 @@ def test_faults_of_devices_are_named(fault, seed):
     assert max(rig.controller.faults, key=rig.controller.faults.get) == fault, rig.controller.faults
 
 
-def test_a_sign_of_a_quaternion_that_flips_is_the_same_orientation():
+def test_quaternion_with_flipped_sign_is_the_same_orientation():
     rig = Rig()
     for tick in range(100):
         sign = 1.0 if tick % 2 else -1.0
@@ -106,7 +106,7 @@ def fuzzed(draw: random.Random) -> str | bytes:
     return json.dumps(message)
 
 
-def test_10_000_fuzzed_frames_end_in_finite_states_or_in_a_reason():
+def test_fuzzed_frames_give_finite_states_or_a_reason():
     draw, refused, taken = random.Random(3), 0, 0
     for _ in range(10_000):
         frame = fuzzed(draw)

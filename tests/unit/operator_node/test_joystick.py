@@ -84,7 +84,7 @@ def test_axes_of_another_joystick_may_be_triggers(gamepad):
         (16384, 0.0, -0.50002),
     ],
 )
-def test_dead_zone_is_that_of_joy_node(raw, deadzone, value):
+def test_dead_zone_equals_that_of_joy_node(raw, deadzone, value):
     assert axis_of(raw, deadzone) == pytest.approx(value, abs=3e-5)
 
 
@@ -118,7 +118,7 @@ def test_a_force_is_felt_as_rumbling(gamepad):
     device.cue((1.0, 0.0, 0.0))
 
 
-def test_joysticks_are_told_apart_by_number_and_name(gamepad):
+def test_joysticks_are_selected_by_number_or_name(gamepad):
     other = VirtualJoystick("flight stick")
     reader = opened(dev_name="flight")
     other.move([-1.0])
@@ -136,7 +136,7 @@ def test_joysticks_are_told_apart_by_number_and_name(gamepad):
     other.unplug()
 
 
-def test_another_one_that_goes_unopened_is_not_minded(gamepad):
+def test_unplugging_an_unopened_joystick_has_no_effect(gamepad):
     """pygame drops all events then."""
     reader = opened()
     VirtualJoystick("passing by").unplug()

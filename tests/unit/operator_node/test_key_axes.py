@@ -17,7 +17,7 @@ def test_names_and_codes_are_those_of_the_message():
     assert constants == KEY_CODES
 
 
-def test_an_axis_is_what_is_held_of_its_two_keys():
+def test_axis_value_follows_its_two_keys():
     keys = KeyAxes([("LEFT", "RIGHT"), ("b", "f")], ["1", "SPACE"])
     left, right, b, one = (KEY_CODES[name] for name in ("LEFT", "RIGHT", "b", "1"))
     assert keys.reading(()) == Reading((0.0, 0.0), (0, 0))

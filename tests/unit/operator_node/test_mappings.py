@@ -29,7 +29,7 @@ def test_scale_is_the_product_axis_by_axis(scale):
         assert mapping.map(axes) == pytest.approx(np.asarray(scale) * np.asarray(axes)[[2, 0, 3]])
 
 
-def test_isometric_is_scale_times_min_n_1_over_n_times_the_axes():
+def test_isometric_mapping_limits_the_norm_of_its_axes():
     mapping, generator = made("isometric", axes_idx=[1, 0, 2], scale=0.4), random.Random(2)
     for _ in range(100):
         a = np.asarray(random_axes(generator))[[1, 0, 2]]
@@ -47,7 +47,7 @@ def test_isometric_scales_axis_by_axis_after_the_limit():
 
 
 @pytest.mark.parametrize("name", MAPPINGS)
-def test_what_is_within_the_dead_zone_is_nothing_and_it_rises_to_the_same_end(name):
+def test_dead_zone_gives_zero_and_full_deflection_stays_full(name):
     mapping = made(name, axes_idx=[1], dead_zone=0.2)
     axes = (-1.0, -0.6, -0.2, -0.1, 0.0, 0.2, 0.21, 1.0)
     assert [mapping.map([1.0, axis])[0] for axis in axes] == pytest.approx([-1.0, -0.5, 0, 0, 0, 0, 0.0125, 1.0])
@@ -106,6 +106,6 @@ def test_bad_scale_is_refused_with_key_expected_and_got(name, scale, told):
     assert told in str(error.value)
 
 
-def test_unknown_mapping_is_told_with_the_known_ones():
+def test_unknown_mapping_is_reported_with_a_suggestion():
     with pytest.raises(UnknownNameError, match="did you mean 'isometric'"):
         MAPPINGS.make("isometrik", {"axes_idx": [0]})

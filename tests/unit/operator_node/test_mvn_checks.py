@@ -116,7 +116,7 @@ def test_time_that_goes_back_is_named():
     assert ("time", "went back by 1 s, from 2000 ms") in findings
 
 
-def test_what_was_lost_between_two_frames_makes_no_jump():
+def test_gap_between_two_frames_is_not_a_jump():
     sender, decoder, checks = suit(), StreamDecoder(), FrameChecks()
     for sample in (60, 120):
         assert checks.check(decoder.decode(*sender.datagrams(sample, sample / HZ)), sample / HZ) == []

@@ -51,7 +51,7 @@ def read_frame(device):
                 return reading, event
 
 
-def test_frames_come_through_the_socket_and_hands_count_from_the_first_one(mvn, sender):
+def test_received_hand_positions_are_relative_to_the_first_frame(mvn, sender):
     first = round((1.5 + 1.0) * HZ)  # a hand is on its way
     sender.send(*suit().datagrams(first, first / HZ))
     reading, frame = read_frame(mvn)
@@ -77,7 +77,7 @@ def test_silence_gives_zeros_once_and_the_hands_count_anew(mvn, sender):
     assert frame.sample == 10 and not any(reading.axes)
 
 
-def test_a_port_in_use_is_told(mvn):
+def test_port_in_use_is_reported(mvn):
     other = Mvn(MvnConfig(port=mvn.receiver.port))
     with pytest.raises(
         DeviceError, match=r"cannot listen at 127.0.0.1:\d+: Address already in use; does another program"
@@ -86,7 +86,7 @@ def test_a_port_in_use_is_told(mvn):
     other.close()
 
 
-def test_closed_and_opened_again_it_goes_on(mvn, sender):
+def test_reopened_receiver_continues(mvn, sender):
     config = MvnConfig(port=mvn.receiver.port)
     mvn.close()
     mvn.close()
@@ -97,7 +97,7 @@ def test_closed_and_opened_again_it_goes_on(mvn, sender):
     again.close()
 
 
-def test_what_is_refused_is_told_with_its_reason(mvn, sender):
+def test_refused_datagrams_are_counted_with_their_reason(mvn, sender):
     sender.send(b"", b"hello", b"MXTP05" + bytes(100))
     refused = []
     for _ in tries("all three are refused"):
@@ -178,7 +178,7 @@ class TestCalibration:
         with pytest.raises(InterfaceError, match=r"person 0: \w+ is \d+ deg off a T-pose; stand upright"):
             Calibration().fit(truth(300))
 
-    def test_of_nobody_is_refused(self, mvn):
+    def test_calibration_without_a_person_is_refused(self, mvn):
         with pytest.raises(InterfaceError, match="nobody is there"):
             mvn.receiver.calibrate()
 
@@ -212,7 +212,7 @@ class TestRecording:
     def test_is_as_the_documentation_says(self, path):
         assert path.read_bytes().startswith(b"MVN datagrams 1\n" + struct.pack(">dH", 0.0, 3) + b"one")
 
-    def test_that_was_cut_off_is_read_as_far_as_it_goes(self, path):
+    def test_truncated_recording_is_read_up_to_its_end(self, path):
         path.write_bytes(path.read_bytes()[:-1])
         assert [data for _, data in read_recording(path)] == [b"one", b""]
 

@@ -46,7 +46,7 @@ def by_hand(*, kind=b"02", sample=7, counter=0x80, count=23, time_ms=1234, perso
     return header + b"".join(items)
 
 
-def test_a_datagram_written_by_hand_has_760_bytes_and_becomes_a_frame():
+def test_handwritten_datagram_of_760_bytes_becomes_a_frame():
     data = by_hand()
     assert len(data) == 760
     frame = StreamDecoder().decode(data)
@@ -55,7 +55,7 @@ def test_a_datagram_written_by_hand_has_760_bytes_and_becomes_a_frame():
     np.testing.assert_array_equal(frame.quats_xyzw, [[0.0, 0.0, 0.0, 1.0]] * 23)
 
 
-def test_the_suit_writes_what_is_written_by_hand():
+def test_emulated_suit_writes_the_handwritten_datagram():
     ours = suit(3).frame(7, 1.234, np.tile([1.0, 0.5, 0.0], (23, 1)), np.tile([0.0, 0.0, 0.0, 1.0], (23, 1)))
     assert ours == [by_hand()]
 
@@ -198,7 +198,7 @@ def test_a_stream_that_begins_anew_is_followed():
     assert decoder.counts["late"] == 0
 
 
-def test_a_short_recording_that_is_played_again_and_again_is_followed():
+def test_short_recording_played_in_a_loop_is_followed():
     decoder, sender = StreamDecoder(), suit()
     taken = [decoder.decode(*sender.datagrams(n % 60, n / HZ)) is not None for n in range(180)]
     assert sum(taken) == 180 - 2 * MAX_LATE
@@ -211,7 +211,7 @@ def test_the_counter_may_turn_over():
     assert decoder.counts["skipped"] == decoder.counts["late"] == 0
 
 
-def test_a_datagram_from_far_ahead_does_not_lock_the_stream_out():
+def test_sample_number_from_far_ahead_does_not_lock_the_stream():
     decoder, sender = StreamDecoder(), suit()
     assert decoder.decode(*sender.datagrams(10, 0.1))
     assert decoder.decode(*sender.datagrams(2**31, 0.1))
@@ -234,7 +234,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("reason", BROKEN)
-def test_what_cannot_be_used_is_refused_with_its_reason(reason):
+def test_unusable_datagrams_are_refused_with_their_reason(reason):
     decoder = StreamDecoder()
     assert decoder.decode(BROKEN[reason]) is None
     assert decoder.counts[f"refused: {reason}"] == 1
@@ -248,7 +248,7 @@ def test_more_people_than_allowed_are_refused():
     assert decoder.counts["refused: too many people"] == 1 and decoder.counts["duplicate"] == 1
 
 
-def test_people_who_were_made_up_do_not_keep_out_those_who_come_for_long():
+def test_invented_people_do_not_block_a_persistent_person():
     decoder = StreamDecoder(max_people=2)
     for person in (7, 8):
         decoder.decode(*suit(person, kinds=(12,)).datagrams(0, 0.0))
@@ -257,7 +257,7 @@ def test_people_who_were_made_up_do_not_keep_out_those_who_come_for_long():
 
 
 @pytest.mark.filterwarnings("error")
-def test_broken_datagrams_raise_nothing_and_let_nothing_through_that_is_not_finite():
+def test_broken_datagrams_raise_no_error_and_give_only_finite_values():
     """Bits, bytes and whole fields change at random, in datagrams of all types."""
     generator = random.Random(5)
     good = [data for n in (0, 60) for data in suit(kinds=KINDS, items=9).datagrams(n, n / HZ)]

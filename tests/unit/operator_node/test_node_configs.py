@@ -28,7 +28,7 @@ from operator_node.node_configs import (
         (TeleopParameters, {"input_timeout_s": float("inf")}, "input_timeout_s: must be a finite number [s], got .inf"),
     ],
 )
-def test_what_is_wrong_is_named(model, data, told):
+def test_wrong_parameters_are_named(model, data, told):
     with pytest.raises(ConfigError) as error:
         model.parse(data, "~")
     assert told in str(error.value)

@@ -39,7 +39,7 @@ def test_without_the_controller_many_are_not(outcomes):
     assert sum(not each.is_passive for each in outcomes[1]) >= 0.3 * CASES
 
 
-def test_a_coarse_device_is_passive_if_its_resolution_is_known_and_else_below_the_bound():
+def test_coarse_device_is_passive_only_with_known_resolution():
     """The latter is the negative control: an energy that is counted from rounded positions is not the true one."""
     cases = [set_up(seed)._replace(resolution_m=1e-5) for seed in COARSE]
     known, unknown = ([run_set_up(case, TICKS, is_resolution_known=on) for case in cases] for on in (True, False))
@@ -64,7 +64,7 @@ def test_observer_counts_force_before_times_displacement():
     assert controller.energy_j == pytest.approx(0.01)
 
 
-def test_a_force_that_was_cut_amid_a_sample_counts_against_us():
+def test_force_cut_within_a_sample_counts_as_energy_given_out():
     controller = PassivityController(10.0, 200.0, 1.0, 0.001)
     for displacement, energy_j in (((0.0, 0.0, -0.001), 0.0), ((0.0, 0.0, 0.0005), -0.0005)):
         controller.energy_j = 0.0
@@ -74,7 +74,7 @@ def test_a_force_that_was_cut_amid_a_sample_counts_against_us():
         assert controller.energy_j == pytest.approx(energy_j)
 
 
-def test_energy_that_was_given_out_is_not_forgotten_when_the_handle_is_taken_anew():
+def test_negative_energy_is_kept_after_a_reset():
     controller = PassivityController(10.0, 200.0, 1.0, 0.001)
     controller.energy_j = -0.001
     controller.reset()
@@ -84,7 +84,7 @@ def test_energy_that_was_given_out_is_not_forgotten_when_the_handle_is_taken_ane
     assert controller.energy_j == 0.0
 
 
-def test_bound_is_what_the_page_derives():
+def test_energy_bound_equals_that_of_the_documentation():
     assert PassivityController(MAX_FORCE_N, MAX_ACCELERATION, 1.0, 0.001).floor_j == pytest.approx(-leak_j(0.0))
     coarse = PassivityController(MAX_FORCE_N, MAX_ACCELERATION, 1.0, 0.001, resolution_m=2e-5)
     assert coarse.floor_j == pytest.approx(-leak_j(2e-5)) and leak_j(2e-5) == pytest.approx(0.002866, abs=1e-6)

@@ -17,7 +17,7 @@ def arrays(window: SignalWindow, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("hz", [10, 100])
-def test_it_holds_what_is_as_old_as_its_duration_at_any_rate(hz):
+def test_window_holds_its_whole_duration_at_any_rate(hz):
     """Defect 41: 2 s held one sample."""
     window = SignalWindow(2.0)
     for step in range(5 * hz + 1):
@@ -39,7 +39,7 @@ def test_irregular_times_count_as_they_are():
     assert window.data() == [] and window.size == 0
 
 
-def test_time_that_goes_back_and_another_size_begin_a_new_window():
+def test_earlier_time_or_another_size_begins_a_new_window():
     window = SignalWindow(10.0)
     window.add(5.0, (1.0,))
     window.add(0.5, (2.0,))
@@ -48,7 +48,7 @@ def test_time_that_goes_back_and_another_size_begin_a_new_window():
     assert window.data() == [0.6, 3.0, 4.0] and window.size == 2
 
 
-def test_time_that_stands_still_does_not_fill_the_memory():
+def test_window_stays_bounded_when_time_stands_still():
     window = SignalWindow(1.0, most=10)
     for number in range(25):
         window.add(1.0, (number,))
@@ -56,7 +56,7 @@ def test_time_that_stands_still_does_not_fill_the_memory():
 
 
 @pytest.mark.parametrize("signal", [(), (math.nan,), (0.0, math.inf)])
-def test_what_is_no_signal_is_refused_and_nothing_is_lost(signal):
+def test_invalid_signal_is_refused_without_loss_of_data(signal):
     window = SignalWindow(1.0)
     window.add(0.0, (7.0,))
     with pytest.raises(ValueError, match="expected finite numbers"):

@@ -88,7 +88,7 @@ class Chattering(TestSpacenav):
         (Chattering(), "test_at_rest_it_has_nothing_to_say", (), "it keeps reporting readings at rest"),
     ],
 )
-def test_the_suite_notices_what_is_wrong(suite, test, arguments, complaint, tmp_path, monkeypatch):
+def test_conformance_suite_finds_planted_faults(suite, test, arguments, complaint, tmp_path, monkeypatch):
     suite.path = tmp_path / "spnav.sock"
     reader = Reader("spacenav", suite.make())
     try:
@@ -127,7 +127,7 @@ def test_axes_are_those_of_spacenav_node(daemon):
     reader.feed.close()
 
 
-def test_without_zero_when_static_only_what_is_small_comes_to_rest(daemon):
+def test_only_small_values_are_zeroed_without_zero_when_static(daemon):
     reader = opened(daemon, zero_when_static=False)
     reader.until(lambda: len(reader.feed.free_axes) == 6, "it is at rest")
     daemon.move(0, 0, 300, 20, 0, 0)
@@ -137,7 +137,7 @@ def test_without_zero_when_static_only_what_is_small_comes_to_rest(daemon):
     reader.feed.close()
 
 
-def test_what_is_held_while_it_connects_moves_nothing(daemon):
+def test_input_held_while_connecting_moves_nothing(daemon):
     """The device says only that it moves; until it has been at rest, that does not count."""
     reader = opened(daemon, static_count_threshold=2000)
     for _ in range(5):
@@ -188,7 +188,7 @@ def test_a_device_with_more_buttons_has_them_all(tmp_path):
         ((7, 0, 0, 0, 0, 0, 0, 0), "a packet of an unknown type"),
     ],
 )
-def test_a_packet_that_makes_no_sense_is_named_and_the_next_one_counts(daemon, packet, reason):
+def test_invalid_packet_is_named_and_the_next_one_counts(daemon, packet, reason):
     reader = opened(daemon)
     reader.until(lambda: reader.is_free("x"), "it is at rest")
     daemon.send(struct.pack("=8i", *packet))
@@ -283,7 +283,7 @@ class SpnavEvent(ctypes.Union):
     _fields_ = [("words", ctypes.c_int * 16), ("size", ctypes.c_byte * 128)]
 
 
-def test_debians_client_library_understands_the_stand_in(tmp_path):
+def test_client_library_of_debian_understands_the_emulator(tmp_path):
     """Version, name, buttons, motions and presses; that it has 5 buttons, the library cannot guess."""
     path = tmp_path / "spnav.sock"
     daemon = SpacenavDaemon(path, buttons=5)

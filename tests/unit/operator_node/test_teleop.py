@@ -30,7 +30,7 @@ def run(teleop: Teleop, since_s: float, duration_s: float, hz: float = HZ) -> fl
 
 
 @pytest.mark.parametrize("hz", [60.0, 100.0, 170.0])
-def test_the_way_is_velocity_times_true_time_whatever_the_rate_is_in_fact(hz):
+def test_displacement_is_velocity_times_true_time_at_any_rate(hz):
     """Defect 44: the release counts 1/hz for every step."""
     teleop = made()
     teleop.step(5.0)
@@ -62,7 +62,7 @@ def test_timer_that_is_late_makes_no_jump():
     assert teleop.pose.position[0] == pytest.approx(LATE_PERIODS / HZ), "a clock that goes back moves nothing"
 
 
-def test_signal_that_is_old_ends_and_the_frame_stays_where_it_is():
+def test_old_signal_ends_and_the_frame_stays_in_place():
     """Defect 44: the release goes on for ever."""
     teleop = made(timeout_s=0.2)
     teleop.step(0.0)
@@ -84,7 +84,7 @@ def test_it_stays_within_its_box_axis_by_axis():
         assert teleop.pose.position == pytest.approx(corner, abs=0.02)
 
 
-def test_reset_puts_it_there_and_outside_of_the_box_it_is_refused():
+def test_reset_sets_the_pose_and_is_refused_outside_the_box():
     teleop = made(ylim=[-1.0, 1.0])
     teleop.command((0.3, 0.0, 0.0), 0.0)
     for pose, told in (
@@ -104,7 +104,7 @@ def test_reset_puts_it_there_and_outside_of_the_box_it_is_refused():
 @pytest.mark.parametrize(
     "signal", [(), (0.1,), (0.1,) * 4, (0.1,) * 7, (math.nan, 0, 0), (0, 0, 0, 0, 0, math.inf), (1.7e308,) * 3]
 )
-def test_what_is_no_signal_is_refused_and_stops_it(signal):
+def test_invalid_signal_is_refused_and_stops_the_frame(signal):
     teleop = made()
     teleop.command((0.5, 0.0, 0.0), 0.0)
     with pytest.raises(ValueError, match=r"expected 3 numbers|must be finite|expected a velocity"):
@@ -113,7 +113,7 @@ def test_what_is_no_signal_is_refused_and_stops_it(signal):
     assert teleop.pose == TeleopPose()
 
 
-def test_signal_that_is_too_fast_is_slowed_in_its_direction_and_that_is_told():
+def test_too_fast_signal_is_scaled_down_and_reported():
     teleop = made(max_speed=0.5, max_turn_rate=1.0)
     teleop.step(0.0)
     assert not teleop.command((0.3, 0.4, 0.0, 1.0, 0.0, 0.0), 0.0)
@@ -144,7 +144,7 @@ def test_angles_stay_within_a_turn():
         ({"target_frame": "target"}, "unknown key 'target_frame'; did you mean 'target_frame_id'?"),
     ],
 )
-def test_bad_configuration_is_told_with_key_expected_and_got(options, told):
+def test_bad_configuration_is_reported_with_key_and_values(options, told):
     with pytest.raises(ConfigError) as error:
         config(**options)
     assert told in str(error.value)
@@ -155,7 +155,7 @@ def test_nothing_is_limited_unless_it_is_said():
     assert config(zlim=[0, 0]).zlim == (0.0, 0.0), "an axis may be held"
 
 
-def test_no_jump_from_1000_random_offsets_at_start_reset_and_reconnect():
+def test_no_jump_from_random_offsets_at_start_reset_and_reconnect():
     """Wherever the frame is when a signal begins, and whatever the signal, no step is longer than v_max dt."""
     generator = random.Random(13)
     longest = 0.0

@@ -44,7 +44,7 @@ def test_nothing_jumps(walk):
     assert np.degrees(2 * np.arccos(np.clip(cosines, 0, 1))).max() < 15.0
 
 
-def test_one_foot_at_least_stands_still_on_the_ground(walk):
+def test_at_least_one_foot_rests_on_the_ground(walk):
     height_m, speed, positions, _ = walk
     feet = positions[:, [INDEX["RightFoot"], INDEX["LeftFoot"]]]
     still = np.linalg.norm(np.diff(feet, axis=0), axis=2) < 1e-9

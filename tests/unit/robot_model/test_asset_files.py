@@ -19,7 +19,7 @@ def test_absolute_path_is_taken_as_it_is(tmp_path: Path) -> None:
         find_file(f"{tmp_path}/b.urdf", "~config")
 
 
-def test_relative_path_is_sought_beside_the_file_from_any_working_directory(
+def test_relative_path_is_relative_to_the_file_from_any_directory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "configs").mkdir()
@@ -47,12 +47,12 @@ def test_folder_is_no_file(tmp_path: Path) -> None:
         find_file(str(tmp_path), "~config")
 
 
-def test_unknown_package_is_told_as_a_wrong_value() -> None:
+def test_unknown_package_is_reported_as_a_wrong_value() -> None:
     with pytest.raises(ValueError, match="^unknown ROS package 'zebra_robot'"):
         find_file("package://zebra_robot/a.urdf", "~config")
 
 
-def test_folder_is_found_beside_the_file_or_by_its_word(tmp_path: Path) -> None:
+def test_folder_is_found_next_to_the_file_or_by_keyword(tmp_path: Path) -> None:
     (tmp_path / "meshes").mkdir()
     assert find_folder("meshes", f"{tmp_path}/world.yaml") == f"{tmp_path}/meshes"
     assert find_folder("pybullet_data_path", "~config") == DATA
@@ -61,12 +61,12 @@ def test_folder_is_found_beside_the_file_or_by_its_word(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("start", ["{example-robot-data}", "package://example-robot-data"])
-def test_robots_of_the_extra_assets_are_named_as_if_they_were_a_ros_package(start):
+def test_robots_of_extra_assets_are_found_like_a_ros_package(start):
     found = find_file(f"{start}/robots/talos_data/robots/talos_reduced.urdf", "~")
     assert Path(found).is_file() and found.endswith("/talos_reduced.urdf")
 
 
-def test_without_the_extra_it_is_said_what_to_install(monkeypatch):
+def test_missing_extra_is_reported_with_its_install_command(monkeypatch):
     monkeypatch.setattr("sys.path", [])
     with pytest.raises(ValueError, match="'example-robot-data' is not installed: ./rpbi setup assets"):
         find_file("{example-robot-data}/robots/talos.urdf", "~")

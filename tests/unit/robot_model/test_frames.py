@@ -38,7 +38,7 @@ def test_frames_of_no_configurations_are_none():
     assert robot.frames.of_links(np.empty((0, 7))).shape == (0, len(robot.links), 4, 4)
 
 
-def test_a_link_is_where_its_pose_says_in_any_other_one():
+def test_link_pose_can_be_relative_to_any_other_link():
     robot, q = RobotModel(KUKA), np.full(7, 0.3)
     assert robot.pose(q, robot.root) == (ZERO, (0.0, 0.0, 0.0, 1.0))
     in_root = robot.pose(q, "lwr_arm_2_link") @ robot.pose(q, "lwr_arm_7_link", base="lwr_arm_2_link")
@@ -47,7 +47,7 @@ def test_a_link_is_where_its_pose_says_in_any_other_one():
     assert in_root.position == pytest.approx(at)
 
 
-def test_joints_that_are_not_driven_stand_and_mimics_of_theirs_with_them(tmp_path):
+def test_undriven_joints_and_their_mimics_are_fixed(tmp_path):
     text = MIMIC.replace('lower="-1.5" upper="2"', 'lower="0.5" upper="2"')
     robot = robot_of(tmp_path, text, ("push",))
     assert robot.joint_names == ("push",)
@@ -66,7 +66,7 @@ def test_a_joint_follows_over_several_steps():
         followed("a", {"a": Mimic("b", 1.0, 0.0), "b": Mimic("a", 1.0, 0.0)})
 
 
-def test_what_makes_no_sense_is_named(tmp_path):
+def test_invalid_names_and_values_are_reported(tmp_path):
     with pytest.raises(UnknownNameError, match="roll"):
         robot_of(tmp_path, MIMIC, ("roll",))  # it mimics another one
     robot = robot_of(tmp_path, SKEW)

@@ -14,20 +14,20 @@ NAMES = ("arm", "wrist", "wheel", "slide")
 LIMITS = Limits((-3.0, -6.5, -INF, 0.0), (3.0, 6.5, INF, 0.5), (True, True, True, False))
 
 
-def test_a_joint_that_turns_comes_in_by_whole_turns_and_one_that_slides_at_the_limit():
+def test_revolute_joint_wraps_by_whole_turns_and_prismatic_is_clamped():
     limits = Limits((-3.0, -1.0), (3.0, 1.0), (True, False))
     assert limits.wrap_to_limits((2.0 + TURN, 0.5), (0.0, 0.0)) == ([pytest.approx(2.0), 0.5], [False, False])
     assert limits.wrap_to_limits((2.0 - 3 * TURN, 4.0), (0.0, 0.0)) == ([pytest.approx(2.0), 1.0], [False, True])
 
 
-def test_a_joint_that_fits_in_no_turn_stops_at_the_limit_that_it_is_beyond():
+def test_joint_that_cannot_wrap_inside_stops_at_the_exceeded_limit():
     for position, limit in ((3.1, 3.0), (-3.1, -3.0)):
         inside, stopped = LIMITS.wrap_to_limits((position, 14.0, 0.0, 0.7), (0.0,) * 4)
         assert inside == pytest.approx([limit, 14.0 - 2 * TURN, 0.0, 0.5])
         assert stopped == [True, False, False, True]
 
 
-def test_a_position_just_beyond_a_limit_comes_to_that_limit_not_to_the_other():
+def test_position_slightly_outside_a_limit_comes_to_that_limit():
     limits = Limits((-2.967,), (2.967,), (True,))
     for near in (0.0, 2.5, -2.5):
         assert limits.wrap_to_limits((-2.967 - 1e-8,), (near,)) == ([-2.967], [False])
@@ -43,7 +43,7 @@ def test_of_several_turns_the_nearest_is_taken():
     assert not any(stopped)
 
 
-def test_whatever_comes_in_is_within_limits_and_what_is_said_to_be_the_same_pose_is():
+def test_wrapped_positions_are_within_limits_and_correctly_flagged():
     generator = random.Random(1)
     for _ in range(5000):
         lower = generator.uniform(-8.0, 4.0)
@@ -55,13 +55,13 @@ def test_whatever_comes_in_is_within_limits_and_what_is_said_to_be_the_same_pose
         assert stopped == (abs(turns - round(turns)) >= 1e-6)
 
 
-def test_the_middle_is_within_limits_that_are_open_on_one_side_or_both():
+def test_middle_is_finite_for_limits_open_on_any_side():
     limits = Limits((-1.0, -INF, 2.0, -INF), (3.0, INF, INF, -2.0), (True,) * 4)
     assert limits.middle == (1.0, 0.0, 2.0, -2.0)
 
 
 @pytest.mark.parametrize("generator", [random.Random(1), np.random.default_rng(1)], ids=["random", "numpy"])
-def test_random_positions_fill_the_limits_and_are_near_where_there_are_none(generator):
+def test_random_positions_fill_limits_or_stay_near_without_limits(generator):
     limits = Limits((-1.0, -INF, 2.0), (3.0, INF, INF), (True, True, False))
     first, second, third = zip(*(limits.random(generator, (0.0, 50.0, 0.0)) for _ in range(500)))
     assert -1.0 <= min(first) < -0.9 and 2.9 < max(first) <= 3.0
@@ -69,23 +69,23 @@ def test_random_positions_fill_the_limits_and_are_near_where_there_are_none(gene
     assert 2.0 <= min(third) and max(third) <= 3.0
 
 
-def test_a_search_starts_where_it_is_told_and_then_at_random():
+def test_search_begins_at_the_given_start_then_at_random():
     first, *others = LIMITS.starts([0.1, 0.2, 0.3, 0.4], 3, lambda: random.Random(1))
     assert first == [0.1, 0.2, 0.3, 0.4]
     assert others == [LIMITS.random(generator, first) for generator in [random.Random(1)] for _ in range(3)]
 
 
-def test_limits_of_a_problem_narrow_those_of_the_robot_and_never_widen_them():
+def test_problem_limits_narrow_those_of_the_robot_only():
     limits = _narrowed(lower=[-1.0, -9.0, -2.0, 0.1], upper=[9.0, 1.0, 2.0, 0.2])
     assert (limits.lower, limits.upper) == ((-1.0, -6.5, -2.0, 0.1), (3.0, 1.0, 2.0, 0.2))
 
 
-def test_what_robot_info_tells_of_a_joint_without_limits_means_none():
+def test_robot_info_limits_of_an_unlimited_joint_mean_none():
     limits = _narrowed(lower=[-1.0, -1.0, 0.0, 0.0], upper=[1.0, 1.0, -1.0, 0.5])
     assert (limits.lower[2], limits.upper[2]) == (-INF, INF)
 
 
-def test_limits_that_leave_a_joint_no_position_are_refused_by_its_name():
+def test_limits_without_any_valid_position_are_refused_by_joint_name():
     with pytest.raises(ValueError, match="lowerLimits, upperLimits: no position of 'slide' .* URDF has 0 to 0.5"):
         _narrowed(lower=[-1.0, -1.0, -1.0, 0.6], upper=[1.0, 1.0, 1.0, 0.7])
 

@@ -27,7 +27,7 @@ def test_service_is_compatible_on_the_wire(name: str, md5: str) -> None:
 
 
 @pytest.mark.parametrize("path", sorted(SOURCES.glob("**/*.[ms][sr][gv]")), ids=lambda path: path.name)
-def test_every_field_says_what_it_means(path: Path) -> None:
+def test_every_field_has_a_comment_in_its_definition(path: Path) -> None:
     """The definitions are what `rosmsg show -r` prints: each field has a comment, the file a first line.
 
     A key's constant says by its name which key it is.

@@ -36,7 +36,7 @@ def resolved(path: str) -> str:
     return text_of(for_pybullet(document, files_of(document)))
 
 
-def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_path):
+def test_folder_near_the_urdf_replaces_a_package_as_in_pybullet(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.obj").write_text("")
     path = urdf(tmp_path, mesh("package://meshes/a.obj"))
@@ -44,7 +44,7 @@ def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_pa
     assert meshes(description_for_ros(path)) == [f"file://{tmp_path}/meshes/a.obj"]
 
 
-def test_meshes_of_a_package_that_another_of_its_name_hides_are_those_near_the_urdf(tmp_path):
+def test_hidden_package_is_replaced_by_meshes_near_the_urdf(tmp_path):
     path = tmp_path / "rpbi_examples/robots/own.urdf"
     path.parent.mkdir(parents=True)
     (path.parent / "own.obj").write_text("")
@@ -65,7 +65,7 @@ def test_comments_and_plugins_are_not_meshes(tmp_path):
     assert "libgazebo_ros_control.so" in text and "file://" not in text
 
 
-def test_ros_gets_relative_meshes_with_their_folder_and_those_of_packages_as_they_are(tmp_path):
+def test_description_for_ros_resolves_relative_meshes_and_keeps_package_paths(tmp_path):
     inner = mesh("../a.obj") + mesh("package://rpbi_examples/robots/b.obj") + mesh("file:///c.obj")
     assert meshes(description_for_ros(urdf(tmp_path, inner))) == [
         f"file://{tmp_path}/a.obj",
@@ -80,7 +80,7 @@ def test_characters_that_are_no_xml_are_left_out(tmp_path):
     assert UrdfDocument(path).joint_types == {}
 
 
-def test_two_robots_of_one_file_stand_in_one_description_with_names_of_their_own(tmp_path):
+def test_two_robots_of_one_file_get_distinct_names_when_joined(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(
         "<robot name='arm'><link name='foot'/><link name='hand'/><link name='finger'/>"

@@ -33,7 +33,7 @@ def corner_forces(random, share: float) -> np.ndarray:
     return np.column_stack((across, up))
 
 
-def test_what_corners_can_take_is_in_the_cone():
+def test_wrenches_that_corner_forces_can_produce_are_in_the_cone():
     random, cone = np.random.default_rng(1), wrench_cone(LENGTH, WIDTH, FRICTION)
     for _ in range(300):
         assert (cone @ wrench(corner_forces(random, 1.0)) <= 1e-9).all()
@@ -49,7 +49,7 @@ def test_what_corners_can_take_is_in_the_cone():
         (0.0, 0.0, 100.0, 0.0, 0.0, 6.5),  # turns
     ],
 )
-def test_what_they_cannot_take_is_not(outside):
+def test_other_wrenches_are_outside_the_cone(outside):
     assert (wrench_cone(LENGTH, WIDTH, FRICTION) @ outside > 0.0).any()
 
 
@@ -65,7 +65,7 @@ def test_a_hand_comes_to_its_target_without_haste():
     assert 0.4 < max(speeds) <= 0.5
 
 
-def test_the_way_waits_for_a_hand_that_is_held():
+def test_approach_waits_for_a_hand_that_is_held():
     way = Approach(np.zeros(3), np.eye(3), 0.004, 0.5)
     for _ in range(1000):
         way.advance(Pose((0.6, 0.0, 0.3), quaternion_of((0.0, 1.0, 0.0))), np.zeros(3), np.eye(3))

@@ -15,13 +15,13 @@ def test_every_example_is_measured_or_left_out_for_a_reason():
     assert len(EXAMPLES) > 25 and not set(EXAMPLES) & set(LEFT_OUT)
 
 
-def test_rates_are_those_of_the_files_below_the_namespace_of_the_simulator():
+def test_rates_come_from_the_files_in_the_simulators_namespace():
     assert asked_rates("tracking_example", ["headless:=true"]) == {"/lab/vicon/box/box": 100.0}
     rates = asked_rates("basic_example_kuka_lwr", ["headless:=true"])
     assert rates["/rpbi/kuka_lwr/joint_states"] == 100.0 and rates["/rpbi/camera/depth/image"] == 15.0
 
 
-def test_the_slowest_topic_is_named_and_any_other_that_is_too_slow():
+def test_slowest_topic_and_all_that_miss_their_rate_are_named():
     asked = {"/a": 10.0, "/b": 100.0, "/c": 50.0}
     found = list(rate_results("cup", asked, {"/a": 9.9, "/b": 80.0, "/c": 45.0}))
     assert [each.figure for each in found] == ["cup: rate of /b, of 100 Hz", "cup: rate of /c, of 50 Hz"]

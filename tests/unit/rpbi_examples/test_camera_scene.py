@@ -12,7 +12,7 @@ from rpbi_examples.motions import TARGET_HEIGHT, FigureEight, camera_pose
 
 
 @pytest.mark.parametrize("time_s", [0.0, 3.0, 11.0])
-def test_orbiting_camera_looks_at_its_target_and_keeps_the_horizon_level(time_s):
+def test_orbiting_camera_faces_its_target_with_a_level_horizon(time_s):
     position, quat_xyzw = camera_pose(time_s)
     right, down, forward = rotation_matrix(quat_xyzw).T
     towards = np.array([0.0, 0.0, TARGET_HEIGHT]) - position
@@ -37,7 +37,7 @@ def test_figure_eight_crosses_itself_in_the_middle_and_closes():
     assert np.ptp(points[:, 0]) == pytest.approx(figure.height, rel=1e-3)
 
 
-def test_figure_eight_is_by_default_the_one_that_controllers_were_written_for():
+def test_default_figure_eight_is_the_one_controllers_were_written_for():
     for time_s in (0.0, 0.4, 3.1, 7.7):
         x, y = 0.1 * math.sin(0.4 * math.pi * time_s), 0.2 * math.sin(0.2 * math.pi * time_s)
         assert FigureEight().position(time_s) == pytest.approx((x, y, 0.0))

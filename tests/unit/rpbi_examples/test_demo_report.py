@@ -31,7 +31,7 @@ def test_a_topic_that_never_came_is_found():
     assert not table.loc["/silent", "enough"]
 
 
-def test_the_summary_marks_what_came_too_seldom():
+def test_summary_marks_topics_below_their_rate():
     topics = measured_rates({"/fast": 1000, "/slow": 1}, {"/fast": 100.0, "/slow": 100.0}, 10.0).to_dict(orient="index")
     lines = as_text({"topics": topics, "figures": {"overruns": 3}}).splitlines()
     assert [line.split()[0] for line in lines if "TOO FEW" in line] == ["/slow"]
@@ -51,12 +51,12 @@ def slow(summary):
     return slow_lines(summary, IMAGES, "world.yaml")
 
 
-def test_what_reaches_its_rate_needs_no_word():
+def test_topics_at_their_rate_are_not_mentioned():
     summary = summary_of()
     assert failures(summary, REQUIRED) == slow(summary) == []
 
 
-def test_few_images_are_no_failure_but_one_line_with_what_limits_them_and_what_to_do():
+def test_few_images_give_a_line_with_cause_and_remedy():
     summary = summary_of(image=39, info=120)
     assert failures(summary, REQUIRED) == []
     assert slow(summary) == [
@@ -66,14 +66,14 @@ def test_few_images_are_no_failure_but_one_line_with_what_limits_them_and_what_t
     ]
 
 
-def test_a_clock_that_skips_ticks_is_no_failure_but_a_line():
+def test_skipped_clock_ticks_give_a_line_but_no_failure():
     summary = summary_of(clock=670)
     assert failures(summary, REQUIRED) == []
     assert [line.partition(":")[0] for line in slow(summary)] == ["/clock came at 67.0 instead of 100 Hz"]
 
 
 @pytest.mark.parametrize("topic", REQUIRED)
-def test_joint_states_or_tf_below_their_rate_are_slow_and_fail_only_if_none_came(topic):
+def test_slow_joint_states_or_tf_fail_only_without_any_message(topic):
     summary = summary_of(**{topic.strip("/"): 900})
     assert failures(summary, REQUIRED) == []
     assert [line.partition(":")[0] for line in slow(summary)] == [f"{topic} came at 90.0 instead of 100 Hz"]
@@ -86,7 +86,7 @@ def test_physics_below_real_time_is_slow_and_no_failure():
     assert failures(summary, REQUIRED) == []
 
 
-def test_tracking_error_compares_with_the_target_that_held_and_by_joint_name():
+def test_tracking_error_compares_with_the_held_target_by_joint_name():
     times = np.arange(0.0, 1.0, 0.01)
     states = pd.DataFrame({"position/b": 0.5, "position/a": times}, index=times)
     targets = pd.DataFrame({"position/a": [0.0, 0.5], "position/b": [0.4, np.nan]}, index=[0.0, 0.5])
@@ -101,7 +101,7 @@ def test_two_targets_with_one_stamp_do_no_harm():
     assert tracking_error(states, targets).loc["a", "max"] == pytest.approx(0.3)
 
 
-def test_forces_of_contacts_are_added_up_and_0_where_the_arm_does_not_touch():
+def test_contact_forces_are_summed_and_zero_without_contact():
     others = [None, "floor", "arm", "arm", "floor"]
     contacts = pd.DataFrame(
         {"other_body": others, "normal_force": [np.nan, 8.0, 2.0, 3.0, 8.0]}, index=[0.1, 0.2, 0.2, 0.2, 0.3]

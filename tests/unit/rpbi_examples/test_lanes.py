@@ -21,7 +21,7 @@ def test_one_lane_is_a_line():
     assert lanes(1, 0.4, 0.1, 0.1) == pytest.approx(np.column_stack((np.zeros(5), np.linspace(-0.2, 0.2, 5))))
 
 
-def test_a_single_place_has_no_way():
+def test_single_place_has_length_zero():
     assert ways_along([(1.0, 2.0, 3.0)]) == pytest.approx([0.0])
 
 

@@ -50,7 +50,7 @@ def test_a_scene_of_ones_own_has_a_world_anywhere():
     assert any("lift.rviz" in node.args for node in loaded.nodes if node.package == "rviz")
 
 
-def test_a_real_robot_of_ones_own_needs_a_folder_and_a_urdf(tmp_path):
+def test_own_real_robot_needs_only_a_folder_and_a_urdf(tmp_path):
     real_robot = LAUNCH_FILES[0].parent / "include/real_robot.launch"
     for file in (real_robot.parents[2] / "configs/real_robot/kuka_lwr").iterdir():
         (tmp_path / file.name).write_text(file.read_text().replace("period_s: 0.009", "period_s: 0.0031"))
@@ -67,7 +67,7 @@ def test_a_real_robot_of_ones_own_needs_a_folder_and_a_urdf(tmp_path):
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_a_scene_that_ends_ends_its_world_and_the_other_way_round(path):
+def test_scene_and_world_end_together(path):
     required = {node.name for node in load(path, "headless:=true").nodes if node.required}
     assert required >= {"scene", "ros_pybullet_interface"}
 
@@ -76,7 +76,7 @@ def test_a_scene_that_ends_ends_its_world_and_the_other_way_round(path):
 @pytest.mark.parametrize(
     ("given", "swings"), [((), True), (("controls:=true",), False), (("controls:=true", "move:=true"), True)]
 )
-def test_nothing_swings_what_sliders_move_but_on_demand(path, given, swings):
+def test_robot_with_sliders_swings_only_on_request(path, given, swings):
     names = {node.name for node in load(path, "headless:=false", *given).nodes}
     assert ("basic_robot_example" in names, "rpbi_controls_node" in names) == (swings, bool(given))
 

@@ -96,7 +96,7 @@ def test_a_plan_comes_from_anywhere_and_pushes_as_was_shown(start):
         (lambda t: t.iloc[::150], "expected at least 10 samples"),
     ],
 )
-def test_what_cannot_be_learned_is_named(change, message):
+def test_unsuitable_demonstrations_are_refused_with_a_reason(change, message):
     with pytest.raises(InterfaceError, match=message):
         PushSkill(shown(change(demonstrated(0))))
 
@@ -109,7 +109,7 @@ def test_a_box_on_its_side_is_not_at_its_goal():
     assert not BoxError.of(np.array([0.031, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, -1.0])).is_at_goal
 
 
-def test_on_a_full_disk_no_table_and_no_picture_is_half_written(tmp_path, file_limit):
+def test_full_disk_leaves_no_partial_table_or_picture(tmp_path, file_limit):
     table, figure = pd.DataFrame({"a": np.random.default_rng(0).random(2_000)}), Figure()
     figure.subplots().plot(table["a"])
     file_limit(5_000)

@@ -9,7 +9,7 @@ from rpbi_examples.pushing import BALL_RADIUS_M, HALF_SIDES_M, next_push
 
 
 @pytest.mark.parametrize("turns", range(-2, 3))
-def test_the_ball_pushes_the_middle_of_the_side_that_is_away_from_the_goal(turns):
+def test_ball_pushes_the_middle_of_the_side_away_from_goal(turns):
     push = next_push(PlanarPose(0.5, 0.1, turns * math.pi / 2.0), (0.5, 0.4))
     back = HALF_SIDES_M[(turns + 1) % 2] + BALL_RADIUS_M
     assert push.start == pytest.approx((0.5, 0.1 - back))
@@ -18,7 +18,7 @@ def test_the_ball_pushes_the_middle_of_the_side_that_is_away_from_the_goal(turns
     assert push.beside(-0.3) == pytest.approx(push.end)
 
 
-def test_a_box_that_stands_askew_comes_nearer_with_each_push_until_it_is_there():
+def test_tilted_box_approaches_the_goal_with_each_push():
     box, goal, pushes = PlanarPose(0.0, 0.0, 0.2), (0.3, 0.2), 0
     while (push := next_push(box, goal)) is not None:
         before = math.dist((box.x, box.y), goal)

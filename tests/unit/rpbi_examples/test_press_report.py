@@ -46,7 +46,7 @@ def with_forces(press: Press, extra_n: Callable[[float, float], float]) -> Press
     return press
 
 
-def test_damping_on_the_way_cancels_but_shows_as_scatter():
+def test_damping_cancels_but_appears_as_scatter():
     report = with_forces(pressed(0.01), lambda _, rate: 20.0 * rate).report()
     assert report.error < 0.01 and report.scatter_n > 0.1
 
@@ -57,7 +57,7 @@ def test_a_press_is_judged_beyond_its_steadiest_moment():
     assert report.error > 0.2 and report.scatter_n > 1.0
 
 
-def test_a_softer_box_and_a_weaker_hand_are_told():
+def test_softer_box_and_weaker_hand_are_reported():
     assert pressed(0.01, stiffness=450.0).report().error == pytest.approx(0.1)
     assert pressed(0.01, felt=0.8).report().felt_error == pytest.approx(0.2)
 

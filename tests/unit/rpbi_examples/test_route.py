@@ -17,12 +17,12 @@ def test_velocities_are_in_the_frame_of_the_base():
     assert velocity == pytest.approx((0.0, ROUTE_GAIN, ROUTE_GAIN * math.pi / 2.0))
 
 
-def test_it_turns_the_shorter_way():
+def test_route_turns_in_the_shorter_direction():
     velocity = Route([PlanarPose(0.0, 0.0, -3.0)]).velocity(PlanarPose(0.0, 0.0, 3.0))
     assert velocity.yaw == pytest.approx(ROUTE_GAIN * (2.0 * math.pi - 6.0))
 
 
-def test_what_follows_the_velocities_passes_all_waypoints_again_and_again():
+def test_follower_of_the_velocities_passes_all_waypoints_repeatedly():
     route, pose = Route(), PlanarPose(0.0, 0.0, 1.0)
     visits = dict.fromkeys(SQUARE, 0)
     near = None

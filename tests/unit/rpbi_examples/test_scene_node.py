@@ -35,7 +35,7 @@ class FaultyStage(Stage):
         return "0b6"
 
 
-def test_an_error_ends_an_episode_as_failed_and_the_next_begins(monkeypatch):
+def test_error_ends_an_episode_as_failed_and_the_next_begins(monkeypatch):
     config = node.SceneNodeConfig(scene="writing_scene:Writing", episodes=2)
     said = []
     monkeypatch.setattr(node, "private_parameters", lambda kind: config)
@@ -60,7 +60,7 @@ class Answer:
 
 
 @pytest.mark.parametrize("is_shutdown", [True, False])
-def test_a_shutdown_while_the_world_is_asked_or_waited_for_is_no_error(monkeypatch, is_shutdown):
+def test_shutdown_while_waiting_for_the_world_is_no_error(monkeypatch, is_shutdown):
     def wait_for_tick(*_):
         raise TimeoutError("nothing came")
 

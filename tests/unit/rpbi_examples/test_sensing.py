@@ -40,7 +40,7 @@ def test_a_body_at_rest_is_smoothed():
     assert 0.1 * NOISE_M < sensed[2 * MEAN_OF :].std() < 0.2 * NOISE_M
 
 
-def test_noise_is_that_of_the_seed():
+def test_noise_is_determined_by_the_seed():
     first, again, other = (track(SensedPoses(np.random.default_rng(seed)), np.zeros(20)) for seed in (3, 3, 4))
     assert (first == again).all() and (first != other).all()
 

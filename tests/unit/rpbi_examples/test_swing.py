@@ -49,7 +49,7 @@ def test_no_joint_ever_leaves_its_limits(swing):
         assert all(low <= position <= high for low, position, high in zip(LOWER, swing.at(time_s), UPPER))
 
 
-def test_each_swing_begins_and_ends_at_rest_and_is_no_faster_than_its_joint(swing):
+def test_each_swing_begins_and_ends_at_rest_within_joint_velocities(swing):
     dt_s = 1e-3
     times = np.arange(TO_MIDDLE_S - 0.5, TO_MIDDLE_S + 4 * SWING_PERIOD_S, dt_s)
     velocities = np.diff([swing.at(time_s) for time_s in times], axis=0) / dt_s
@@ -57,7 +57,7 @@ def test_each_swing_begins_and_ends_at_rest_and_is_no_faster_than_its_joint(swin
     assert np.abs(np.diff(velocities, axis=0)).max() / dt_s < 6.0
 
 
-def test_a_joint_whose_limits_leave_out_zero_goes_to_the_nearest_it_may():
+def test_joint_whose_limits_exclude_zero_moves_to_the_nearest():
     assert Swing((1.0,), (0.5,), (2.0,)).at(TO_MIDDLE_S) == (0.5,)
 
 
@@ -70,7 +70,7 @@ def test_joints_may_swing_about_another_place_than_zero():
     assert max(third) == pytest.approx(1.2, abs=0.01) and min(third) == pytest.approx(0.8, abs=0.01)
 
 
-def test_the_panda_stays_out_of_its_own_way():
+def test_panda_swings_without_self_collision():
     """Its guard would stop it, and did."""
     config = yaml.safe_load((EXAMPLES / "configs/basic_example_panda/panda.yaml").read_text())
     launch = ElementTree.parse(EXAMPLES / "launch/basic_example_panda.launch")

@@ -20,7 +20,7 @@ def example() -> dict:
         return yaml.safe_load(file)
 
 
-def test_hand_follows_the_path_of_the_example_at_its_height_with_the_stick_down(example):
+def test_hand_follows_the_path_at_its_height_with_stick_down(example):
     config = PlanarHandConfig.parse(example["hand"], EXAMPLE)
     hand = PlanarHand(config)
     joints = hand.solve(hand.posture, np.array([0.33, -0.37]))

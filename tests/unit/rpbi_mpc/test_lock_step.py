@@ -55,7 +55,7 @@ class Regulator(MpcController):
         return ControlPlan(commands, places[:, None], 0.04, 1.0, converged, "limit", 7, self.wall_s, 0.001)
 
 
-def test_measurement_is_taken_first_and_its_command_acts_after_the_delay():
+def test_measurement_comes_first_and_its_command_acts_after_the_delay():
     plant = Cart()
     cycle = LockStep(plant, Regulator(), LoopConfig(hz=25, delay_s=0.01)).cycle()
     assert plant.happened == ["sense", "0.01", "act", "0.03"]
@@ -63,7 +63,7 @@ def test_measurement_is_taken_first_and_its_command_acts_after_the_delay():
     assert plant.place == pytest.approx(1.0 - 0.03 * 5.0)
 
 
-def test_last_plan_goes_on_and_then_the_loop_stops_and_says_why():
+def test_last_plan_is_continued_then_the_loop_stops_with_reason():
     plant = Cart()
     loop = LockStep(plant, Regulator(failing=range(2, 99)), LoopConfig(delay_s=0.0, max_missed=2))
     cycles = loop.run(1.0)
@@ -82,7 +82,7 @@ def test_a_plan_that_fails_once_does_not_stop_it():
     assert [str(each.status) for each in cycles] == ["solved", "last plan", "solved", "last plan", "solved"]
 
 
-def test_a_task_that_has_failed_stops_it_until_it_begins_again():
+def test_failed_task_stops_the_loop_until_restarted():
     plant, controller = Cart(), Regulator()
     loop = LockStep(plant, controller, LoopConfig(delay_s=0.0))
     assert loop.run(0.1)[-1].status == "solved"
@@ -95,7 +95,7 @@ def test_a_task_that_has_failed_stops_it_until_it_begins_again():
     assert loop.run(0.1)[-1].status == "solved"
 
 
-def test_without_a_measurement_it_stands_and_goes_on_with_the_next_one():
+def test_loop_waits_without_a_measurement_and_continues_with_the_next():
     plant = Cart()
     plant.hidden = range(2, 4)
     cycles = LockStep(plant, Regulator(), LoopConfig(delay_s=0.0)).run(0.2)
@@ -111,7 +111,7 @@ def test_slow_solver_counts_on_hardware_alone():
     assert cycle.status == "stopped" and "the solver took 9000.0 ms, expected at most 20.0 ms" in cycle.reason
 
 
-def test_numbers_that_do_not_fit_and_commands_that_are_not_finite_do_not_act():
+def test_wrong_number_of_values_and_non_finite_commands_are_refused():
     plant, controller = Cart(), Regulator()
     controller.command_names = ("velocity", "force")
     with pytest.raises(InterfaceError, match=r"command: expected 2 numbers \(velocity, force\), got \[-5.\]"):

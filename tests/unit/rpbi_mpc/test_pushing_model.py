@@ -24,13 +24,13 @@ from rpbi_mpc.pushing.planar.slider import SliderConfig
 SLIDER = SliderConfig(length=0.1, width=0.08, friction=0.3, support="uniform")
 
 
-def test_characteristic_length_is_that_of_known_shapes():
+def test_characteristic_length_is_right_for_known_shapes():
     assert SliderConfig(length=0.06, width=0.08, support="corners").characteristic_length == pytest.approx(0.05)
     square = SliderConfig(length=1.0, width=1.0, support="uniform")
     assert square.characteristic_length == pytest.approx((np.sqrt(2) + np.log(1 + np.sqrt(2))) / 6, rel=1e-3)
 
 
-def test_twist_is_normal_to_the_limit_surface_and_friction_takes_power():
+def test_twist_is_normal_to_the_limit_surface_and_friction_dissipates():
     random, square = np.random.default_rng(0), SLIDER.characteristic_length**2
 
     def height(load):
@@ -44,13 +44,13 @@ def test_twist_is_normal_to_the_limit_surface_and_friction_takes_power():
         assert np.allclose(load_for(twist, SLIDER), load)
 
 
-def test_a_push_through_the_middle_does_not_turn_and_one_beside_it_turns_away():
+def test_push_through_the_centre_does_not_turn_the_slider():
     assert twist_of(load_of(0.0, 0.1, 0.0, SLIDER), SLIDER) == (0.1, 0.0, 0.0)
     assert twist_of(load_of(0.03, 0.1, 0.0, SLIDER), SLIDER)[2] < 0.0
     assert twist_of(load_of(-0.03, 0.1, 0.0, SLIDER), SLIDER)[2] > 0.0
 
 
-def test_model_of_symbols_is_that_of_numbers_and_its_jacobian_that_of_differences():
+def test_symbolic_model_equals_the_numeric_one_with_its_jacobian():
     state, control = casadi.SX.sym("x", 4), casadi.SX.sym("u", 4)
     after = casadi.vertcat(*advanced(state, control, 0.08, SLIDER))
     function = casadi.Function("f", [state, control], [after, casadi.jacobian(after, state)])
@@ -64,7 +64,7 @@ def test_model_of_symbols_is_that_of_numbers_and_its_jacobian_that_of_difference
 
 
 @pytest.mark.parametrize("control", [(0.05, 0.0, 0.0, 0.0), (0.05, 0.015, 0.03, 0.0), (0.05, -0.015, 0.0, 0.03)])
-def test_velocity_of_the_pusher_causes_the_motion_it_was_computed_from(control):
+def test_pusher_velocity_and_response_are_inverse(control):
     """Sticking, and sliding to both sides; velocity and response are each other's inverse."""
     state = (0.0, 0.0, 0.0, 0.012)
     assert complementarity(control, SLIDER) == pytest.approx(0.0)
@@ -74,7 +74,7 @@ def test_velocity_of_the_pusher_causes_the_motion_it_was_computed_from(control):
     assert np.allclose(twist, rates(state, control, SLIDER)[:3])
 
 
-def test_contact_slides_beyond_the_motion_cone_at_the_edge_of_the_friction_cone():
+def test_contact_beyond_the_motion_cone_slides_at_the_friction_limit():
     _, (normal, tangential), sliding = response((0, 0, 0, 0.0), (0.02, 0.1), SLIDER)
     assert tangential == pytest.approx(SLIDER.friction * normal) and sliding > 0.0
     twist, force, sliding = response((0, 0, 0, 0.0), (-0.02, 0.1), SLIDER)

@@ -67,7 +67,7 @@ def test_the_best_command_is_found_and_is_the_same_again(sampler):
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
-def test_candidates_are_within_the_limits_and_the_first_is_the_plan(sampler):
+def test_candidates_obey_the_limits_and_the_first_is_the_plan(sampler):
     bowl = Bowl()
     bowl.lower, bowl.upper = np.array([-0.1, -0.1]), np.array([0.1, 0.1])
     plant, _ = run(bowl, 3, sampler={"type": sampler, "noise": 1.0})
@@ -75,7 +75,7 @@ def test_candidates_are_within_the_limits_and_the_first_is_the_plan(sampler):
     assert np.array_equal(bowl.asked[0][0], np.zeros((5, 2)))
 
 
-def test_candidates_that_cannot_be_simulated_do_not_count_and_without_any_the_loop_stops():
+def test_loop_stops_if_no_candidate_can_be_simulated():
     bowl = Bowl()
     bowl.largest = 0.35
     plant, loop = run(bowl)

@@ -82,7 +82,7 @@ def random_path(draw: np.random.Generator) -> Array:
     return path
 
 
-def test_the_first_command_that_breaks_a_limit_stops_it_and_none_before() -> None:
+def test_first_command_that_breaks_a_limit_stops_the_robot() -> None:
     """500 paths: the oracle and the controller agree on the command, and on a limit that it breaks."""
     draw, seen = np.random.default_rng(14), set()
     for _ in range(500):
@@ -101,7 +101,7 @@ def test_the_first_command_that_breaks_a_limit_stops_it_and_none_before() -> Non
     assert seen == {"none", "discontinuity", "velocity", "acceleration", "jerk", "position"}
 
 
-def test_what_it_follows_reaches_the_motors_as_it_is_and_peaks_are_told() -> None:
+def test_valid_commands_reach_the_motors_unchanged_and_peaks_are_reported() -> None:
     path = smooth(1000, 0.3, 2.0)
     robot = controller(command_delay_s=0.0195)
     at, points = run(robot, path)
@@ -113,7 +113,7 @@ def test_what_it_follows_reaches_the_motors_as_it_is_and_peaks_are_told() -> Non
     assert told["acceleration"] == pytest.approx((peaks[1] / ACCELERATION).max())
 
 
-def test_a_reflex_brakes_as_hard_as_it_may_and_needs_to_be_recovered() -> None:
+def test_reflex_brakes_at_the_limits_and_requires_recovery() -> None:
     path = smooth(702, 0.6, 3.0)
     path[700:, 2] += 1.0
     robot = controller()
@@ -149,7 +149,7 @@ def test_who_is_outside_may_only_come_back() -> None:
         assert at == 1
 
 
-def test_commands_on_their_way_are_lost_in_a_reflex() -> None:
+def test_commands_in_transit_are_lost_in_a_reflex() -> None:
     robot = controller(command_delay_s=0.01)
     robot.command(0.0, HOME + 0.01)
     robot.refuse_command("a joint is missing")
@@ -157,7 +157,7 @@ def test_commands_on_their_way_are_lost_in_a_reflex() -> None:
     assert not robot.cycle(1.0, HOME, NO_EFFORT) and robot.set_point == tuple(HOME)
 
 
-def test_commands_that_come_at_uneven_times_are_a_cycle_apart_for_the_motors() -> None:
+def test_commands_with_jitter_reach_the_motors_one_per_cycle() -> None:
     robot = controller(command_delay_s=0.01, timeout_s=1.0, rate_tolerance=0.9)
     arrivals_s = 5.0 + np.arange(2000) * DT_S + np.random.default_rng(0).uniform(0.0, DT_S, 2000)
     arrivals_s[1000:] += 0.5  # a pause
@@ -208,7 +208,7 @@ def test_motors_at_their_torque_and_joints_left_behind_are_reflexes() -> None:
         assert robot.reflex is None
 
 
-def test_commands_may_end_at_rest_but_neither_in_a_motion_nor_come_at_another_rate() -> None:
+def test_commands_may_end_only_at_rest_and_keep_their_rate() -> None:
     there_and_back = smooth(2001, 0.3, 2.0)
     for count, mode in ((2001, Mode.IDLE), (1001, Mode.IDLE), (700, Mode.REFLEX)):
         robot = controller(timeout_s=0.05)
@@ -227,7 +227,7 @@ def test_commands_may_end_at_rest_but_neither_in_a_motion_nor_come_at_another_ra
 
 
 @pytest.mark.parametrize("command", [[math.nan, *HOME[1:]], [math.inf, *HOME[1:]], HOME[:6], [], [*HOME, 0.0]])
-def test_what_is_no_command_is_a_reflex(command: Any) -> None:
+def test_invalid_command_causes_a_reflex(command: Any) -> None:
     robot = controller()
     robot.command(0.0, HOME)
     robot.command(DT_S, command)
@@ -273,7 +273,7 @@ def test_limits_of_robots_can_be_changed_joint_by_joint(robot: str) -> None:
         ({"command_hz": 0.0}, "command_hz: must be > 0"),
     ],
 )
-def test_wrong_limits_are_told_with_file_and_key(changes: dict[str, Any], complaint: str) -> None:
+def test_wrong_limits_are_reported_with_file_and_key(changes: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ConfigError, match=complaint):
         FakeDriverConfig.parse({"robot": "panda", "limits": "panda", **changes}, "~config").load_limits()
 

@@ -48,7 +48,7 @@ def test_a_random_tree_is_multiplied_up_and_down(seed: int) -> None:
     assert (found[ROTATION].to_numpy()[1:] * found[ROTATION].to_numpy()[:-1]).sum(axis=1).min() >= 0.0
 
 
-def test_frames_of_different_rates_are_interpolated_and_the_error_is_there() -> None:
+def test_frames_of_different_rates_are_interpolated_with_a_time_error() -> None:
     fast, slow = np.linspace(0.0, 1.0, 11), np.array([0.0, 1.0])
     none = Rotation.from_quat([[0.0, 0.0, 0.0, 1.0]])
     a = _rows("world", "a", fast, np.outer(fast, [1, 0, 0]), Rotation.concatenate([none] * 11))
@@ -71,7 +71,7 @@ def test_the_same_frame_is_the_identity_of_no_time() -> None:
     np.testing.assert_allclose(transforms_between(tables, "a", "a", times=[3.0]).iloc[0], [0, 0, 0, 0, 0, 0, 1, 0])
 
 
-def test_what_cannot_be_connected_is_named() -> None:
+def test_unconnected_frames_are_named() -> None:
     one = Rotation.from_quat([[0.0, 0.0, 0.0, 1.0]])
     rows = {pair: _rows(*pair, np.zeros(1), np.zeros((1, 3)), one) for pair in [("w", "a"), ("v", "b"), ("v", "a")]}
     apart = {"/tf": pd.concat([rows["w", "a"], rows["v", "b"]])}

@@ -64,7 +64,7 @@ def random_quat(rng: np.random.Generator) -> Quaternion:
     return normalized(rng.normal(size=4).tolist())
 
 
-def test_samples_are_at_their_true_times_and_do_not_depend_on_the_rate():
+def test_samples_have_true_times_independent_of_the_tick_rate():
     """The release stretched n samples over the whole time, and played one at each tick."""
     config = joints("a", inter_dt=0.03)
     of_rates = []
@@ -173,7 +173,7 @@ def test_protected_samples_are_those_of_the_plan_before(seed):
     assert got[count + 3].state.position != pytest.approx(expected[count + 3].state.position, abs=1e-9)
 
 
-def test_many_motions_in_one_life_and_a_new_one_after_forget():
+def test_interpolator_plays_many_motions_and_restarts_after_forget():
     config = joints("a")
     plan = Interpolator(config)
     add(plan, config, [[0, 1], [0, 1]], 0.0)
@@ -353,7 +353,7 @@ def test_each_representation_has_its_rotation_and_the_shortest_path_wraps():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_angular_motion_is_that_of_the_orientations(seed):
+def test_angular_velocity_matches_the_orientations(seed):
     """Against differences of the orientations, with knots up to half a turn apart."""
     rng, h = np.random.default_rng(seed), 1e-4
     knots = [RotationKnot(float(i), random_quat(rng), *(tuple(v) for v in rng.normal(size=(2, 3)))) for i in range(4)]
@@ -412,7 +412,7 @@ def test_wrong_waypoints_are_named():
     )
 
 
-def test_waypoints_that_are_over_are_refused_and_the_motion_goes_on():
+def test_expired_waypoints_are_refused_and_the_motion_continues():
     config = joints("a", nochange_window_length=20)
     plan = Interpolator(config)
     assert "expected a waypoint to come, the last one is 1 s old" in refused(

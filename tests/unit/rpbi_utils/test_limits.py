@@ -31,7 +31,7 @@ def _nest(levels: int, last: str, length: str = "") -> MessageType:
 
 
 @pytest.mark.parametrize("length", ["", "[2]"])
-def test_types_in_types_are_read_once_however_often_they_are_named(length: str) -> None:
+def test_nested_types_are_read_once_however_often_they_are_named(length: str) -> None:
     nested = _nest(45, "", length)  # 2^45 messages of nothing, in 3 kB
     assert nested.fields == () and not nested.holds_bytes
     assert lay_out(nested, b"").leaves == {}
@@ -62,7 +62,7 @@ def test_arrays_of_nothing_take_no_time(length: str) -> None:
         lay_out(_types(f"T1{length} x", "uint8 y"), b"\7")
 
 
-def test_a_message_has_at_most_so_many_values_and_a_path_so_many_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_message_values_and_name_bytes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rpbi_utils.bags.layout.MAX_VALUES", 4)
     assert len(lay_out(_types("uint8[4] x"), bytes(4)).leaves) == 4
     with pytest.raises(LimitError, match="expected at most 4 values in a message, got more"):
@@ -162,7 +162,7 @@ def test_a_builder_asks_its_budget_for_each_layout() -> None:
         builder.table()
 
 
-def test_files_of_topics_with_one_name_or_a_long_one_can_be_made() -> None:
+def test_topics_with_similar_or_long_names_get_distinct_file_names() -> None:
     stems = file_stems(["/a", "/a/", "/a.", "/a-2", "/" + "x" * 5000, "/" + "x" * 5001])
     assert len(set(stems.values())) == 6
     assert list(stems.values())[:2] == ["a", "a-2"]

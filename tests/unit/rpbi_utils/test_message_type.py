@@ -28,7 +28,7 @@ float64 z
 """
 
 
-def test_fields_keep_order_length_and_nested_types_and_leave_constants_out() -> None:
+def test_fields_keep_order_length_and_nested_types_without_constants() -> None:
     message_type = MessageType.parse("a_msgs/Corners", POSE)
     assert [field.name for field in message_type.fields] == ["header", "corners", "values", "times"]
     assert [field.length for field in message_type.fields] == [SCALAR, 2, VARIABLE, VARIABLE]

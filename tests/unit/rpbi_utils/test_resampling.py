@@ -104,7 +104,7 @@ def test_too_old_samples_are_no_values() -> None:
     assert list(found["text"]) == ["c", None]
 
 
-def test_rotations_are_on_the_shortest_way_whatever_their_signs() -> None:
+def test_rotations_take_the_shortest_path_whatever_their_signs() -> None:
     angles = np.radians([170.0, 190.0, 230.0])
     quats = Rotation.from_rotvec(np.outer(angles, [0, 0, 1])).as_quat() * [[1], [-1], [1]]
     table = _table([0.0, 1.0, 2.0], **{f"rotation/{axis}": quats[:, i] for i, axis in enumerate("xyzw")})

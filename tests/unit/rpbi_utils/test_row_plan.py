@@ -24,9 +24,7 @@ def test_joints_are_columns_by_name(joint_state_type: MessageType, pack_joint_st
     assert plan.notes == []
 
 
-def test_names_of_joints_are_part_of_what_equal_messages_share(
-    joint_state_type: MessageType, pack_joint_state: Pack
-) -> None:
+def test_equal_messages_share_the_names_of_joints(joint_state_type: MessageType, pack_joint_state: Pack) -> None:
     first = pack_joint_state(1, ["a", "b"], [1.0, 2.0])
     swapped = pack_joint_state(1, ["b", "a"], [1.0, 2.0])
     later = pack_joint_state(9, ["a", "b"], [5.0, 6.0])
@@ -39,7 +37,7 @@ def test_names_of_joints_are_part_of_what_equal_messages_share(
     assert shared(first) != shared(swapped)
 
 
-def test_values_that_cannot_be_assigned_to_joints_are_left_out_and_named(
+def test_values_without_matching_joints_are_left_out_and_named(
     joint_state_type: MessageType, pack_joint_state: Pack
 ) -> None:
     plan = plan_rows(joint_state_type, pack_joint_state(1, ["a", "b"], [1.0], [1.0, 2.0]))
@@ -52,7 +50,7 @@ def test_joints_without_names_are_numbered(joint_state_type: MessageType, pack_j
     assert [name for name in plan.rows[0] if "header" not in name] == ["position/0", "position/1"]
 
 
-def test_fields_named_like_the_index_or_the_record_time_get_a_name_of_their_own() -> None:
+def test_fields_named_like_index_or_record_time_are_renamed() -> None:
     plan = plan_rows(MessageType.parse("a_msgs/A", "float32 time\nfloat32 record_time\nfloat32 x"), bytes(12))
     assert list(plan.rows[0]) == ["time_", "record_time_", "x"]
 

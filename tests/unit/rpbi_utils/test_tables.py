@@ -82,9 +82,7 @@ def test_batches_leave_no_trace(
     pd.testing.assert_frame_equal(_table(joint_state_type, raws), whole)
 
 
-def test_rows_are_in_the_order_of_stamps_and_equal_stamps_in_that_of_recording(
-    joint_state_type: MessageType, pack_joint_state: Pack
-) -> None:
+def test_rows_are_ordered_by_stamp_then_by_recording(joint_state_type: MessageType, pack_joint_state: Pack) -> None:
     stamps = [5, 3, 3, 4]
     table = _table(joint_state_type, [pack_joint_state(stamp, ["a"], [index]) for index, stamp in enumerate(stamps)])
     assert list(table.index) == [3.0, 3.0, 4.0, 5.0]
@@ -92,9 +90,7 @@ def test_rows_are_in_the_order_of_stamps_and_equal_stamps_in_that_of_recording(
     assert list(table["record_time"]) == [101.0, 102.0, 103.0, 100.0]
 
 
-def test_the_record_time_stands_in_for_a_stamp_of_zero_and_for_no_header(
-    joint_state_type: MessageType, pack_joint_state: Pack
-) -> None:
+def test_record_time_replaces_a_zero_or_missing_stamp(joint_state_type: MessageType, pack_joint_state: Pack) -> None:
     table = _table(joint_state_type, [pack_joint_state(0, ["a"], [1.0]), pack_joint_state(200, ["a"], [2.0])])
     assert list(table.index) == [100.0, 200.0]
     assert list(_table(NUMBER, [struct.pack("<d", 1.0)]).index) == [100.0]
@@ -139,7 +135,7 @@ def test_time_and_duration_are_seconds() -> None:
     assert table["d"].iloc[0] == -1.75
 
 
-def test_texts_of_equal_and_of_other_lengths_are_told_apart() -> None:
+def test_texts_of_equal_and_different_lengths_are_kept_apart() -> None:
     texts = [b"ab", b"cd", b"", b"ab", "ä".encode(), b"a\0"]
     assert list(_table(TEXT, [_text(text) for text in texts])["data"]) == [text.decode() for text in texts]
 
@@ -169,7 +165,7 @@ def test_two_types_on_one_topic_share_a_table() -> None:
     assert list(builder.table()["data"]) == [1.5, "x"]
 
 
-def test_a_clock_that_was_set_back_and_messages_of_several_types_are_named(
+def test_clock_set_back_and_mixed_message_types_are_reported(
     joint_state_type: MessageType, pack_joint_state: Pack, caplog: pytest.LogCaptureFixture
 ) -> None:
     _table(joint_state_type, [pack_joint_state(stamp, ["a"], [0.0]) for stamp in (5, 7, 6, 8)])

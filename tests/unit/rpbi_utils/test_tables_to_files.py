@@ -49,7 +49,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(columns, index=pd.Index([1700000000.000000001, 1700000000.1], name="time"))
 
 
-def test_parquet_gives_back_what_went_in(table: pd.DataFrame, tmp_path: Path) -> None:
+def test_parquet_round_trip_preserves_the_table(table: pd.DataFrame, tmp_path: Path) -> None:
     table["data"] = [b"\0\xff", b""]
     write_table(table, tmp_path / "t.parquet")
     back = pd.read_parquet(tmp_path / "t.parquet", engine="fastparquet")
@@ -92,7 +92,7 @@ def test_an_empty_table_can_be_written(tmp_path: Path, name: str) -> None:
     assert (tmp_path / name).stat().st_size > 0
 
 
-def test_hdf5_gives_back_what_went_in(table: pd.DataFrame, tmp_path: Path) -> None:
+def test_hdf5_round_trip_preserves_the_table(table: pd.DataFrame, tmp_path: Path) -> None:
     table["data"] = [b"\0\xff", b""]
     write_table(table, tmp_path / "t.hdf5")
     with h5py.File(tmp_path / "t.hdf5") as file:

@@ -45,7 +45,7 @@ def test_noise_at_rest_is_smoothed_and_motion_is_hardly_late() -> None:
     assert 0.0 < rotation_between(last.quat_xyzw, turned(199 * DT_S))[2] < 1.0 * 0.03
 
 
-def test_time_between_samples_is_what_counts() -> None:
+def test_filter_depends_on_the_time_between_samples() -> None:
     """A step is answered alike at 100 Hz, at 1 kHz, and where every third sample is missing."""
     constant = SmoothingConfig(min_cutoff_hz=1.0, per_speed=0.0, per_angular_speed=0.0)
     answers = []

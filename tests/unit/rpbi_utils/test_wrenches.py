@@ -35,7 +35,7 @@ def sample(payload: PayloadConfig, quat: Quaternion, noise: np.ndarray | float =
     return PoseSample(payload.offset + payload.weight(gravity) + noise, gravity)
 
 
-def test_the_weight_is_what_holds_the_payload():
+def test_weight_is_the_wrench_that_holds_the_payload():
     """Upwards by m g, with the moment of a force at the centre."""
     assert PAYLOAD.weight(gravity_in(Pose(), 9.81)) == pytest.approx([0, 0, 16.677, -0.05 * 16.677, -0.03 * 16.677, 0])
 
@@ -103,7 +103,7 @@ def test_a_touch_and_an_empty_sensor_are_refused():
     assert "expected a payload, got a mass of" in refused([sample(empty, tilted(*each)) for each in TILTS])
 
 
-def test_the_calibrated_wrench_is_that_of_contacts():
+def test_calibrated_wrench_contains_contacts_only():
     calibration = WrenchCalibration(PAYLOAD)
     push = np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
     for each in TILTS:

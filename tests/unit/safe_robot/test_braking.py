@@ -17,7 +17,7 @@ def braking(period_s: float, velocity: float = V, acceleration: float = A, jerk:
 
 
 @pytest.mark.parametrize("period_s", [0.001, 0.002, 0.01, 0.04])
-def test_from_any_state_within_limits_it_comes_to_rest_within_limits_of_acceleration_and_jerk(period_s):
+def test_braking_from_any_state_obeys_acceleration_and_jerk_limits(period_s):
     generator = np.random.default_rng(1)
     brakes = braking(period_s)
     for _ in range(200):
@@ -53,12 +53,12 @@ def _fits(length: int, v: float, a: float, period_s: float) -> bool:
     return np.abs(jerk).max() <= J * period_s**3 and np.abs(a + np.cumsum(jerk)).max() <= A * period_s**2
 
 
-def test_what_stands_stays():
+def test_braking_from_rest_does_not_move():
     brake = braking(0.01).plan(np.zeros(4), np.zeros(4))
     assert not brake.displacement.any()
 
 
-def test_from_beyond_its_limits_it_knows_no_way():
+def test_braking_from_outside_the_limits_has_no_plan():
     assert braking(0.01).plan(np.zeros(4), np.array([0.0, 0.0, 0.0, 2.0 * A])) is None
 
 

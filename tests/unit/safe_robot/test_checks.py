@@ -145,13 +145,13 @@ def check_of(name: str, guarded: GuardedRobot, limits: dict | None = None, /, **
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf"])
-def test_a_measured_force_that_is_not_a_number_is_too_large(bad):
+def test_non_finite_measured_force_is_too_large(bad):
     check = check_of("force", GuardedRobot(KUKA))
     motion = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     assert check.check(motion, CheckContext(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
 
 
-def test_a_robot_that_is_as_late_as_expected_follows_and_one_that_stands_does_not(tmp_path):
+def test_tracking_accepts_the_expected_lag_and_rejects_a_stalled_robot(tmp_path):
     robot = slider(tmp_path)
     check = check_of("tracking", robot, tolerance=0.05, lag_s=0.1)
     start = State(np.array((0.5, 0.0)), np.array((0.8, 0.0)), np.zeros(2))
@@ -191,7 +191,7 @@ def test_a_link_box_reaches_where_the_link_is(tmp_path):
     assert violation.value == pytest.approx(0.5001)
 
 
-def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
+def test_link_speed_is_that_of_its_origin(tmp_path):
     robot = slider(tmp_path)
     check = check_of("link_velocity", robot, links={"hand": 0.25})
     for speed, is_safe in ((0.249, True), (0.251, False)):
@@ -202,7 +202,7 @@ def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["link_box", "link_velocity"])
-def test_what_joints_could_not_bring_about_at_all_is_not_computed_and_the_answers_are_the_same(name):
+def test_bound_by_reach_skips_computation_without_changing_the_result(name):
     robot, link, generator, safe = GuardedRobot(KUKA), "lwr_arm_7_link", np.random.default_rng(5), 0
     low, high, most = np.array((-0.66, -0.04, 0.52)), np.array((-0.59, 0.04, 0.58)), 0.3
     boxes = {link: dict(zip("xyz", np.stack((low, high), axis=1).tolist()))}
@@ -231,7 +231,7 @@ def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
 
 @pytest.mark.quick
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_path, side):
+def test_joint_stays_within_limits_and_moves_only_inwards_outside(tmp_path, side):
     robot = slider(tmp_path)
     check = check_of("joint_position", robot)
     for before, after, is_safe in ((0.99, 1.0, True), (0.99, 1.01, False), (1.2, 1.19, True), (1.2, 1.21, False)):
@@ -243,7 +243,7 @@ def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_
 
 @pytest.mark.parametrize("name", ["joint_velocity", "joint_acceleration", "joint_jerk"])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_both_ways_have_limits(tmp_path, name, side):
+def test_both_directions_have_limits(tmp_path, name, side):
     robot = slider(tmp_path)
     check = check_of(name, robot, LIMITS)
     start = State.at_rest(np.zeros(2))
@@ -331,7 +331,7 @@ def test_any_shape_is_kept_away_from(tmp_path, obstacle):
     assert check.check(away, CheckContext(obstacles=())) is None
 
 
-def test_what_is_around_the_robot_may_come_go_and_move(tmp_path):
+def test_obstacles_may_appear_disappear_and_move(tmp_path):
     check, motion = stretched(tmp_path)
     near, far = (BALL._replace(pose=Pose((0.6, y, 0.0))) for y in (0.14, 0.3))
     for obstacles, is_safe in (((), True), ((near,), False), ((far,), True), ((far, near), False), ((far, BALL), True)):
@@ -350,7 +350,7 @@ RAIL = """<robot name="rail"><link name="base"/>
 </robot>"""
 
 
-def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_path):
+def test_joint_motion_since_the_last_distance_query_counts(tmp_path):
     path = tmp_path / "rail.urdf"
     path.write_text(RAIL)
     check = check_of("environment", GuardedRobot(str(path)))
@@ -368,12 +368,12 @@ def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_pat
         assert (violation is None) == is_safe, way.max()
 
 
-def test_a_factor_takes_as_much_of_the_range_from_both_ends(tmp_path):
+def test_position_factor_shrinks_the_range_equally_from_both_ends(tmp_path):
     limits = MotionLimits.of(slider(tmp_path), LimitsConfig(position_factor=0.5), "guard.yaml")
     assert limits.lower.tolist() == [-0.5, -1.0] and limits.upper.tolist() == [0.5, 1.0]
 
 
-def test_where_nobody_tells_of_the_environment_nothing_is_safe(tmp_path):
+def test_environment_check_without_a_source_of_obstacles_is_unsafe(tmp_path):
     check, motion = stretched(tmp_path)
     assert "no source of bodies around" in str(check.check(motion, CheckContext()))
 
@@ -407,7 +407,7 @@ def world_of(folder) -> str:
     return str(path)
 
 
-def test_a_world_file_tells_of_bodies_in_the_root_of_the_robot_that_stands_in_it(tmp_path):
+def test_world_file_gives_obstacles_in_the_robots_root_frame(tmp_path):
     robot = folding(tmp_path)
     check = check_of("environment", robot, world=world_of(tmp_path))
     box, wall = check._obstacles
@@ -452,7 +452,7 @@ def test_pairs_can_be_read_changed_and_read_again(tmp_path):
         check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(tmp_path / "nowhere" / "pairs.yaml"))
 
 
-def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refused(tmp_path):
+def test_srdf_disables_pairs_and_that_of_another_robot_is_refused(tmp_path):
     path = tmp_path / "arm.srdf"
     path.write_text('<robot name="a"><disable_collisions link1="lwr_arm_7_link" link2="lwr_arm_0_link"/></robot>')
     pairs = check_of("self_collision", GuardedRobot(KUKA), srdf=str(path)).pairs
@@ -476,12 +476,12 @@ def test_an_unknown_link_is_named_with_the_key(tmp_path, name, options):
         check_of(name, slider(tmp_path), **options)
 
 
-def test_a_box_the_wrong_way_round_is_refused(tmp_path):
+def test_reversed_box_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"checks.link_box.boxes.hand.x: expected the least value first"):
         check_of("link_box", slider(tmp_path), boxes={"hand": {"x": [1.0, -1.0]}})
 
 
-def test_stamps_must_not_go_back_and_targets_must_come_while_the_robot_moves():
+def test_stamps_must_not_decrease_and_moving_robot_needs_targets():
     check = check_of("staleness", GuardedRobot(KUKA))
     still = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     moving = State(np.array(HOME), np.full(7, 0.1), np.zeros(7))

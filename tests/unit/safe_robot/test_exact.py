@@ -73,7 +73,7 @@ def distance(robot, obstacle, geometry, at) -> float:
     return min(distances.contact(("peg", 0), 10.0, MARGIN_M).distance, MARGIN_M)
 
 
-def test_the_peg_goes_into_a_hollow_up_to_its_walls_and_with_hulls_stays_before_it(peg, tmp_path):
+def test_peg_enters_a_hollow_with_exact_geometry_but_not_hulls(peg, tmp_path):
     pytest.importorskip("hppfcl")
     pytest.importorskip("daqp")
     around = CheckContext(obstacles=(mesh_of(tmp_path / "trough.obj", TROUGH),))
@@ -92,7 +92,7 @@ def test_the_peg_goes_into_a_hollow_up_to_its_walls_and_with_hulls_stays_before_
     assert found.subject == "link 'peg' and 'mesh'" and found.value == pytest.approx(0.01995, abs=1e-6), found
 
 
-def test_what_is_in_a_closed_mesh_and_far_from_its_surface_is_in_collision(peg, tmp_path):
+def test_body_inside_a_closed_mesh_is_in_collision(peg, tmp_path):
     pytest.importorskip("hppfcl")
     case, trough = mesh_of(tmp_path / "case.obj", CASE), mesh_of(tmp_path / "trough.obj", TROUGH)
     assert distance(peg, case, "exact", (0.0, 0.0)) < 0.0
@@ -117,7 +117,7 @@ def test_edges_of_boxes_count_as_sharp(peg, geometry):
     assert found == pytest.approx(far, abs=1e-6) or geometry == "hulls" and far - 0.0015 < found <= far
 
 
-def test_without_the_library_exact_shapes_name_what_to_install(peg, monkeypatch):
+def test_exact_geometry_without_its_library_names_the_install_command(peg, monkeypatch):
     monkeypatch.setitem(sys.modules, "hppfcl", None)
     monkeypatch.delitem(sys.modules, "safe_robot.geometry.exact", raising=False)
     with pytest.raises(MissingDependency, match="rpbi setup ik"):

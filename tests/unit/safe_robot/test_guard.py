@@ -36,7 +36,7 @@ def test_safe_targets_pass_to_the_last_bit(policy):
         assert decision == Decision(target)
 
 
-def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_started(tmp_path):
+def test_reject_sends_nothing_after_an_unsafe_target_until_restarted(tmp_path):
     guard = guard_of(slider(tmp_path))
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
     decision = decide(guard, (0.1, 0.0))
@@ -50,7 +50,7 @@ def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_starte
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
 
 
-def test_before_a_limit_of_position_only_speeds_that_can_be_braked_pass(tmp_path):
+def test_only_speeds_that_can_be_braked_pass_before_position_limits(tmp_path):
     """The same speed is safe in the middle and not near the limit, though the target is within all limits."""
     robot = slider(tmp_path)
     guard = guard_of(robot)
@@ -62,7 +62,7 @@ def test_before_a_limit_of_position_only_speeds_that_can_be_braked_pass(tmp_path
     assert 0.9 < targets[first][0] < 1.0
 
 
-def test_what_cannot_be_braked_is_not_safe_whatever_the_checks_say(tmp_path):
+def test_motion_that_cannot_be_braked_is_unsafe_without_any_check(tmp_path):
     off = {"active": False}
     guard = guard_of(slider(tmp_path), checks={"joint_acceleration": off, "joint_jerk": off})
     decide(guard, (0.0, 0.0))
@@ -96,7 +96,7 @@ class TestStart:
         assert decision.command is None and not decision.is_halted and decision.violation.check == "start"
         assert decide(guard, (0.0, 0.0), measured={"slide": 0.01, "turn": 0.0}).command == (0.0, 0.0)
 
-    def test_until_it_is_told_what_is_around_it_waits(self, tmp_path):
+    def test_guard_waits_until_obstacles_are_known(self, tmp_path):
         guard = guard_of(slider(tmp_path), checks={"environment": {}})
         decision = decide(guard, (0.0, 0.0))
         assert decision.command is None and not decision.is_halted and decision.violation.check == "environment"
@@ -126,7 +126,7 @@ class TestStart:
             assert (decision.command is not None) == is_safe, first
 
 
-def test_it_says_when_targets_fail_to_come_while_the_robot_moves_and_only_then(tmp_path):
+def test_watchdog_reports_missing_targets_only_while_the_robot_moves(tmp_path):
     robot = slider(tmp_path)
     guard = guard_of(robot)
     targets = list(smooth(robot, 1.0))
@@ -152,7 +152,7 @@ def test_targets_of_one_stamp_are_one_target(tmp_path, policy):
 
 
 @pytest.mark.parametrize("policy", ["reject", "limit"])
-def test_a_stamp_that_stands_still_stops_a_moving_robot(tmp_path, policy):
+def test_unchanged_stamp_stops_a_moving_robot(tmp_path, policy):
     guard = guard_of(slider(tmp_path), policy=policy)
     for target in list(smooth(guard.robot, 1.0))[:50]:
         decide(guard, target)
@@ -181,7 +181,7 @@ class TestLimitPolicy:
         commands = [decide(guard, (5.0, 0.0)).command for _ in range(400)]
         assert commands[-1][0] == pytest.approx(1.0, abs=5e-3) and max(x for x, _ in commands) <= 1.0
 
-    def test_what_is_no_target_brakes_the_robot(self, tmp_path):
+    def test_invalid_target_brakes_the_robot(self, tmp_path):
         robot = slider(tmp_path)
         guard = guard_of(robot, policy="limit")
         commands = [decide(guard, target).command for target in list(smooth(robot, 1.0))[:60]]
@@ -235,7 +235,7 @@ class TestLimitPolicy:
         assert max(worst_shares([*stands, *commands], LIMITS, PERIOD_S).values()) <= 1.0 + ROUNDING
         assert commands[-1] == pytest.approx((0.5, 0.5), abs=1e-3)
 
-    def test_away_from_what_is_near_it_may_be_fast(self, tmp_path):
+    def test_motion_away_from_a_near_body_may_be_fast(self, tmp_path):
         """Out of the margin of a self-collision, the speed is that of anywhere."""
         robot = folding(tmp_path)
         limits = {**LIMITS, "velocity_factor": 1.0}
@@ -257,7 +257,7 @@ def test_without_a_solver_it_scales_back(tmp_path, monkeypatch, caplog):
     assert 2.0 < commands[-1][1] < 2.9
 
 
-def test_it_goes_along_what_is_in_the_way(tmp_path):
+def test_limit_policy_slides_along_an_obstacle(tmp_path):
     """One joint is held back by the base; the other one goes to its target as fast as ever."""
     pytest.importorskip("daqp")
     guard = guard_of(folding(tmp_path), policy="limit", limits=LIMITS, checks={"self_collision": {"margin_m": 0.05}})
@@ -271,7 +271,7 @@ class TestInsideTheMargin:
     START = (0.0, 2.60)
     CHECKS = {"self_collision": {"margin_m": 0.1}}
 
-    def test_it_is_told_which_way_leads_away(self, tmp_path):
+    def test_way_out_names_the_direction_that_leads_away(self, tmp_path):
         guard = guard_of(folding(tmp_path), policy="limit", limits=LIMITS, checks=self.CHECKS)
         assert guard.way_out() is None, "nobody knows where it is"
         decide(guard, self.START)
@@ -296,7 +296,7 @@ class TestInsideTheMargin:
 
 
 @pytest.mark.parametrize("jerk", [200.0, 300.0, 1000.0])
-def test_a_joint_passes_no_target_that_stands_still(tmp_path, jerk):
+def test_joint_does_not_overshoot_a_constant_target(tmp_path, jerk):
     """Neither by going on after a target that it reaches too fast, nor by another braking than the one before."""
     robot, generator = slider(tmp_path), np.random.default_rng(0)
     for target in generator.uniform(-0.9, 0.9, (12, 2)):

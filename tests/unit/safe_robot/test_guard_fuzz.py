@@ -27,7 +27,7 @@ SEED, STEPS = 11, 8
 
 @pytest.mark.parametrize("policy", ["limit", pytest.param("reject", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("scene, count", [(TWO, 1200), (SEVEN, 300)], ids=["two", "seven"])
-def test_no_adversary_gets_the_robot_out_of_limits_or_into_anything(scene, count, policy):
+def test_no_adversary_gets_the_robot_past_limits_or_into_collision(scene, count, policy):
     report = fuzz(scene, scene.guard(policy), Oracle(scene), count, np.random.default_rng(1))
     assert not report.faults, report.faults[:5]
     refused, commands, brakings = (10, 500, 30) if scene is TWO else (1, 120, 6)
@@ -40,7 +40,7 @@ def test_no_adversary_gets_the_robot_out_of_limits_or_into_anything(scene, count
     "scene, bad",
     [*((TWO, bad) for bad in (*LIMITS, "collision")), pytest.param(SEVEN, "collision", marks=pytest.mark.thorough)],
 )
-def test_the_oracle_finds_what_a_bad_guard_lets_through(scene, bad):
+def test_oracle_finds_motions_that_a_bad_guard_accepts(scene, bad):
     guard = scene.guard("limit", **{key: 1.5 * most for key, most in LIMITS.items() if key == bad})
     guard.checks[:] = [check for check in guard.checks if bad != "collision" or check.name != "environment"]
     report = fuzz(scene, guard, Oracle(scene), 1200 if bad == "collision" else 300, np.random.default_rng(1), every=100)
@@ -53,7 +53,7 @@ def test_from_inside_the_margin_the_robot_gets_away():
 
 
 @pytest.mark.parametrize("is_mended", [True, False])
-def test_hill_climbing_finds_no_braking_inside_the_margin_unless_rows_are_left_out(monkeypatch, is_mended):
+def test_hill_climbing_finds_unsafe_braking_only_with_sparse_rows(monkeypatch, is_mended):
     """A wrist that swings its flange through the lowest point is nearest to the table between two sparse rows."""
     every = Proximity._judged
 
@@ -82,7 +82,7 @@ def test_a_target_that_leads_away_at_a_slant_is_reached(start, way):
     assert commands[-1] == pytest.approx(target, abs=2e-3) and fault_of(Oracle(TWO), commands) is None
 
 
-def test_what_holds_a_robot_between_two_margins_is_named_and_a_smaller_margin_lets_it_out():
+def test_robot_locked_between_margins_is_released_by_a_smaller_one():
     """The arm is folded onto its base and flat above the table: what leads from one brings it nearer to the other."""
     driver, oracle = Driver(TWO), Oracle(TWO)
     there = driver.follow(np.array((1.055, -2.642)))[-1]

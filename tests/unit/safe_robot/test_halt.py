@@ -58,7 +58,7 @@ HALTS = (refuse, nonsense, stale, fail, fail_later, Guard.halt)
 
 
 @pytest.mark.parametrize("halt", HALTS, ids=lambda halt: halt.__name__)
-def test_after_any_halt_it_brakes_as_was_found_safe_and_rests_there(tmp_path, halt):
+def test_any_halt_follows_the_verified_braking_and_ends_at_rest(tmp_path, halt):
     guard, commands = in_motion(tmp_path, on_halt="brake", start_tolerance=0.01)
     known = guard.stop_commands
     assert len(known) > 10 and not guard.is_braking and guard.next_braking() is None
@@ -85,7 +85,7 @@ def test_by_default_nothing_follows(tmp_path, halt):
     assert guard.last_command == commands[-1] and not len(guard.stop_commands)
 
 
-def test_a_robot_that_stands_is_sent_nothing(tmp_path):
+def test_robot_at_rest_receives_no_command(tmp_path):
     guard = guard_of(slider(tmp_path), on_halt="brake")
     for _ in range(3):
         decide(guard, (0.1, 0.0))

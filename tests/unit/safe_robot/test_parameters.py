@@ -76,7 +76,7 @@ def test_every_parameter_is_taken_or_refused_in_words(tmp_path, monkeypatch):
         ({"silence_s": math.nan}, "/guard: silence_s: must be a finite number"),
     ],
 )
-def test_a_wrong_parameter_is_named_with_what_was_expected_and_what_it_was(tmp_path, parameters, message):
+def test_wrong_parameter_is_reported_with_expected_and_given_value(tmp_path, parameters, message):
     path = tmp_path / "slider.urdf"
     path.write_text(SLIDER)
     with pytest.raises(ConfigError, match=message):

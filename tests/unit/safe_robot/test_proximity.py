@@ -56,7 +56,7 @@ def grazing(distances, start, way):
     return [swing(distances, start, share * way) for share in (outside, inside)]
 
 
-def test_a_motion_is_safe_if_and_only_if_each_row_is(distances):
+def test_motion_is_safe_exactly_if_each_row_is(distances):
     """Each pair of motions differs by 0.2 %; planes and distances of the motions before are still in use."""
     proximity = Proximity(distances, PAIRS, MARGIN_M)
     generator = np.random.default_rng(3)
@@ -71,7 +71,7 @@ def test_a_motion_is_safe_if_and_only_if_each_row_is(distances):
             assert found is not None and found.distance < MARGIN_M and found.is_while_braking
 
 
-def test_a_row_without_a_bound_of_its_own_has_that_of_a_row_beside_it_less_the_way_between():
+def test_row_without_own_bound_inherits_a_neighbours_minus_the_distance():
     bounds = np.array(((np.inf,), (-np.inf,), (0.5,)))
     _spread(bounds, np.array((0, 2)), np.array(((0.0,), (0.2,), (0.3,))))
     assert bounds[:, 0] == pytest.approx((np.inf, 0.4, 0.5)), "inf says that a row may be, and nothing of other rows"

@@ -156,7 +156,7 @@ def test_shapes_are_where_the_description_puts_them(tmp_path):
         assert (bounds <= measured).all() and (measured - bounds < LOOSE_M).all()
 
 
-def test_what_is_not_known_is_no_bound(distances, pairs):
+def test_unknown_distance_gives_no_bound(distances, pairs):
     separation = separation_of(distances, pairs[:1])
     separation.learn(0, [(math.nan, 0.0, 0.0)], distances.frames(np.zeros((1, 7)))[0])
     assert not separation.lower_bounds(distances.frames(np.zeros((1, 7))), np.array((0,)))[0, 0] > 0.0

@@ -56,7 +56,7 @@ def centre(robot: GuardedRobot, q: np.ndarray, link: str) -> np.ndarray:
     return (robot.frames.at(q[None])[0, frame] @ pose @ (*OFF_M, 1.0))[:3]
 
 
-def test_spheres_are_as_far_apart_as_their_centres_without_their_radii(library, robot):
+def test_distance_of_spheres_is_centre_distance_minus_radii(library, robot):
     measured = LinkDistances(robot)
     assert measured.links == tuple(RADII_M)
     for q in configurations(robot, 5):

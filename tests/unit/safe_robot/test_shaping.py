@@ -62,7 +62,7 @@ def test_a_joint_does_not_go_past_a_target_that_stops(tmp_path, jerk):
 
 
 @pytest.mark.parametrize(("measured", "begin"), [(0.01, 0.0), (0.2, 0.2)])
-def test_a_motion_begins_at_the_last_command_or_where_the_robot_was_moved_to(tmp_path, measured, begin):
+def test_motion_begins_at_last_command_or_at_the_measured_position(tmp_path, measured, begin):
     guard = guard_of(slider(tmp_path), shape={}, start_from="measured")
     assert decide(guard, (0.0, 0.0), measured={"slide": 0.0, "turn": 0.0}).command == (0.0, 0.0)
     guard.halt()
@@ -77,14 +77,14 @@ def test_a_motion_begins_at_the_last_command_or_where_the_robot_was_moved_to(tmp
     ("target", "check"),
     [((0.3, 1.9), "joint_velocity"), ((float("nan"), 1.9), "input"), ((0.0, 2.02), "joint_position")],
 )
-def test_a_jump_what_is_no_target_and_what_is_outside_limits_are_not_smoothed(tmp_path, target, check):
+def test_jumps_and_invalid_targets_are_not_smoothed(tmp_path, target, check):
     guard = guard_of(slider(tmp_path), shape={}, limits={"velocity": 2.0})
     decide(guard, (0.0, 1.9))
     decision = decide(guard, target)
     assert decision.command is None and decision.is_halted and decision.violation.check == check
 
 
-def test_a_joint_that_goes_a_little_past_its_limit_is_kept_at_the_limit(tmp_path):
+def test_joint_slightly_past_its_limit_is_kept_at_the_limit(tmp_path):
     guard = guard_of(slider(tmp_path), shape={})
     turns = 1.804 + 0.1 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 400)))
     decisions = [decide(guard, (0.0, turn)) for turn in (*turns.tolist(), *[turns[-1]] * 50)]
@@ -94,7 +94,7 @@ def test_a_joint_that_goes_a_little_past_its_limit_is_kept_at_the_limit(tmp_path
     assert decisions[-1].command == (0.0, turns[-1])
 
 
-def test_what_is_smoothed_is_judged(tmp_path):
+def test_smoothed_targets_are_checked(tmp_path):
     """The elbow is led into the base, too fast at first."""
     guard = guard_of(folding(tmp_path), shape={}, checks={"self_collision": {"margin_m": 0.03}})
     decisions = [decide(guard, (1.2, min(0.008 * k, 2.8))) for k in range(400)]
@@ -105,7 +105,7 @@ def test_what_is_smoothed_is_judged(tmp_path):
     assert steps[-1] > 0.99 * steps[-20], "it halts at once, and does not brake before"
 
 
-def test_who_is_too_fast_is_followed_at_the_limit_of_speed(tmp_path):
+def test_too_fast_targets_are_followed_at_the_speed_limit(tmp_path):
     guard = guard_of(slider(tmp_path), shape={})
     decisions = [decide(guard, (1.2 * (k * PERIOD_S) ** 3, 0.0)) for k in range(60)]
     assert not any(decision.violation for decision in decisions)

@@ -36,7 +36,7 @@ def started(robot: GuardedRobot, out: float, **config: object) -> Guard:
 
 
 @pytest.mark.parametrize("link", ["trolley", "hook"])
-def test_no_link_goes_further_than_by_its_reach_from_wherever_a_joint_may_start(tmp_path, link):
+def test_link_displacement_is_bounded_by_its_reach_from_any_start(tmp_path, link):
     robot = crane(tmp_path)
     assert robot.telescopic == ("reach",)
     reach, chance = robot.reach(link, 0.0), np.random.default_rng(4)
@@ -70,7 +70,7 @@ def test_a_link_is_no_faster_where_the_boom_is_longest(tmp_path):
     assert 0.9 < 1.05 * fastest / 0.3 <= 1.0
 
 
-def test_where_the_reach_hangs_on_limits_they_are_checked_and_there_are_some(tmp_path):
+def test_telescopic_reach_requires_position_limits_and_their_check(tmp_path):
     with pytest.raises(ConfigError, match=r"checks.joint_position.active: expected true, since joint 'reach' slides"):
         guard_of(crane(tmp_path), checks={"joint_position": {"active": False}})
     boundless = crane(tmp_path, 'lower="0" upper="0"')

@@ -81,7 +81,7 @@ def test_files_named_by_an_object_become_absolute(folder: Path) -> None:
     assert shape.fileName == f"{folder}/meshes/cube.obj"
 
 
-def test_file_is_sought_beside_the_yaml_then_in_search_paths_then_in_pybullets_data(folder: Path) -> None:
+def test_file_search_order_is_yaml_folder_search_paths_pybullet_data(folder: Path) -> None:
     def found() -> str:
         world = load(folder, robots=["arm.yaml"], setAdditionalSearchPath="more")
         return str(world.objects[0].config.loadURDF.fileName)  # type: ignore[attr-defined]
@@ -100,7 +100,7 @@ def test_search_path_may_be_pybullets_data(folder: Path) -> None:
     assert world.config.setAdditionalSearchPath == (pybullet_data.getDataPath(), str(folder))
 
 
-def test_robot_description_is_a_word_until_a_file_stands_for_it(folder: Path) -> None:
+def test_robot_description_is_replaced_once_a_file_is_given(folder: Path) -> None:
     write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "robot_description"}})
     main = write(folder / "world.yaml", {"robots": ["arm.yaml"]})
     for file, expected in ((None, "robot_description"), ("/tmp/described.urdf", "/tmp/described.urdf")):
@@ -108,7 +108,7 @@ def test_robot_description_is_a_word_until_a_file_stands_for_it(folder: Path) ->
         assert world.objects[0].config.loadURDF.fileName == expected  # type: ignore[attr-defined]
 
 
-def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
+def test_faults_of_all_files_are_reported_at_once(folder: Path) -> None:
     write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": -1})
     shape = {**BALL["createVisualShape"], "radius": float("nan"), "raduis": 1}
     write(folder / "ball.yaml", {**BALL, "createVisualShape": shape})
@@ -175,7 +175,7 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
         ),
     ],
 )
-def test_wrong_value_in_the_main_file_is_told(folder: Path, main: dict[str, Any], told: str) -> None:
+def test_wrong_value_in_the_main_file_is_reported(folder: Path, main: dict[str, Any], told: str) -> None:
     assert problems(folder, **main)[0].startswith(f"world.yaml: {told}")
 
 
@@ -203,7 +203,7 @@ def test_parameter_that_is_no_mapping_is_refused() -> None:
         load_world_dict("text", "~config")  # type: ignore[arg-type]
 
 
-def test_missing_main_file_is_told(tmp_path: Path) -> None:
+def test_missing_main_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^{tmp_path}/none.yaml: no such file or directory$"):
         load_world(f"{tmp_path}/none.yaml")
 
@@ -248,11 +248,11 @@ def test_unknown_type_of_object_is_named() -> None:
         load_object("robt", ARM, "config")
 
 
-def test_lists_in_what_was_recorded_of_an_older_world_are_ignored() -> None:
+def test_lists_of_files_in_an_older_recorded_world_are_ignored() -> None:
     assert WorldConfig.model_validate({"timeStep": 0.01, "robots": ["arm.yaml"]}) == WorldConfig(timeStep=0.01)
 
 
-def test_every_key_of_the_main_file_has_a_description_and_a_schema() -> None:
+def test_every_key_of_the_main_file_has_description_and_schema() -> None:
     whole = main_file_model(object_sections()).model_json_schema()
     assert {"robots", "objects", "rgbd_sensors", "timeStep"} <= set(whole["properties"])
     for key, schema in whole["properties"].items():

@@ -50,7 +50,7 @@ def _world(tmp_path, **lists):
     return path
 
 
-def test_name_pose_and_colour_differ_and_the_rest_is_the_same(tmp_path):
+def test_entry_overrides_name_pose_and_colour_and_keeps_the_rest(tmp_path):
     red = {"name": "red", "basePosition": [1, 0, 1], "createVisualShape": {"rgbaColor": [1, 0, 0, 1]}}
     world = World.from_file(
         _world(

@@ -25,7 +25,7 @@ def test_roll_pitch_and_yaw_say_the_same_as_a_quaternion():
     assert poses({"tf_id": "a"}).pose_of("a") == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
-def test_poses_of_parents_are_taken_along_and_prefixes_are_left_out():
+def test_poses_include_those_of_parents_and_prefixes_are_optional():
     config = poses(
         {"tf_id": "tip", "parent": "table", "position": [0.0, 1.0, 0.0]},
         {"tf_id": "table", "position": [2.0, 0.0, 0.0], "orientation": [0.0, 0.0, HALF, HALF]},
@@ -49,7 +49,7 @@ def test_poses_of_parents_are_taken_along_and_prefixes_are_left_out():
         ([{"position": [0, 0, 0]}], "poses[0].tf_id: missing"),
     ],
 )
-def test_what_makes_no_sense_is_refused(entries, expected):
+def test_invalid_poses_are_refused(entries, expected):
     with pytest.raises(ConfigError) as error:
         poses(*entries)
     assert f"world.yaml: {expected}" in str(error.value)

@@ -58,7 +58,7 @@ def test_exclusive_constant_is_a_name_or_number_of_its_family() -> None:
         (URDF_FLAGS, [None], "got nothing"),
     ],
 )
-def test_what_is_not_of_the_family_is_refused(family: Constants, given: Any, told: str) -> None:
+def test_values_outside_the_family_are_refused(family: Constants, given: Any, told: str) -> None:
     with pytest.raises(ValueError) as caught:
         family.parse(given)
     assert told in str(caught.value)

@@ -131,7 +131,7 @@ def test_pybullet_takes_every_key_with_a_value_of_its_type(
 
 
 @pytest.mark.parametrize("key", ["lateralFrction", "bodyUniqueId", "linkIndex", "physicsClientId"])
-def test_key_that_pybullet_lacks_or_that_names_the_body_is_refused(key: str) -> None:
+def test_keys_unknown_to_pybullet_or_naming_the_body_are_refused(key: str) -> None:
     with pytest.raises(ConfigError, match=f"^f: {key}: unknown key '{key}'"):
         ChangeDynamics.parse({key: 1}, "f")
 
@@ -144,7 +144,7 @@ def test_key_that_pybullet_lacks_or_that_names_the_body_is_refused(key: str) -> 
         {"connection_mode": 2, "hostName": "localhost", "port": 1234},
     ],
 )
-def test_pybullet_connects_as_told(connect: dict[str, Any]) -> None:
+def test_pybullet_connects_with_the_configured_arguments(connect: dict[str, Any]) -> None:
     arguments = Connect.parse(connect, "f").kwargs()
     Client(arguments.pop("connection_mode"), **arguments).disconnect()
 
@@ -154,11 +154,11 @@ def test_connect_is_by_memory_or_by_network() -> None:
         Connect.parse({"key": 1, "port": 1}, "f")
 
 
-def test_connection_mode_is_there_though_nobody_wrote_it() -> None:
+def test_connection_mode_has_a_default() -> None:
     assert Connect().kwargs() == {"connection_mode": pybullet.GUI}
 
 
-def test_arguments_are_what_the_user_wrote_also_after_pickling() -> None:
+def test_arguments_are_as_written_also_after_pickling() -> None:
     written = {"shapeType": "GEOM_BOX", "halfExtents": [1, 2, 3], "rgbaColor": None}
     shape = pickle.loads(pickle.dumps(CreateVisualShape.parse(written, "f")))
     assert shape.kwargs() == {"shapeType": pybullet.GEOM_BOX, "halfExtents": (1.0, 2.0, 3.0)}
@@ -270,6 +270,6 @@ def test_every_key_has_a_description() -> None:
             assert schema.get("description", "").endswith("."), f"{model.__name__}.{key}"
 
 
-def test_file_that_does_not_exist_is_told_with_the_folders_searched(tmp_path: Path) -> None:
+def test_missing_file_is_reported_with_the_searched_folders(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=rf"f.yaml: fileName: no such file: robot.urdf \(looked in {tmp_path}, "):
         LoadURDF.parse({"fileName": "robot.urdf"}, str(tmp_path / "f.yaml"))

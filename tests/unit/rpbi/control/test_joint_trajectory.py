@@ -86,7 +86,7 @@ def test_columns_go_to_the_joints_that_are_named():
         ),
     ],
 )
-def test_what_cannot_be_followed_is_refused_with_its_code(asked, code, message):
+def test_invalid_trajectories_are_refused_with_their_error_code(asked, code, message):
     with pytest.raises(TrajectoryRefusedError) as refused:
         validate_trajectory(asked, JOINTS, False)
     assert refused.value.code == code
@@ -98,7 +98,7 @@ def test_part_of_the_joints_will_do_where_that_is_allowed():
     assert [each.joint.name for each in joint_trajectories] == ["b"]
 
 
-def test_planned_motion_at_the_speed_limit_is_not_refused_for_what_its_curve_makes_of_it():
+def test_planned_motion_at_the_speed_limit_is_accepted():
     """A trapezoidal velocity of 10 rad/s^2 up to the limit, sampled each 0.1 s as planners do, from any moment on."""
     for phase in range(20):
         points = []
@@ -115,7 +115,7 @@ def joint_trajectory_of(*points: Point, name: str = "a"):
     return validate_trajectory(request(*points, names=(name,)), {name: JOINTS[name]}, False)[0]
 
 
-def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_point():
+def test_spliced_course_skips_past_points_and_continues_to_the_next():
     planned = joint_trajectory_of(Point(0.5, (1.0,)), Point(1.5, (0.5,)), Point(2.5, (-0.5,)))
     spliced = planned.spliced_onto(standing(0.0), start_s=9.0, from_s=10.0)
     assert [spliced.sample(t).position[0] for t in (9.0, 10.0, 10.25, 10.5, 11.0, 11.5)] == pytest.approx(
@@ -123,7 +123,7 @@ def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_poi
     )
 
 
-def test_joined_course_begins_with_the_motion_under_way():
+def test_spliced_course_begins_with_the_current_motion():
     current = Trajectory.through([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
     planned = joint_trajectory_of(Point(1.0, (-0.5,), (0.0,)))
     spliced = planned.spliced_onto(current, start_s=1.0, from_s=1.0)
@@ -138,7 +138,7 @@ def test_joined_course_begins_with_the_motion_under_way():
     "now, asked, goes_to",
     [(0.0, 1.5 * math.pi, -0.5 * math.pi), (6.0 * math.pi, 0.5, 6.0 * math.pi + 0.5), (0.2, 0.3, 0.3)],
 )
-def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_on(now, asked, goes_to):
+def test_joint_without_limits_turns_the_shorter_direction_first(now, asked, goes_to):
     planned = joint_trajectory_of(Point(1.0, (asked,)), Point(2.0, (asked + 7.0,)), name="wheel")
     spliced = planned.spliced_onto(standing(now), 0.0, 0.0)
     assert spliced.sample(1.0).position[0] == pytest.approx(goes_to)
@@ -155,7 +155,7 @@ def test_joint_that_was_pushed_beyond_its_limit_may_come_back():
     assert spliced.goal == (1.0,)
 
 
-def test_stop_takes_its_time_at_constant_deceleration_and_within_the_limits():
+def test_stop_decelerates_at_a_constant_rate_within_limits():
     trajectory = stopping(JOINTS["a"], (0.5, 1.0), 3.0, 0.4)
     assert trajectory.goal[0] == pytest.approx(0.7)
     assert {round(trajectory.sample(t).acceleration[0], 9) for t in (3.0, 3.1, 3.3)} == {-2.5}

@@ -77,7 +77,7 @@ def test_a_regular_stream_is_a_quadratic_b_spline():
 
 @pytest.mark.parametrize("smooth", [True, False], ids=["smooth", "linear"])
 @pytest.mark.parametrize("seed", range(20))
-def test_whatever_comes_when_it_never_leaves_the_hull_and_ends_at_the_last_target(seed, smooth):
+def test_stream_stays_between_its_targets_and_ends_at_the_last(seed, smooth):
     rng = random.Random(seed)
     targets, tick, sent = [], 0, 0.0
     for _ in range(80):
@@ -103,7 +103,7 @@ def delayed(rng: random.Random, count: int) -> list[tuple[int, float, int]]:
     ]
 
 
-def test_the_buffer_evens_out_what_comes_late():
+def test_buffer_evens_out_late_targets():
     targets = delayed(random.Random(3), 80)
     start = 40 * PERIOD
     by_stamps = play(targets, 80 * PERIOD, buffer_s=0.02)[start:]
@@ -124,7 +124,7 @@ def test_one_late_target_does_not_change_a_constant_velocity(late, has_stamps):
     assert largest_change_of_velocity(positions) < 1.0
 
 
-def test_a_target_late_at_the_turning_point_of_a_swing_stops_nothing():
+def test_late_target_at_a_turning_point_stops_no_motion():
     def position(tick: float) -> float:
         return 0.8 * math.cos(math.pi * tick * DT_S)
 
@@ -136,7 +136,7 @@ def test_a_target_late_at_the_turning_point_of_a_swing_stops_nothing():
     assert largest_change_of_velocity(positions) < 1.05 * 0.8 * math.pi**2
 
 
-def test_the_first_stall_of_a_regular_stream_is_none_of_the_samples():
+def test_first_stall_of_a_regular_stream_changes_no_sample_times():
     """Its stamps are those of sending, and until then nothing says so."""
     turn = 2.0 * math.pi * PERIOD * DT_S
     positions = [0.3 * math.cos(turn * n) for n in range(120)]
@@ -169,7 +169,7 @@ def test_the_delay_is_constant_from_the_first_target_on():
         assert positions[tick] == pytest.approx(0.03 / PERIOD * (tick + 1 - lag), abs=1e-9)
 
 
-def test_a_stream_that_stops_at_full_speed_passes_its_last_target_by_little_and_comes_back():
+def test_stream_stopped_at_full_speed_overshoots_a_little_and_returns():
     speed = 1.5
     for velocities, beyond_s in ((None, 0.091), ([speed] * 40, 0.101)):
         targets = [(n * PERIOD, speed * n * PERIOD * DT_S, 0) for n in range(40)]
@@ -192,7 +192,7 @@ def test_jitter_within_the_buffer_changes_nothing_of_a_swing(has_stamps, monkeyp
     assert bounded[300:] == pytest.approx(play(targets, 1980, buffer_s=0.02)[300:], abs=1e-4)
 
 
-def test_the_first_target_after_a_stall_in_a_motion_does_not_jump():
+def test_first_target_after_a_stall_does_not_jump():
     for pause, jumps in ((300, False), (600, True)):
         ticks = [n * PERIOD + (pause if n >= 40 else 0) for n in range(41)]
         positions = play([(tick, 0.003 * tick, 0) for tick in ticks], ticks[-1] + 20, buffer_s=0.02)
@@ -233,7 +233,7 @@ def test_a_clock_may_jump(jump_s):
 
 @pytest.mark.parametrize("stalled", ["world", "sender"])
 @pytest.mark.parametrize("stall_s", [0.15, 0.3, 0.9])
-def test_what_waited_in_a_stall_is_played_little_faster_than_it_was_sent(stalled, stall_s):
+def test_targets_queued_in_a_stall_are_played_slightly_faster(stalled, stall_s):
     stall, begin, speed = round(stall_s / DT_S), 80 * PERIOD, 0.003
     if stalled == "world":  # its ticks do not go on meanwhile
         arrivals = [n * PERIOD if n <= 80 else max(begin + 1, n * PERIOD - stall) for n in range(400)]
@@ -252,7 +252,7 @@ def test_what_waited_in_a_stall_is_played_little_faster_than_it_was_sent(stalled
     assert positions[-1] == pytest.approx(targets[-1][1] - lag * speed, abs=2 * PERIOD * speed)
 
 
-def test_a_world_that_becomes_slower_than_the_clock_of_the_sender_lags_only_for_a_while():
+def test_slower_world_lags_behind_the_senders_clock_only_temporarily():
     arrivals = [n * PERIOD for n in range(100)]
     arrivals += [arrivals[-1] + round(PERIOD / 3 * (n + 1)) for n in range(1300)]
     targets = [(tick, 0.03 * n, stamp_ns(n * PERIOD)) for n, tick in enumerate(arrivals)]
@@ -262,7 +262,7 @@ def test_a_world_that_becomes_slower_than_the_clock_of_the_sender_lags_only_for_
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_slow_world_that_gets_its_targets_in_bursts_never_jumps_to_the_newest_one(seed):
+def test_slow_world_never_jumps_to_the_newest_target_of_bursts(seed):
     """As on a busy machine: targets that wait are played, also once the clock of the stamps counts as another one."""
     rng, speed, burst, targets = random.Random(seed), 0.003, 0, []
     for n in range(600):
@@ -319,7 +319,7 @@ def test_hostile_velocities_pass_no_limit():
     assert max(map(abs, play(targets, 1100, velocities=velocities, buffer_s=0.02, limit=0.5))) <= 0.5
 
 
-def test_a_motion_off_its_plan_returns_to_targets_that_hardly_move():
+def test_motion_off_its_plan_returns_to_slow_targets():
     motion = BoundedMotion({0: 0.0}, DT_S, True, lambda index, value: value)
     tick = 0
 

@@ -29,7 +29,7 @@ def sample_just_before(trajectory: Trajectory, time_s: float) -> DesiredState:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_passes_through_its_knots_with_what_they_give(kind):
+def test_trajectory_passes_through_positions_and_derivatives_of_its_knots(kind):
     given = knots(kind)
     trajectory = Trajectory.through(given)
     for knot in given[:-1]:
@@ -55,13 +55,13 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_position(kind):
         assert here[1:] == pytest.approx((after - before)[:2] / (2 * h), abs=2e-3, rel=1e-4)
 
 
-def test_line_is_straight_when_one_of_two_knots_has_a_position_alone():
+def test_line_is_straight_if_one_knot_has_only_a_position():
     trajectory = Trajectory.through([Knot(0.0, (0.0,), (5.0,)), Knot(2.0, (4.0,))])
     assert [trajectory.sample(t).position[0] for t in (0.0, 0.5, 1.5)] == [0.0, 1.0, 3.0]
     assert trajectory.sample(0.0).velocity == (2.0,)
 
 
-def test_stands_before_the_start_and_exactly_at_the_last_knot_after_the_end():
+def test_trajectory_rests_before_its_start_and_after_its_end():
     given = knots("quintic")
     trajectory = Trajectory.through(given)
     still = (0.0,) * 3
@@ -70,7 +70,7 @@ def test_stands_before_the_start_and_exactly_at_the_last_knot_after_the_end():
         assert trajectory.sample(trajectory.end_s + late_s) == (given[-1].position, still, still)
 
 
-def test_one_knot_stands_still():
+def test_one_knot_means_rest():
     trajectory = Trajectory.through([Knot(3.0, (1.0, 2.0))])
     assert (trajectory.start_s, trajectory.end_s) == (3.0, 3.0)
     assert {trajectory.sample(t).position for t in (0.0, 3.0, 9.0)} == {(1.0, 2.0)}
@@ -86,7 +86,7 @@ def test_minimum_jerk_has_the_known_profile():
 
 
 @pytest.mark.parametrize("at_s", [-1.0, 0.0, 0.3, 1.0, 1.5, 2.0, 2.7, 3.0, 4.5, 6.0, 9.0])
-def test_spliced_is_the_old_one_until_the_time_and_the_new_one_from_then_on(at_s):
+def test_spliced_trajectory_follows_the_old_one_then_the_new_one(at_s):
     old = Trajectory.through([Knot(0.0, (0.0,), (0.0,)), Knot(1.0, (2.0,), (1.0,)), Knot(3.0, (1.0,), (0.0,))])
     new = Trajectory.through([Knot(2.0, (5.0,)), Knot(4.0, (6.0,)), Knot(6.0, (3.0,))])
     spliced = old.spliced(new, at_s)
@@ -124,7 +124,7 @@ def test_shifted_is_the_same_motion_elsewhere():
         ([Knot(0.0, (0.0,), None, (1.0,))], "knot 0: has accelerations but no velocities"),
     ],
 )
-def test_what_is_no_trajectory_is_refused(given, message):
+def test_invalid_knots_are_refused(given, message):
     with pytest.raises(ValueError, match=message):
         Trajectory.through(given)
 

@@ -21,7 +21,7 @@ from rpbi.window import DOWN, PRESSED, RELEASED, ButtonHistory
         ([1, 4], [DOWN, RELEASED]),  # pressed before the window looked
     ],
 )
-def test_presses_and_releases_are_told_one_by_one(states: list[int], happened: list[int]) -> None:
+def test_each_press_and_release_is_reported(states: list[int], happened: list[int]) -> None:
     history = ButtonHistory()
     assert [each for state in states for each in history.observe(97, state)] == happened
 

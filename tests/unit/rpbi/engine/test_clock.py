@@ -17,14 +17,14 @@ def test_simulated_stamps_are_exact_and_begin_at_one_tick():
     assert clock.dt_s == 0.001
 
 
-def test_a_time_step_that_is_no_whole_nanosecond_is_rounded_once():
+def test_time_step_is_rounded_once_to_whole_nanoseconds():
     clock = Clock(1.0 / 240.0)
     assert clock.dt_ns == 4_166_667
     clock.advance()
     assert clock.stamp_ns == 2 * 4_166_667
 
 
-def test_wall_stamps_never_repeat_even_when_the_wall_clock_goes_back(monkeypatch):
+def test_wall_stamps_never_repeat_after_the_clock_is_set_back(monkeypatch):
     clock = Clock(0.001, simulated=False)
     first = clock.stamp_ns
     assert abs(first - time.time_ns()) < 10**10
@@ -47,7 +47,7 @@ def test_a_time_step_of_nothing_is_refused():
 
 @pytest.mark.parametrize("hz", [1, 7, 30, 49.9, 50, 60, 333, 1000])
 @pytest.mark.parametrize("dt_ns", [1_000_000, 4_166_667, 2_000_000])
-def test_the_mean_rate_is_exact_and_the_jitter_at_most_a_tick(hz, dt_ns):
+def test_mean_rate_is_exact_with_a_jitter_of_one_tick(hz, dt_ns):
     schedule = Schedule(hz, dt_ns)
     ticks = 60 * 10**9 // dt_ns
     due = [tick for tick in range(1, ticks + 1) if schedule.is_due(tick)]
@@ -74,7 +74,7 @@ def test_a_rate_above_one_a_tick_is_clamped():
     assert not Schedule(1000, 1_000_000).clamped
 
 
-def test_a_rate_that_is_next_to_nothing_is_due_some_day():
+def test_tiny_rate_is_due_eventually():
     assert Schedule(1e-300, 1_000_000).next_due(0) == 10**9
 
 
@@ -82,14 +82,14 @@ def test_the_initial_state_is_due():
     assert Schedule(0.1, 1_000_000).is_due(0)
 
 
-def test_a_span_of_ticks_is_due_if_any_in_it_is():
+def test_span_of_ticks_is_due_if_one_of_them_is():
     schedule = Schedule(50, 1_000_000)
     assert schedule.is_due(25, since=15)
     assert not schedule.is_due(39, since=20)
 
 
 @pytest.mark.parametrize("simulated", [True, False])
-def test_a_restart_counts_from_0_and_goes_on_with_the_stamps(simulated):
+def test_restart_counts_from_zero_and_continues_the_stamps(simulated):
     clock = Clock(0.001, simulated)
     for _ in range(5):
         clock.advance()
@@ -101,7 +101,7 @@ def test_a_restart_counts_from_0_and_goes_on_with_the_stamps(simulated):
         assert clock.stamp_ns == before_ns + clock.dt_ns
 
 
-def test_stamps_within_a_tick_differ_and_the_coming_ticks_keep_theirs() -> None:
+def test_stamps_within_a_tick_differ_and_later_ticks_keep_theirs() -> None:
     clock = Clock(0.001)
     clock.advance()
     for turn in range(1, 4):
@@ -111,7 +111,7 @@ def test_stamps_within_a_tick_differ_and_the_coming_ticks_keep_theirs() -> None:
     assert (clock.tick, clock.stamp_ns) == (2, 3_000_000)
 
 
-def test_stamps_never_repeat_however_many_are_told_apart() -> None:
+def test_stamps_never_repeat_however_often_they_are_bumped() -> None:
     clock = Clock(1e-9)
     for _ in range(5):
         clock.bump_stamp()

@@ -9,7 +9,7 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi.engine.mailbox import ClosedError, Mailbox
 
 
-def test_the_newest_value_of_a_slot_wins_and_is_taken_once():
+def test_newest_value_of_a_slot_wins_and_is_taken_once():
     mailbox = Mailbox()
     mailbox.put("a", 1)
     mailbox.put("a", 2)
@@ -18,7 +18,7 @@ def test_the_newest_value_of_a_slot_wins_and_is_taken_once():
     assert dict(mailbox.drain()) == {}
 
 
-def test_what_was_taken_from_an_empty_mailbox_stays_empty():
+def test_values_drained_from_an_empty_mailbox_stay_empty():
     mailbox = Mailbox()
     taken = mailbox.drain()
     mailbox.put("a", 1)
@@ -33,7 +33,7 @@ def test_partial_values_that_wait_are_merged():
     assert dict(mailbox.drain()) == {"target": {1: 0.1, 2: 0.5}}
 
 
-def test_a_request_is_made_by_whoever_runs_requests():
+def test_request_runs_in_the_thread_that_runs_requests():
     mailbox = Mailbox()
     future = mailbox.request(threading.get_ident)
     assert not future.done()
@@ -59,7 +59,7 @@ def test_a_busy_world_drops_values_and_refuses_requests():
     assert dict(mailbox.drain()) == {"a": 3}
 
 
-def test_a_request_that_raises_hands_its_error_on_and_the_next_is_made():
+def test_request_that_raises_passes_its_error_and_the_next_runs():
     mailbox = Mailbox()
     bad = mailbox.request(lambda: 1 / 0)
     good = mailbox.request(lambda: "fine")
@@ -78,7 +78,7 @@ def test_a_request_given_up_before_its_turn_is_not_made():
     assert made == []
 
 
-def test_a_request_made_by_a_request_waits_for_the_next_turn():
+def test_request_made_by_a_request_waits_for_the_next_turn():
     mailbox = Mailbox()
     made = []
     mailbox.request(lambda: mailbox.request(lambda: made.append(1)))
@@ -119,7 +119,7 @@ def test_many_threads_lose_no_request_and_keep_the_newest_value():
     assert {taken.get(f"slot{number}") for number in range(4)} == {count - 1}
 
 
-def test_what_waits_is_dropped_and_so_is_what_belongs_to_an_earlier_era():
+def test_drop_discards_waiting_values_and_those_of_earlier_generations():
     mailbox = Mailbox()
     generation = mailbox.generation
     mailbox.put("kuka/target", 1)

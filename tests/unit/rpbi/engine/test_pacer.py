@@ -103,5 +103,5 @@ def test_a_start_after_a_stop_makes_nothing_up(wall):
         (Load(1.0, 0.98, 1.0, 0.2, 400), "sensors, controllers and messages take 2 ms a tick, PyBullet 0.5 ms"),
     ],
 )
-def test_what_slows_a_world_down_is_named(spent, said):
+def test_reason_names_the_part_that_slows_a_world_down(spent, said):
     assert said in spent.reason(0.001)

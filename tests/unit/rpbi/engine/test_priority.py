@@ -79,7 +79,7 @@ def may_use_real_time() -> bool:
 
 
 @pytest.mark.skipif(not may_use_real_time(), reason="expected the permission for real-time threads")
-def test_real_time_only_while_less_than_half_a_processor_is_needed():
+def test_real_time_priority_requires_less_than_half_a_processor():
     done = subprocess.run([sys.executable, "-c", LOAD_PROGRAM], capture_output=True, text=True)
     normal, real_time = "normal", "real-time"
     few_ticks_of_a_busy_machine = normal

@@ -33,13 +33,13 @@ NULL_SPACE = {
         ({"residualThreshold": math.nan}, "residualThreshold: must not be negative, got nan"),
     ],
 )
-def test_what_makes_no_sense_is_refused_by_the_name_of_its_field(fields, message):
+def test_invalid_fields_are_refused_by_name(fields, message):
     with pytest.raises(ValueError, match=message):
         IKProblem("tool", **{"targetPosition": HERE, **fields})
 
 
 @pytest.mark.parametrize("field", ["lowerLimits", "jointDamping", "currentPosition"])
-def test_a_list_needs_one_value_for_each_joint_and_the_joints_are_named(field):
+def test_list_needs_one_value_for_each_named_joint(field):
     fields = NULL_SPACE if field in NULL_SPACE else {field: [0.1, 0.1]}
     problem = IKProblem("tool", HERE, **fields)
     problem.check_lengths(["a", "b"])

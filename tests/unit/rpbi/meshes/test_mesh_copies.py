@@ -35,7 +35,7 @@ def missing_textures(meshes):
     return missing
 
 
-def test_what_ros_gets_of_a_robot_names_no_texture_that_is_missing(cache):
+def test_robot_description_for_ros_names_no_missing_texture(cache):
     data = Path(PANDA).parent / "meshes"
     assert len(missing_textures(data.glob("*/*.obj"))) == 5, "else there is nothing to mend"
     meshes = set(re.findall(r'"file://(.*?\.obj)"', description_for_ros(PANDA)))
@@ -44,7 +44,7 @@ def test_what_ros_gets_of_a_robot_names_no_texture_that_is_missing(cache):
     assert Path(copied).read_bytes() == (data / "collision/link6.obj").read_bytes()
 
 
-def test_where_no_cache_can_be_written_ros_gets_the_files_as_they_are(tmp_path, monkeypatch):
+def test_original_files_are_used_where_no_cache_can_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert len(missing_textures(set(re.findall(r'"file://(.*?\.obj)"', description_for_ros(PANDA))))) == 5
@@ -63,7 +63,7 @@ print(len(list(kept("shared", make).iterdir())))
 """
 
 
-def test_of_several_processes_one_makes_a_folder_and_all_see_it_whole(cache):
+def test_one_of_several_processes_makes_a_folder_visible_only_whole(cache):
     processes = [
         subprocess.Popen([sys.executable, "-c", WRITES, str(number)], stdout=subprocess.PIPE, text=True)
         for number in range(3)

@@ -20,18 +20,18 @@ def pybullet_matrix(values):
     return np.array(values).reshape(4, 4).T
 
 
-def test_focal_lengths_are_equal_and_follow_from_the_vertical_field_of_view():
+def test_focal_lengths_are_equal_and_follow_from_vertical_fov():
     K = INTRINSICS.K
     assert K[1, 1] == pytest.approx(240.0 / math.tan(math.radians(20.0)))
     assert K[0, 0] == pytest.approx(K[1, 1])
     assert K[0, 0] == pytest.approx(659.4, abs=0.05)
 
 
-def test_principal_point_is_the_centre_of_the_image_counted_from_the_centre_of_the_first_pixel():
+def test_principal_point_is_the_image_centre_counted_from_pixel_centres():
     assert INTRINSICS.K[:2, 2] == pytest.approx([319.5, 239.5])
 
 
-def test_projection_is_the_one_that_pybullet_computes():
+def test_projection_equals_that_of_pybullet():
     expected = pybullet.computeProjectionMatrixFOV(40.0, 640 / 480, 0.1, 10.0)
     assert INTRINSICS.projection == pytest.approx(pybullet_matrix(expected), rel=1e-5)
 
@@ -48,7 +48,7 @@ def test_camera_matrix_agrees_with_projection_and_viewport_even_off_centre():
     assert pixel[:2] / pixel[2] == pytest.approx([u, v])
 
 
-def test_corner_of_the_view_is_the_outer_corner_of_the_first_pixel():
+def test_corner_of_the_view_is_the_first_pixels_outer_corner():
     half_height = math.tan(math.radians(20.0))
     corner = INTRINSICS.K @ [-half_height * 640 / 480, -half_height, 1.0]
     assert corner[:2] == pytest.approx([-0.5, -0.5])
@@ -71,7 +71,7 @@ def test_depth_in_metres_undoes_the_projection(near, far):
     assert np.all(np.abs(depth_in_metres(buffer, intrinsics) - z) <= 2 * rounding_m + 1e-6)
 
 
-def test_empty_pixels_tell_the_far_plane_and_depth_stays_single_precision():
+def test_empty_pixels_have_far_plane_depth_in_single_precision():
     depth = depth_in_metres(np.ones((2, 3), np.float32), INTRINSICS)
     assert depth.dtype == np.float32
     assert depth == pytest.approx(np.full((2, 3), 10.0))

@@ -34,7 +34,7 @@ def test_colour_is_packed_as_pcl_reads_it(images):
     assert np.array_equal(packed, red << 16 | green << 8 | blue)
 
 
-def test_pixels_that_see_nothing_have_no_point_and_keep_their_colour(images):
+def test_empty_pixels_have_no_point_and_keep_their_colour(images):
     depth_m, colour = images
     depth_m[3, 4] = np.float32(INTRINSICS.far_m) * np.float32(1.0 - 1e-7)  # as the depth buffer rounds it
     depth_m[3, 5] = 4.99

@@ -66,7 +66,7 @@ def test_sockets_are_flushed_in_the_order_in_which_messages_came(pair):
         each.close()
 
 
-def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair):
+def test_slow_reader_blocks_no_sender_and_receives_everything_in_order(pair):
     buffered = BufferedSocket(pair[0], limit=1000)
     for number in range(100):  # far more than the socket's buffer takes
         buffered.sendall(_message(number))
@@ -77,7 +77,7 @@ def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair)
     assert data == b"".join(map(_message, range(100)))
 
 
-def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
+def test_oldest_whole_messages_are_dropped_beyond_the_limit(pair):
     buffered = BufferedSocket(pair[0], limit=5)
     for number in range(100):
         buffered.sendall(_message(number))
@@ -92,7 +92,7 @@ def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
     assert len(numbers) < 100
 
 
-def test_a_reader_that_has_gone_is_an_error_at_the_next_message(pair):
+def test_closed_reader_raises_an_error_at_the_next_message(pair):
     buffered = BufferedSocket(pair[0], limit=5)
     pair[1].close()
     buffered.sendall(b"x")
@@ -106,7 +106,7 @@ def test_it_is_otherwise_the_socket(pair):
     assert BufferedSocket(pair[0], limit=5).fileno() == pair[0].fileno()
 
 
-def test_a_message_does_not_wait_until_the_one_before_it_is_acknowledged():
+def test_message_does_not_wait_for_the_acknowledgement_of_its_predecessor():
     with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as ours:
         assert not ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
         BufferedSocket(ours, limit=10)

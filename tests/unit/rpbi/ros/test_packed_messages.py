@@ -36,7 +36,7 @@ def test_joint_states(fields):
     assert written(PackedJointState(*fields)) == written(JointState(*fields))
 
 
-def test_joint_states_with_something_else_than_numbers_are_refused_as_ever():
+def test_joint_states_with_invalid_numbers_are_refused_as_by_rospy():
     fields = (HEADER, ("a",), ("x",), (0.0,), (0.0,))
     with pytest.raises(genpy.SerializationError) as expected:
         written(JointState(*fields))

@@ -10,14 +10,14 @@ def _log(count):
     return log
 
 
-def test_commands_are_told_from_an_index_on():
+def test_commands_are_returned_from_an_index_on():
     first, commands = _log(10).since(7)
     assert first == 7
     assert [command.value for command in commands] == [7, 8, 9]
     assert _log(10).since(10) == (10, ())
 
 
-def test_no_more_are_told_than_asked_for():
+def test_at_most_the_requested_number_of_commands_is_returned():
     first, commands = _log(10).since(2, most=3)
     assert (first, [command.value for command in commands]) == (2, [2, 3, 4])
 

@@ -54,7 +54,7 @@ def test_files_that_are_no_worlds_are_named(tmp_path):
     assert problems(str(tmp_path / "odd.yaml")) == ["expected a mapping of keys to values, got str"]
 
 
-def test_a_wrong_key_of_an_object_in_the_right_list_stays_a_wrong_key(tmp_path):
+def test_wrong_key_in_the_right_list_is_reported(tmp_path):
     (told,) = problems(write_world(tmp_path, dynamic=({**box(), "radius": 1.0},)))
     assert told.startswith("unknown key 'radius'")
     assert load_world(write_world(tmp_path, visual=(VISUAL,), collision=(BOX_FLOOR,))).objects

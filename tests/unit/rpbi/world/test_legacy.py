@@ -38,7 +38,7 @@ def robot(**more: Any) -> ConfigModel:
         ),
     ],
 )
-def test_old_spelling_works_with_a_warning_that_says_what_to_write(
+def test_old_spelling_works_and_the_warning_names_the_new_one(
     caplog: pytest.LogCaptureFixture, old: str, new: str, value: Any, expected: Any
 ) -> None:
     assert getattr(robot(**{old: value}), new) == expected
@@ -72,7 +72,7 @@ def test_two_old_spellings_of_one_key_are_refused() -> None:
         robot(broadcast_link_states_frequency=30, brodcast_link_states_frequency=30)
 
 
-def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
+def test_fault_in_an_old_spelling_is_reported_as_written() -> None:
     with pytest.raises(ConfigError) as caught:
         robot(publish_joint_state_frequency=-1)
     assert str(caught.value) == "iiwa.yaml: publish_joint_state_frequency: must be >= 0 [Hz], got -1"
@@ -116,7 +116,7 @@ def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main:
         ({}, ["object_tf"]),
     ],
 )
-def test_object_that_names_no_frame_stays_where_it_is_with_a_warning_of_each_key(
+def test_object_without_frame_stays_and_warns_of_each_key(
     caplog: pytest.LogCaptureFixture, object_tf: dict[str, Any], told: list[str]
 ) -> None:
     shape = {"shapeType": "GEOM_SPHERE", "radius": 0.1}
@@ -130,7 +130,7 @@ def test_object_that_names_no_frame_stays_where_it_is_with_a_warning_of_each_key
         assert all("has no effect" in message for message in caplog.messages)
 
 
-def test_keys_beside_the_frame_have_no_effect_and_the_frame_has(caplog: pytest.LogCaptureFixture) -> None:
+def test_unused_keys_of_object_tf_warn_and_its_frame_works(caplog: pytest.LogCaptureFixture) -> None:
     loaded = robot(object_tf={"tf_id": "base", "hz": 10, "offset": [1.0, 0.0, 0.0]})
     assert loaded.object_tf.tf_id == "base" and loaded.object_tf.hz == 10.0  # type: ignore[attr-defined]
     (message,) = caplog.messages

@@ -59,14 +59,14 @@ def parse(kind: str, data: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
-def test_schema_is_one_that_editors_understand(kind: str) -> None:
+def test_schema_is_understood_by_editors(kind: str) -> None:
     for schema in (SCHEMAS[kind], explained(SCHEMAS[kind])):
         Draft7Validator.check_schema(schema)
         assert "draft-07" in schema["$schema"]
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
-def test_shipped_file_names_its_schema_in_the_first_line_and_holds_it(path: Path) -> None:
+def test_shipped_file_names_its_schema_first_and_validates_against_it(path: Path) -> None:
     named = MODELINE.match(path.read_text())
     assert named, f"{path}: the first line should be '# yaml-language-server: $schema=PATH/KIND.schema.json'"
     schema = path.parent / named[1]
@@ -91,7 +91,7 @@ def mappings(data: Any) -> Iterator[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
-def test_shipped_file_with_a_wrong_key_anywhere_does_not_hold_its_schema(path: Path) -> None:
+def test_shipped_file_with_a_wrong_key_violates_its_schema(path: Path) -> None:
     named = MODELINE.match(path.read_text())
     assert named
     data = yaml.safe_load(path.read_text())
@@ -110,7 +110,7 @@ def test_shipped_file_with_a_wrong_key_anywhere_does_not_hold_its_schema(path: P
 
 
 @pytest.mark.parametrize("path", sorted(SRC.glob("*/schema/*.json")), ids=lambda path: path.name)
-def test_schema_refers_to_itself_and_to_entries_of_files_beside_it_only(path: Path) -> None:
+def test_schema_references_only_itself_and_entries_of_neighbouring_files(path: Path) -> None:
     content = json.loads(path.read_text())
     resolver = RefResolver(path.as_uri(), content)
     for reference in {each["$ref"] for each in mappings(content) if isinstance(each.get("$ref"), str)}:
@@ -119,11 +119,11 @@ def test_schema_refers_to_itself_and_to_entries_of_files_beside_it_only(path: Pa
         assert resolver.resolve(reference)[1], reference
 
 
-def test_schema_of_the_main_file_is_small_since_it_refers_to_those_of_objects() -> None:
+def test_schema_of_the_main_file_is_small() -> None:
     assert (SRC / "ros_pybullet_interface/schema/world.schema.json").stat().st_size < 40_000
 
 
-def test_shipped_files_name_the_schema_of_the_list_that_names_them() -> None:
+def test_shipped_files_name_the_schema_of_their_list() -> None:
     """A box that names the schema of robots would be told off by editors and accepted by the world."""
     worlds_shipped = [path for path in SHIPPED if "world.schema.json" in path.read_text()]
     assert worlds_shipped
@@ -212,7 +212,7 @@ ACCEPTED: list[tuple[str, Any]] = [
 
 
 @pytest.mark.parametrize(("kind", "data"), ACCEPTED, ids=lambda value: value if isinstance(value, str) else "")
-def test_what_a_world_takes_the_schema_takes(kind: str, data: Any) -> None:
+def test_schema_accepts_files_that_a_world_accepts(kind: str, data: Any) -> None:
     parse(kind, data)
     assert problems(kind, data) == []
 
@@ -237,7 +237,7 @@ VALUES = (
 
 
 @pytest.mark.parametrize("kind", BASES)
-def test_whatever_value_a_world_takes_for_a_key_the_schema_takes(kind: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_schema_accepts_every_value_that_a_world_accepts(kind: str, caplog: pytest.LogCaptureFixture) -> None:
     base = BASES[kind]
     refused, taken = [], 0
     for path in [path for path, _ in keys(SCHEMAS[kind], SCHEMAS[kind]) if not path.startswith(tuple(sections()))]:
@@ -302,7 +302,7 @@ def test_a_mistake_is_found_by_schema_and_world_alike(kind: str, data: Any, key:
     assert any(key in fault for fault in problems(kind, data)), problems(kind, data)
 
 
-def test_instance_may_have_any_key_of_its_file_and_no_other() -> None:
+def test_entry_accepts_only_keys_of_its_file() -> None:
     arms = [{"file": "iiwa.yaml", "name": "left", "loadURDF": {"basePosition": [0, 0, 1]}}, "iiwa.yaml"]
     assert problems("world", {"robots": arms}) == []
     assert problems("world", {"robots": [{"file": "iiwa.yaml", "nmae": "left"}]})
@@ -310,7 +310,7 @@ def test_instance_may_have_any_key_of_its_file_and_no_other() -> None:
     assert problems("robot", worlds.iiwa(file="iiwa.yaml")), "'file' is a key of entries only"
 
 
-def test_entry_requires_nothing_of_mappings_but_all_of_items_since_lists_are_replaced_as_a_whole() -> None:
+def test_entry_requires_keys_of_list_items_but_not_of_mappings() -> None:
     for overrides in ({"loadURDF": {"flags": 0}}, {"object_tf": {"hz": 5}}, {"setJointMotorControlArray": {}}):
         assert problems("world", {"robots": [{"file": "iiwa.yaml", **overrides}]}) == []
         is_complete = "object_tf" in overrides  # which then follows nothing
@@ -319,7 +319,7 @@ def test_entry_requires_nothing_of_mappings_but_all_of_items_since_lists_are_rep
         assert problems("world", {"robots": [{"file": "iiwa.yaml", **overrides}]})
 
 
-def test_objects_of_own_types_may_have_keys_that_nobody_here_knows() -> None:
+def test_objects_of_own_types_may_have_unknown_keys() -> None:
     own = {"type": "my_lab.conveyor:Conveyor", "name": "belt", "speed": 1.0}
     assert problems("object", own) == []
     assert problems("world", {"objects": ["belt.yaml", {"file": "belt.yaml", "name": "slow", "speed": 0.1}]}) == []
@@ -327,7 +327,7 @@ def test_objects_of_own_types_may_have_keys_that_nobody_here_knows() -> None:
     assert problems("object", {**own, "type": "Conveyor"})
 
 
-def test_old_keys_are_marked_and_say_what_to_write() -> None:
+def test_old_keys_are_deprecated_and_name_their_replacement() -> None:
     old = SCHEMAS["robot"]["properties"]["publish_joint_state_frequency"]
     assert old["deprecated"] is True
     assert "write joint_state_publisher_hz" in old["deprecationMessage"]
@@ -339,7 +339,7 @@ ALL = {**SCHEMAS, **{node: json_schema(model, node) for node, model in NODE_CONF
 
 
 @pytest.mark.parametrize("kind", ALL)
-def test_every_key_is_explained_and_its_default_is_one_that_it_takes(kind: str) -> None:
+def test_every_key_has_a_description_and_a_valid_default(kind: str) -> None:
     for path, schema in keys(ALL[kind], ALL[kind]):
         assert schema.get("description", "").endswith("."), path
         if "default" in schema:
@@ -347,6 +347,6 @@ def test_every_key_is_explained_and_its_default_is_one_that_it_takes(kind: str) 
             assert list(validator.iter_errors(schema["default"])) == [], path
 
 
-def test_editors_are_told_unit_and_default_since_they_show_nothing_else() -> None:
+def test_description_for_editors_includes_unit_and_default() -> None:
     shown = explained(SCHEMAS["robot"])["properties"]["target_timeout_s"]["description"]
     assert shown.endswith("[s] Default: 0.5.")
