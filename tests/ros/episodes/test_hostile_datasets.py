@@ -8,18 +8,20 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from ros_system import support_on_path
 
 ROBUSTNESS = Path(__file__).resolve().parents[3] / "dev/robustness"
 
 
-def test_hostile_datasets_are_checked_in_words(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.thorough)])
+def test_hostile_datasets_are_checked_in_words(tmp_path: Path, count: int) -> None:
     environment = {**os.environ, **support_on_path(), "TMPDIR": str(tmp_path)}
-    command = [sys.executable, str(ROBUSTNESS / "datasets.py"), "--first", "3000", "--count", "12"]
+    command = [sys.executable, str(ROBUSTNESS / "datasets.py"), "--first", "3000", "--count", str(count)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stdout + done.stderr
     rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith("| ")][1:]
-    assert [row[1] for row in rows] == ["12"] * 3
+    assert [row[1] for row in rows] == [str(count)] * 3
     assert sum(int(row[2]) for row in rows) and all(int(row[3]) for row in rows), "some are good, and some have faults"
 
 

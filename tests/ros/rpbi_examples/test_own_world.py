@@ -80,6 +80,7 @@ def places(ros):
     return place
 
 
+@pytest.mark.thorough
 def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder):
     left = launch(ros, folder, f"{RPBI} --ns left")
     more = {"use_sim_time": "false", "real_time_factor": 0.5}

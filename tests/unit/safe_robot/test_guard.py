@@ -295,7 +295,7 @@ class TestInsideTheMargin:
         assert out.is_locked or out.direction[1] == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("jerk", [200.0, 300.0, 1000.0])
+@pytest.mark.parametrize("jerk", [200.0, *(pytest.param(jerk, marks=pytest.mark.thorough) for jerk in (300.0, 1000.0))])
 def test_joint_does_not_overshoot_a_constant_target(tmp_path, jerk):
     """Neither by going on after a target that it reaches too fast, nor by another braking than the one before."""
     robot, generator = slider(tmp_path), np.random.default_rng(0)

@@ -9,7 +9,13 @@ import pytest
 from rpbi.world.load_log import replay
 
 
-@pytest.mark.parametrize("visitors", [False, True], ids=["same bodies", "bodies come and go"])
+@pytest.mark.parametrize(
+    "visitors",
+    [
+        pytest.param(False, id="same bodies", marks=pytest.mark.thorough),
+        pytest.param(True, id="bodies come and go"),
+    ],
+)
 def test_a_session_is_the_same_in_another_process(visitors):
     world = session.build()
     here = session.run(world, visitors=visitors)

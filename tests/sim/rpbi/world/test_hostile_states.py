@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from worlds import FLOOR, box, write_world
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -17,12 +18,13 @@ from rpbi.world import World  # noqa: E402
 from rpbi.world.saved.command_log import RecordedCommand  # noqa: E402
 
 
-def test_every_reader_takes_or_refuses_a_sample_of_hostile_states():
-    command = [sys.executable, str(ROOT / "dev/robustness/states.py"), "--count", "12", "--first", "5000"]
+@pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.thorough)])
+def test_every_reader_takes_or_refuses_a_sample_of_hostile_states(count):
+    command = [sys.executable, str(ROOT / "dev/robustness/states.py"), "--count", str(count), "--first", "5000"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-3000:]
     rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith("| ")][1:]
-    assert [row[0][2:] for row in rows] == [*states.READERS] and all(row[1] == "12" for row in rows)
+    assert [row[0][2:] for row in rows] == [*states.READERS] and all(row[1] == str(count) for row in rows)
     assert all(int(row[3]) for row in rows), "some are refused"
 
 
