@@ -62,7 +62,7 @@ def rig(tmp_path):
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_the_tip_is_where_pybullet_has_it_and_moves_as_its_jacobian_says(name, rig):
+def test_tip_pose_and_jacobian_equal_those_of_pybullet(name, rig):
     path, base, tip = CHAINS[name]
     path = rig if path == "rig.urdf" else str(path)
     description = Chain(path, base, tip)
@@ -128,7 +128,7 @@ def test_nothing_is_farther_than_the_reach(rig):
         ("wall", "rail", ValueError, "no joint moves 'rail' in 'wall'"),
     ],
 )
-def test_a_chain_that_is_not_there_is_told_with_what_is(rig, base, tip, error, message):
+def test_unknown_link_of_a_chain_is_reported_with_known_ones(rig, base, tip, error, message):
     with pytest.raises(error, match=message):
         Chain(rig, base, tip)
 

@@ -133,7 +133,7 @@ def test_a_solver_that_never_finds_anything_does_not_pass():
         OfHopeless().test_reachable_targets_are_reached()
 
 
-def test_a_solver_that_tells_the_wrong_distance_does_not_pass():
+def test_solver_that_reports_a_wrong_distance_fails_the_suite():
     with pytest.raises(AssertionError):
         OfHopeless().test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off()
 

@@ -37,7 +37,7 @@ def hinges_of(pose: AvatarPose) -> dict[str, float]:
     return dict(zip(HINGES, pose.hinges))
 
 
-def test_pybullet_loads_the_mass_and_the_shapes_that_the_urdf_says(avatar):
+def test_pybullet_loads_mass_and_shapes_of_the_urdf(avatar):
     masses = {name: avatar.pb.getDynamicsInfo(avatar.body, index)[0] for name, index in avatar.links.items()}
     pelvis_kg = 0.6 * 0.1117 * 75.0  # which PyBullet leaves out of a fixed base
     assert sum(masses.values()) + pelvis_kg == pytest.approx(75.0, abs=1e-3)
@@ -82,7 +82,7 @@ def test_limits_hold_and_the_rest_follows():
     assert found["jRightElbow_rotz"] == pytest.approx(0.5) and found["jC1Head_rotz"] == pytest.approx(0.4)
 
 
-def test_hinges_go_on_evenly_while_the_person_turns_around():
+def test_hinges_move_continuously_while_the_person_turns_around():
     retargeting, last = Retargeting(OFFSETS), None
     for degrees in range(0, 1080, 4):
         turn = Rotation.from_euler("z", degrees, degrees=True).as_quat() * (-1) ** (degrees // 40)
@@ -115,7 +115,7 @@ def test_a_shoulder_goes_through_its_singular_posture(middle_deg):
         assert off_deg < 0.1
 
 
-def test_a_taller_person_stands_on_the_avatars_feet():
+def test_avatar_of_a_taller_person_has_feet_on_the_ground():
     tall = segment_offsets(1.95)
     person = segment_frame(tall, np.array((2.0, 0.0, 0.53 * 1.95)), LEVEL, {"jRightKnee_roty": 0.0})
     pose = Retargeting(OFFSETS).pose(person)
@@ -124,7 +124,7 @@ def test_a_taller_person_stands_on_the_avatars_feet():
     assert feet == pytest.approx(0.039 * 1.75, abs=1e-9)
 
 
-def test_the_avatar_begins_at_its_place_and_goes_on_with_the_person():
+def test_avatar_begins_at_its_place_and_follows_the_person():
     turn = Rotation.from_euler("z", 50.0, degrees=True).as_quat()
     first = segment_frame(OFFSETS, np.array((7.0, -4.0, 0.9)), turn, {})
     retargeting = Retargeting(OFFSETS, AvatarPlace(1.0, 2.0, np.pi / 2))

@@ -52,7 +52,7 @@ def held_cuff(target: Any) -> np.ndarray:
     return np.array(target.position) + RADIUS_M * to_arm
 
 
-def test_the_sleeve_goes_back_while_the_arm_feels_too_much_and_on_when_it_does_not():
+def test_sleeve_retreats_from_a_large_force_and_advances_again():
     dressing, cuff = Dressing(speed=0.1), np.array(CUFF)
 
     def next_x(force_share: float) -> float:
@@ -181,7 +181,7 @@ def as_a_squeeze(since_s: float, beyond_m: float) -> float:
     return SQUEEZE_N
 
 
-def test_the_robot_backs_off_from_a_force_on_the_arm_and_goes_on_when_it_ends(tmp_path):
+def test_robot_backs_off_from_a_force_and_continues_afterwards(tmp_path):
     found = dress_pressed(tmp_path, SNAG_LIMIT_N, [ABOVE], as_a_thread)
     assert found.back_m > 0.015
     assert 0.8 * SNAG_LIMIT_N < found.peak_n < 1.5 * SNAG_LIMIT_N
@@ -195,7 +195,7 @@ def test_without_a_limit_the_same_force_grows_beyond_it(tmp_path):
 
 
 @pytest.mark.parametrize("limit_n, backs_off", ((FORCE_LIMIT_N, True), (1e6, False)))
-def test_a_squeeze_from_both_sides_is_felt_though_its_vectors_cancel(tmp_path, limit_n, backs_off):
+def test_squeeze_from_both_sides_is_detected_although_its_vectors_cancel(tmp_path, limit_n, backs_off):
     """With a limit beyond all, its negative control, the robot goes on as with a sum of vectors."""
     found = dress_pressed(tmp_path, limit_n, [LEFT, RIGHT], as_a_squeeze, longest_s=0.6)
     assert found.net_n < 0.3 * FORCE_LIMIT_N, "as vectors the two would not even slow the robot down"
@@ -232,7 +232,7 @@ def test_force_is_the_mean_of_a_tenth_of_a_second():
     assert force.peak_n == 6.0 and force.peak_share == 6.0 / FORCE_LIMIT_N
 
 
-def test_each_contact_each_segment_and_the_arm_have_a_limit_of_their_own():
+def test_contacts_segments_and_arm_have_separate_limits():
     def shares(*contacts) -> list[float]:
         """Returns shares of limits at the first tick, and after many without contacts among them."""
         force, found = ArmForce(400.0), []
@@ -249,7 +249,7 @@ def test_each_contact_each_segment_and_the_arm_have_a_limit_of_their_own():
     assert first == 440.0 / 400.0, "no segment is beyond its limit, the arm is"
 
 
-def test_a_person_raises_the_arm_in_front_of_whoever_stands_at_the_side():
+def test_raised_arm_avoids_the_robot_at_the_side():
     """Raised to the side, the hand of seed 25 met the robot's arm with 72 N before anything was drawn."""
     for t_pose_s in (0.0, 1.0):
         person = ArmHeldOut(1.6021, 25, t_pose_s=t_pose_s)
@@ -266,7 +266,7 @@ def test_a_person_raises_the_arm_in_front_of_whoever_stands_at_the_side():
         (CUFF, False),
     ),
 )
-def test_outcome_tells_whether_the_arm_is_in_the_sleeve(cuff, is_dressed):
+def test_outcome_is_dressed_exactly_if_the_arm_is_inside(cuff, is_dressed):
     found = outcome(rings_of(sleeve_at(np.array(cuff))), ARM, ArmForce(FORCE_LIMIT_N))
     assert found.is_dressed is is_dressed
     assert found.past_elbow_m == pytest.approx(np.dot(np.array(cuff) - ELBOW, (SHOULDER - ELBOW) / 0.32388), abs=1e-3)
@@ -285,7 +285,7 @@ def test_an_arm_that_hangs_is_not_held_out():
     assert not is_held_out(down)
 
 
-def test_the_world_is_what_the_code_takes_it_for():
+def test_world_matches_the_constants_of_the_code():
     world = World.from_file(WORLD)
     assert world.bodies["panda"].base_pose().position == pytest.approx(ROBOT_BASE.position)
     nodes = np.array(world.bodies["sleeve"].state().nodes)

@@ -117,7 +117,7 @@ def test_chain_has_the_names_and_order_of_the_authors_release(kuka: Kuka) -> Non
     }
 
 
-def test_the_one_with_a_sponge_is_the_same_arm_without_the_ball() -> None:
+def test_arm_with_sponge_equals_the_other_without_its_ball() -> None:
     other = ElementTree.parse(ROBOTS / "kuka_lwr2.urdf").getroot()
     expected = copy.deepcopy(URDF.getroot())
     for ball in expected.findall("*[@name='end_effector_ball']"):
@@ -158,7 +158,7 @@ def test_first_joint_turns_the_arm_about_the_vertical(
     assert kuka.position("lwr_arm_4_link") == pytest.approx(elbow, abs=1e-6)
 
 
-def test_arm_weighs_16_kg_and_its_pedestal_s_mass_centre_is_about_55_mm_up(kuka: Kuka) -> None:
+def test_arm_weighs_16_kg_with_a_low_centre_of_mass(kuka: Kuka) -> None:
     dynamics = {name: kuka.pb.getDynamicsInfo(kuka.body, index) for name, index in kuka.links.items()}
     assert sum(dynamics[link][0] for link in ARM_LINKS) == pytest.approx(16.0)
     assert all(dynamics[link][0] > 0.0 for link in ARM_LINKS + TOOL_LINKS)
@@ -196,7 +196,7 @@ def test_every_mesh_is_used_and_there_and_all_are_small() -> None:
     assert sum(path.stat().st_size for path in used) < 2e6
 
 
-def test_arm_links_are_finely_meshed_but_light_enough_for_the_camera() -> None:
+def test_arm_meshes_are_fine_but_light_enough_for_the_camera() -> None:
     links = {link.attrib["name"]: link for link in URDF.iter("link")}
     bodies = {name: len(read_obj(meshes_of(links[name])[0])[2]) for name in ARM_LINKS}
     assert min(bodies.values()) >= 300, bodies

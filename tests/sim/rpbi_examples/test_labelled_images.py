@@ -108,7 +108,7 @@ def models(found) -> dict[int, cKDTree]:
     return {each["id"]: surface(found.folder / f"models/obj_{each['id']:06d}.ply") for each in found.coco["categories"]}
 
 
-def test_what_the_camera_sees_lies_on_the_models_at_their_poses(found, models):
+def test_depth_points_lie_on_the_models_at_their_poses(found, models):
     worst = 0.0
     for image, label, pose, _ in found.each():
         off = distances(found, image, label, pose, models)
@@ -168,7 +168,7 @@ def test_a_pixel_belongs_to_one_object_and_some_hide_others(found):
     assert min(fractions) < 0.7 and np.mean(fractions) > 0.7
 
 
-def test_objects_lie_on_the_table_and_equal_ones_are_of_one_kind(found):
+def test_objects_lie_on_the_table_and_equal_ones_share_categories(found):
     names = {each["id"]: each["name"] for each in found.coco["categories"]}
     assert len(names) == 20
     for image in range(IMAGES):
@@ -230,7 +230,7 @@ def test_an_image_depends_on_the_seed_and_its_number_alone(small, tmp_path):
     assert a["train/000000/rgb/000000.png"] != other["train/000000/rgb/000000.png"]
 
 
-def test_a_world_that_runs_can_be_given_and_the_camera_be_named(small, tmp_path):
+def test_running_world_and_camera_name_can_be_given(small, tmp_path):
     world = World.from_file(str(small()), connection_mode=pybullet.DIRECT)
     try:
         for _ in range(100):
@@ -255,7 +255,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("what", BAD)
-def test_a_world_that_gives_no_images_is_refused_and_nothing_is_left(small, tmp_path, what):
+def test_unsuitable_world_is_refused_and_leaves_no_files(small, tmp_path, what):
     changes, message = BAD[what]
     place = tmp_path / "sets"
     with pytest.raises(InterfaceError, match=message):
@@ -263,7 +263,7 @@ def test_a_world_that_gives_no_images_is_refused_and_nothing_is_left(small, tmp_
     assert not list(place.iterdir())
 
 
-def test_objects_that_go_on_moving_are_named(small, tmp_path, monkeypatch):
+def test_objects_that_never_rest_are_named(small, tmp_path, monkeypatch):
     monkeypatch.setattr("rpbi_utils.labelled_images.arrangement.PATIENCE_S", 0.2)
     with pytest.raises(InterfaceError, match="'(ball|box)' does not come to rest within 0.2 s, in 5 attempts"):
         write_labelled_images(small(), tmp_path / "set", 1)

@@ -66,21 +66,21 @@ def test_the_demo_runs_at_1_khz_as_these_pushes_do():
     assert load_world(WORLD).config.timeStep == 0.001
 
 
-def test_each_push_brings_the_box_to_its_place_and_hardly_turns_it(session):
+def test_each_push_brings_the_box_to_its_goal_without_turning(session):
     assert len(session.boxes) == ROUNDS
     for box, goal in session.boxes:
         assert math.dist((box.x, box.y), goal) < NEAR_M
         assert abs(box.yaw) < 0.1
 
 
-def test_it_pushes_with_the_friction_of_the_box_and_lets_go_of_it(session):
+def test_pushing_force_is_friction_and_ends_with_the_push(session):
     touching = session.forces[session.forces > 0.0]
     assert 0.2 < len(touching) / len(session.forces) < 0.8
     assert touching.mean() == pytest.approx(0.8 * 9.81 * 0.7 * 1.0, rel=0.35)
 
 
 @pytest.mark.parametrize(("objects", "most_std_n"), [({}, 0.5), ({"box": COMPLIANT}, 0.2)])
-def test_at_constant_speed_the_push_is_the_friction_and_does_not_chatter(objects, most_std_n):
+def test_force_at_constant_speed_is_friction_without_chatter(objects, most_std_n):
     force = pushed(objects=objects, length_m=0.2).steady()
     assert force.points.min() == 4.0
     assert force.push == pytest.approx(force.friction, rel=0.05)
@@ -95,7 +95,7 @@ def test_on_a_plane_it_would_chatter():
     assert force.push.std() > 1.5 and force.push.max() > 12.0
 
 
-def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_a_jump(session, solver):
+def test_joints_stay_within_limits_and_speeds_without_jumps(session, solver):
     assert (np.ptp(session.targets, axis=0) > 0.2).all()
     assert (session.targets > solver.lower).all() and (session.targets < solver.upper).all()
     velocities = np.diff(session.targets, axis=0) * 50.0
@@ -103,7 +103,7 @@ def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_
     assert np.abs(np.diff(velocities, axis=0)).max() * 50.0 < 20.0
 
 
-def test_what_is_out_of_reach_is_told(solver):
+def test_push_out_of_reach_is_reported(solver):
     push = next_push(PlanarPose(-1.5, 0.0, 0.0), PLACES[0])
     with pytest.raises(ValueError, match=r"\(-1\.6.*\) m is out of reach"):
         Pusher(solver).moves((0.0,) * 7, push)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[3]
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
-def test_blocks_do_what_the_page_says(tmp_path):
+def test_code_blocks_of_the_page_give_the_documented_results(tmp_path):
     blocks = BLOCK.findall((ROOT / "docs/mpc.md").read_text())
     (tmp_path / "script.py").write_text("\n".join(blocks))
     clean = ["env", "-i", "PATH=/usr/local/bin:/usr/bin:/bin", f"HOME={tmp_path}", str(ROOT / ".venv/bin/python")]

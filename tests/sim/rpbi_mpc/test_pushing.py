@@ -64,7 +64,7 @@ def test_ipopt_alone_does_it_too():
     assert trial.errors.mean() < 0.005 and all(cycle.status == "solved" for cycle in trial.cycles)
 
 
-def test_the_best_of_simulated_pushes_follows_a_line_and_is_what_then_happens():
+def test_sampled_pushes_follow_a_line_as_predicted():
     config = PushingConfig(path=LINE)
     sampling = PushSamplingConfig(horizon=0.6, seed=903)
 
@@ -147,7 +147,7 @@ def test_decisions_do_not_depend_on_the_speed_of_the_computer():
     assert np.array_equal(quick.truth, slow.truth)
 
 
-def test_robot_stands_while_the_box_is_hidden_and_goes_on_afterwards():
+def test_robot_waits_while_the_box_is_hidden_and_continues_afterwards():
     world, plant, loop = line_loop()
     loop.run(1.0)
     see, plant._see = plant._see, lambda sample: None
@@ -164,7 +164,7 @@ def test_robot_stands_while_the_box_is_hidden_and_goes_on_afterwards():
     world.close()
 
 
-def test_shove_moves_and_turns_the_box_but_not_into_the_pusher():
+def test_shove_moves_and_turns_the_box_without_hitting_the_pusher():
     world = pushing_world(Variation(), PushPath(LINE))
     plant, config = PushingWorld(world), PushingConfig(path=LINE)
     for seed in range(10):

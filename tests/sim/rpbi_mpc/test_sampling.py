@@ -39,7 +39,7 @@ def run(world: World, cost: str = "costs:turned", delay_s: float = 0.01) -> Lock
     return loop
 
 
-def test_the_arm_goes_where_the_cost_is_least_and_does_so_again(world):
+def test_arm_reaches_the_least_cost_reproducibly(world):
     loop = run(world)
     assert list(world.bodies["iiwa"].joint_positions().values())[1] == pytest.approx(0.6, abs=0.06)
     assert {str(each.status) for each in loop.cycles} == {"solved"}

@@ -71,7 +71,7 @@ def errors(found: Pose, truth: Pose) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("position", [(0.0, 0.0, 0.55), (0.07, 0.19, 0.55), (-0.09, 0.1, 0.55)])
-def test_a_tag_that_is_parallel_to_the_image_is_found_as_it_is(position):
+def test_pose_of_a_tag_parallel_to_the_image_is_found(position):
     truth, half = Pose(position, (1.0, 0.0, 0.0, 0.0)), SIZE / 2.0
     corners = np.array(position) + [[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]]
     pixels = corners @ CAMERA_MATRIX.T
@@ -114,7 +114,7 @@ def test_poses_are_those_of_the_world(lab) -> None:
     assert np.median(distance) < 0.001 and np.median(angle) < math.radians(0.5)
 
 
-def test_two_tags_are_told_apart_and_one_from_behind_is_not_there(lab) -> None:
+def test_two_tags_are_distinguished_and_one_from_behind_is_ignored(lab) -> None:
     left, right = (Pose((x, 0.0, 0.7), (1.0, 0.0, 0.0, 0.0)) for x in (-0.12, 0.12))
     tags = seen(lab, left, right)
     for number, truth in ((0, left), (7, right)):

@@ -122,7 +122,7 @@ def arm(tmp_path: Path) -> Iterator[Arm]:
     arm.world.close()
 
 
-def test_mass_within_1_percent_centre_within_2_mm_and_nothing_left_in_new_poses(arm):
+def test_identified_payload_has_accurate_mass_and_centre_without_remaining_wrench(arm):
     samples = []
     for tilt in TILTS:
         arm.go(**tilt)
@@ -143,7 +143,7 @@ def test_mass_within_1_percent_centre_within_2_mm_and_nothing_left_in_new_poses(
         assert np.abs((one.wrench - samples[0].wrench)[:3]).max() > 3.0, "zeroing in the first pose would not do"
 
 
-def test_a_moving_arm_is_no_sample_and_an_arm_at_rest_is(arm):
+def test_moving_arm_gives_no_sample_and_one_at_rest_does(arm):
     arm.go()
     arm.step(1.0)
     arm.rest()

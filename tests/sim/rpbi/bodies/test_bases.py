@@ -72,7 +72,7 @@ def test_a_fixed_base_stays_whatever_pushes_it(build):
     assert quat == pytest.approx(pose["baseOrientation"], abs=1e-6)
 
 
-def test_a_base_that_follows_tf_has_its_link_frame_there_not_its_centre_of_mass(build, tmp_path):
+def test_base_that_follows_tf_places_its_link_frame_there(build, tmp_path):
     robot = mobile_base(
         tmp_path,
         loadURDF={"useFixedBase": True},
@@ -99,13 +99,13 @@ def test_a_mobile_robot_by_its_type_needs_a_planar_base(build, tmp_path):
 
 
 @pytest.mark.parametrize("planar_base", [None, {}])
-def test_a_base_that_physics_moves_does_not_follow_tf_and_says_so(build, tmp_path, caplog, planar_base):
+def test_base_moved_by_physics_warns_that_tf_has_no_effect(build, tmp_path, caplog, planar_base):
     world = build(mobile_base(tmp_path, object_tf={"tf_id": "carrier"}, planar_base=planar_base))
     assert "mobile/pose" not in world.inputs
     assert "mobile: object_tf: has no effect" in caplog.text
 
 
-def test_a_start_velocity_of_a_fixed_base_has_no_effect_and_that_is_said(build, caplog):
+def test_start_velocity_of_a_fixed_base_only_causes_a_warning(build, caplog):
     world = build(iiwa(resetBaseVelocity={"linearVelocity": [1.0, 0.0, 0.0]}))
     _run(world, 0.2)
     assert world.bodies["iiwa"].base_pose().position == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
@@ -122,7 +122,7 @@ def test_a_floating_base_flies_as_it_was_thrown(build, tmp_path):
     assert body.base_pose().position == pytest.approx((1.0, -0.5, 2.0 - 9.81 / 2 * 1.001), rel=1e-3)
 
 
-def test_the_twist_of_a_spinning_base_is_that_of_its_frame_not_of_its_centre_of_mass(build, tmp_path):
+def test_twist_of_a_spinning_base_is_that_of_its_frame(build, tmp_path):
     spin = {"linearVelocity": [0.3, 0.0, 0.0], "angularVelocity": [0.0, 0.0, 2.0]}
     robot = mobile_base(tmp_path, loadURDF={"baseOrientation": [0.0, 0.0, 0.6, 0.8]}, resetBaseVelocity=spin, **STILL)
     world = build(robot, setGravity={"gravZ": 0.0})
@@ -147,7 +147,7 @@ def test_the_twist_of_a_spinning_base_is_that_of_its_frame_not_of_its_centre_of_
         ({"base_state_hz": 0}, 0),
     ],
 )
-def test_the_state_of_a_base_is_told_by_default_where_physics_moves_it(build, tmp_path, more, count):
+def test_base_state_is_sampled_by_default_where_physics_moves_it(build, tmp_path, more, count):
     samples = _run(build(mobile_base(tmp_path, **more)), 1.0)
     assert sum(isinstance(sample, BaseStateSample) for sample in samples) == count
 
@@ -184,7 +184,7 @@ def test_the_joints_of_a_planar_base_are_not_the_robots(build, tmp_path, flag):
 
 
 @pytest.mark.parametrize("fixed", [True, False])
-def test_a_planar_base_starts_where_the_urdf_is_loaded_and_drives_along_its_own_axes(build, tmp_path, fixed):
+def test_planar_base_starts_at_its_pose_and_drives_straight_ahead(build, tmp_path, fixed):
     start = {"basePosition": [1.0, 2.0, 0.0], "baseOrientation": [0.0, 0.0, 1.0, 0.0], "useFixedBase": fixed}
     world = build(mobile_base(tmp_path, loadURDF=start))
     assert _plane(world) == pytest.approx((1.0, 2.0, math.pi), abs=1e-6)
@@ -207,7 +207,7 @@ def test_a_root_link_without_inertia_adds_none(build, tmp_path):
     assert sum(masses) == pytest.approx(BASE_KG + ARM_KG)
 
 
-def test_a_robot_of_pybullets_own_with_relative_meshes_can_have_a_planar_base(build):
+def test_robot_of_pybullet_with_relative_meshes_can_have_planar_base(build):
     robot = iiwa("mobile", planar_base={})
     world = build(robot)
     _drive(world, x=0.5)
@@ -283,7 +283,7 @@ def test_a_circle_has_the_radius_v_over_w_and_closes(build, tmp_path):
 
 
 @pytest.mark.parametrize("time_step_s", [0.001, 0.02])
-def test_its_way_does_not_depend_on_the_length_of_a_tick(build, tmp_path, time_step_s):
+def test_driven_path_is_independent_of_the_tick_length(build, tmp_path, time_step_s):
     at_once = {"max_linear_acceleration": 1e4, "max_angular_acceleration": 1e4, "max_force": 1e8, "max_torque": 1e8}
     world = build(mobile_base(tmp_path, planar_base=at_once | {"cmd_vel_timeout_s": 10.0}), timeStep=time_step_s)
     _drive(world, x=0.5, yaw=1.0)
@@ -326,7 +326,7 @@ def test_it_brakes_when_commands_cease(build, tmp_path):
 
 
 @pytest.mark.parametrize(("time_step_s", "tolerance"), [(0.001, 1e-6), (0.02, 5e-3)])
-def test_it_does_not_drift_while_it_stands_under_a_swinging_arm(build, tmp_path, time_step_s, tolerance):
+def test_standing_base_does_not_drift_under_a_swinging_arm(build, tmp_path, time_step_s, tolerance):
     world = build(mobile_base(tmp_path), collision=(FLOOR,), timeStep=time_step_s)
     for swing in range(60):
         world.put("mobile/target", JointCommand(["shoulder"], [1.5 * (-1.0) ** swing]))
@@ -351,7 +351,7 @@ def test_the_arm_feels_how_the_base_accelerates(build, tmp_path):
 # Planar bases: what is in the way
 
 
-def test_a_wall_stops_it_with_the_force_it_has_and_it_comes_back(build, tmp_path):
+def test_wall_stops_the_base_with_its_force_and_it_returns(build, tmp_path):
     force = 150.0
     planar_base = {"max_force": force, "cmd_vel_timeout_s": 100.0}
     world = build(mobile_base(tmp_path, planar_base=planar_base), collision=(FLOOR,), dynamic=(WALL,))
@@ -366,7 +366,7 @@ def test_a_wall_stops_it_with_the_force_it_has_and_it_comes_back(build, tmp_path
     assert x - _plane(world)[0] == pytest.approx(0.375, abs=0.01)
 
 
-def test_it_does_not_leap_when_what_held_it_up_is_gone(build, tmp_path):
+def test_base_does_not_jump_when_a_blocking_body_is_removed(build, tmp_path):
     planar_base = {"cmd_vel_timeout_s": 100.0}
     world = build(mobile_base(tmp_path, planar_base=planar_base), collision=(FLOOR,), dynamic=(WALL,))
     _drive(world, x=0.5)
@@ -396,7 +396,7 @@ def test_a_box_is_pushed_and_pushes_back_with_its_friction(build, tmp_path):
     assert _speed(world) == pytest.approx(0.3, abs=0.01)
 
 
-def test_what_is_too_heavy_to_push_stays(build, tmp_path):
+def test_body_too_heavy_to_push_stays(build, tmp_path):
     load = box("load", (0.15, 0.15, 0.15), baseMass=100.0, basePosition=[0.6, 0.0, 0.15])
     planar_base = {"max_force": 100.0, "cmd_vel_timeout_s": 100.0}  # less than its friction of 490 N
     world = build(mobile_base(tmp_path, planar_base=planar_base), collision=(FLOOR,), dynamic=(load,))
@@ -409,7 +409,7 @@ def test_what_is_too_heavy_to_push_stays(build, tmp_path):
 # Planar bases: being put, copied, misused
 
 
-def test_a_planar_base_can_be_put_elsewhere_and_drives_on_from_there(build, tmp_path):
+def test_planar_base_can_be_teleported_and_drives_on(build, tmp_path):
     world = build(mobile_base(tmp_path, planar_base={"cmd_vel_timeout_s": 100.0}))
     _drive(world, x=0.5, yaw=0.5)
     _run(world, 2.0)

@@ -55,7 +55,7 @@ def build(tmp_path):
         ({"shapeType": "GEOM_MESH", "fileName": CUBE, "meshScale": [0.1, 0.2, 0.3]}, ShapeKind.MESH, (0.1, 0.2, 0.3)),
     ],
 )
-def test_shape_has_the_size_the_place_and_the_colour_of_its_yaml(build, shape, kind, size):
+def test_shape_has_size_pose_and_colour_of_its_yaml(build, shape, kind, size):
     rgba = (0.1, 0.2, 0.3, 0.4)
     frame = {"visualFramePosition": [0.5, 0.1, 0.2], "visualFrameOrientation": list(TURNED), "rgbaColor": list(rgba)}
     (found,) = body_shapes(build(visual=(visual(**shape, **frame),)).bodies["thing"])
@@ -79,7 +79,7 @@ def test_capsule_is_a_cylinder_with_a_ball_at_each_end(build):
 
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.0, 3.0, 4.0), (1.0, 0.0, 0.0), (0.0, 0.0, -2.0)])
-def test_plane_is_a_large_thin_box_whose_upper_side_has_its_normal(build, normal):
+def test_plane_is_a_large_thin_box_below_its_surface(build, normal):
     world = build(visual=(visual(shapeType="GEOM_PLANE", planeNormal=list(normal)),))
     (found,) = body_shapes(world.bodies["thing"])
     assert (found.kind, found.size[:2]) == (ShapeKind.BOX, (PLANE_SIZE_M, PLANE_SIZE_M))
@@ -89,7 +89,7 @@ def test_plane_is_a_large_thin_box_whose_upper_side_has_its_normal(build, normal
     assert above.position == pytest.approx(tuple(np.array(normal) / np.linalg.norm(normal)), abs=1e-6)
 
 
-def test_mesh_that_stands_in_the_yaml_has_its_corners(build):
+def test_mesh_written_in_the_yaml_has_its_corners(build):
     vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     shape = {"shapeType": "GEOM_MESH", "vertices": vertices, "indices": [0, 1, 2, 0, 2, 3]}
     (found,) = body_shapes(build(visual=(visual(**shape),)).bodies["thing"])
@@ -107,7 +107,7 @@ def test_only_a_mesh_with_a_picture_on_it_is_textured(build):
     assert not any(shape.is_textured for shape in body_shapes(world.bodies["iiwa"]))
 
 
-def test_shapes_of_a_robot_are_on_its_links_in_the_colours_of_its_urdf(build):
+def test_robot_shapes_belong_to_links_and_have_urdf_colours(build):
     world = build(robots=(iiwa(),), setAdditionalSearchPath="pybullet_data_path")
     shapes = body_shapes(world.bodies["iiwa"])
     assert [shape.link for shape in shapes] == [f"lbr_iiwa_link_{index}" for index in range(8)]

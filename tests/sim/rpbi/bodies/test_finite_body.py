@@ -60,7 +60,7 @@ def _arm(tmp_path, **numbers):
 
 
 @pytest.mark.parametrize("key", FAULTS)
-def test_a_urdf_with_numbers_that_are_not_finite_is_refused_and_the_link_named(world, tmp_path, key):
+def test_urdf_with_non_finite_numbers_is_refused_naming_the_link(world, tmp_path, key):
     value, told = FAULTS[key]
     with pytest.raises((ConfigError, PhysicsError), match=f"arm: .*{told}"):
         world.add("urdf", _arm(tmp_path, **{key: value}))
@@ -81,6 +81,6 @@ def test_a_ball_that_is_too_large_is_refused():
         DynamicObject.Config.parse(ball("huge", radius_m=1e300), "huge.yaml")
 
 
-def test_it_is_told_at_the_start_with_its_file(tmp_path):
+def test_non_finite_body_is_reported_at_start_with_its_file(tmp_path):
     with pytest.raises(ConfigError, match=r"huge\.yaml: createVisualShape.radius: must be within"):
         World.from_file(write_world(tmp_path, dynamic=(ball("huge", radius_m=1e300),)))

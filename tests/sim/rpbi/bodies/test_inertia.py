@@ -79,12 +79,12 @@ def test_efforts_of_a_moving_arm_are_those_of_its_urdf(build):
         assert np.linalg.norm(tau - expected) < 0.01 * np.linalg.norm(expected)
 
 
-def test_where_the_urdf_tells_none_pybullet_guesses(moments_of):
+def test_pybullet_guesses_inertia_that_the_urdf_does_not_give(moments_of):
     assert moments_of("") == pytest.approx(BOX_MOMENTS)
 
 
 @pytest.mark.parametrize("impossible", [inertial(0, 0, 0), inertial(0.1, 0.2, 0.9), inertial(-0.1, 0.2, 0.25)])
-def test_what_no_body_can_have_is_guessed_and_told(moments_of, caplog, impossible):
+def test_impossible_inertia_is_guessed_and_reported(moments_of, caplog, impossible):
     assert moments_of(impossible) == pytest.approx(BOX_MOMENTS)
     assert "bell: no body has the moments of inertia of lump: guessed from the shape" in caplog.messages
 
@@ -99,7 +99,7 @@ def test_they_grow_with_the_lengths(moments_of, caplog):
     assert not own_messages(caplog)
 
 
-def test_placeholders_are_told_with_the_key_that_guesses(moments_of, caplog):
+def test_placeholder_inertia_is_reported_with_the_key_that_guesses(moments_of, caplog):
     assert moments_of(inertial(1, 1, 1)) == pytest.approx((1.0, 1.0, 1.0))
     assert own_messages(caplog) == [
         "bell: moments of inertia of lump are far too large for their size; inertia_from_urdf: false guesses them"
@@ -111,12 +111,12 @@ def test_a_key_has_pybullet_guess_all(moments_of, caplog):
     assert not own_messages(caplog)
 
 
-def test_what_is_not_finite_is_refused(moments_of):
+def test_non_finite_inertia_is_refused(moments_of):
     with pytest.raises(ConfigError, match="link 'lump': inertia.ixx: expected finite numbers, got 'nan'"):
         moments_of(inertial("nan", 0.02, 0.025))
 
 
-def test_a_urdf_that_only_pybullet_can_read_has_its_own_too(moments_of):
+def test_urdf_readable_only_by_pybullet_keeps_its_inertia(moments_of):
     prefixed = inertial(0.01, 0.02, 0.025) + "<sensor:camera/>"
     assert moments_of(prefixed) == pytest.approx((0.01, 0.02, 0.025))
 
@@ -163,7 +163,7 @@ def test_a_frame_at_a_tool_weighs_nothing(build, tmp_path):
 
 
 @pytest.mark.parametrize("is_fixed", [True, False])
-def test_what_moves_moves_as_without_frames(build, tmp_path, is_fixed):
+def test_massless_frames_do_not_change_the_motion(build, tmp_path, is_fixed):
     """A bell on a hinge, or thrown with its hinge, the root of which is a frame then."""
     bell = swinging(inertial(0.3, 0.2, 0.1, mass=2.0).replace("<mass", '<origin xyz="0 0.1 -0.2"/><mass'))
     if not is_fixed:
@@ -196,7 +196,7 @@ def test_what_moves_moves_as_without_frames(build, tmp_path, is_fixed):
     assert abs(moves[0][3]) > 0.05, "it swings"
 
 
-def test_links_whose_mass_nobody_says_are_told_if_they_can_move(build, tmp_path):
+def test_movable_links_without_mass_are_reported(build, tmp_path):
     (tmp_path / "bell.urdf").write_text(with_frames(swinging(""), "lump"))
     load = {"fileName": str(tmp_path / "bell.urdf")}
     fixed = build(urdfs=({"name": "bell", "loadURDF": {**load, "useFixedBase": True}},), setGravity={"gravZ": -9.81})

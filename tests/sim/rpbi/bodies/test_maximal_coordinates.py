@@ -98,7 +98,7 @@ def test_a_moving_plate_carries_or_warns_that_it_does_not(build, caplog, is_maxi
         assert carried_m > 0.03 and not warnings
 
 
-def test_what_pybullet_does_not_tell_of_it_is_that_of_its_own(build):
+def test_dynamics_that_pybullet_does_not_report_are_the_bodys_own(build):
     """PyBullet leaves in its place what it last told of another body, here of the arm."""
     bouncy = {"restitution": 0.3, "contactStiffness": 1.0e4, "contactDamping": 30.0}
     world = build(box(**MAXIMAL), ball(basePosition=[1, 0, 1], changeDynamics=bouncy, **MAXIMAL), robots=(iiwa(),))
@@ -141,7 +141,7 @@ def test_contacts_name_its_link_and_add_up_to_its_weight(build):
         assert ends == {(other, "link0", "link0")}
 
 
-def test_friction_of_what_rests_can_be_lowered(build):
+def test_friction_of_a_resting_body_can_be_lowered(build):
     """Contacts that last are made anew."""
     angle = math.radians(20.0)
     gravity = {"gravX": 9.81 * math.sin(angle), "gravZ": -9.81 * math.cos(angle)}
@@ -174,7 +174,7 @@ def test_the_renderer_shows_it_where_it_is(build):
     client.disconnect()
 
 
-def test_a_session_with_an_arm_is_the_same_after_a_reset(build):
+def test_session_with_an_arm_is_identical_after_a_reset(build):
     heap = (box(f"body{turn}", basePosition=[0.45, 0.02 * turn, 0.1 + 0.21 * turn], **MAXIMAL) for turn in range(3))
     start = {"lbr_iiwa_joint_2": 40.0, "lbr_iiwa_joint_4": -60.0}
     world = build(*heap, robots=(iiwa(initial_joint_position=start),))
@@ -196,12 +196,12 @@ def test_a_session_with_an_arm_is_the_same_after_a_reset(build):
     assert session() == first
 
 
-def test_a_dynamic_one_is_refused_where_soft_bodies_would_not_feel_it(build):
+def test_dynamic_body_is_refused_in_worlds_with_soft_bodies(build):
     with pytest.raises(ConfigError, match=r"box\.yaml: useMaximalCoordinates: soft bodies do not feel"):
         build(box(**MAXIMAL), **DEFORMABLE)
 
 
-def test_soft_bodies_feel_one_of_a_urdf_which_has_the_moments_of_its_file(build, tmp_path):
+def test_soft_bodies_touch_urdf_bodies_with_inertia_of_their_file(build, tmp_path):
     """The example `soft_body` of the release has one; PyBullet reports no shapes of it."""
     load = {"fileName": "cube.urdf", "basePosition": [0.0, 0.0, 0.72], **MAXIMAL}
     jelly = block(tmp_path, load={"basePosition": [0.0, 0.0, 0.11]})

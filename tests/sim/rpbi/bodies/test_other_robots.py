@@ -74,7 +74,7 @@ def test_every_robot_of_pybullets_data_loads_and_holds_still(build, name):
     assert description_for_ros(str(DATA / f"{name}.urdf")).count("package://") == 0
 
 
-def test_a_root_that_is_not_the_first_link_is_kept_in_the_order_of_links(tmp_path):
+def test_root_that_is_not_the_first_link_keeps_link_order(tmp_path):
     joint = "<joint name='j' type='fixed'><parent link='b'/><child link='a'/></joint>"
     (tmp_path / "x.urdf").write_text(f"<robot name='x'>{link('a')}{link('b')}{joint}</robot>")
     load = {"fileName": "x.urdf", "flags": "URDF_MAINTAIN_LINK_ORDER"}  # without it, PyBullet ends with signal 11
@@ -123,7 +123,7 @@ def test_a_prepared_urdf_is_neither_copied_nor_written_again(build, tmp_path, ki
     assert made_ready().misses == 1 and world.bodies["it"].link_indices
 
 
-def test_of_many_lines_of_pybullet_some_are_logged_and_the_rest_is_counted(build, tmp_path, caplog):
+def test_long_output_of_pybullet_is_logged_in_part_and_counted(build, tmp_path, caplog):
     bare = "".join(f"<link name='l{number}'>{BOX}</link>" for number in range(41))
     (tmp_path / "x.urdf").write_text(f"<robot name='x'>{bare}{''.join(joint(n, 'fixed') for n in range(40))}</robot>")
     caplog.set_level("INFO", "pybullet")
@@ -132,7 +132,7 @@ def test_of_many_lines_of_pybullet_some_are_logged_and_the_rest_is_counted(build
     assert len(lines) == 21 and lines[-1] == "and 63 more lines", lines
 
 
-def test_of_more_joints_than_pybullet_tells_of_the_fixed_ones_are_left_out(build, tmp_path, caplog):
+def test_fixed_joints_are_left_out_beyond_pybullets_maximum(build, tmp_path, caplog):
     (tmp_path / "most.urdf").write_text(chain(7, 120))
     assert len(build(tmp_path / "most.urdf").bodies["robot"].joints) == 127
     assert not [record for record in caplog.records if "left out" in record.message]
@@ -146,7 +146,7 @@ def test_of_more_joints_than_pybullet_tells_of_the_fixed_ones_are_left_out(build
     assert len(robot.robot_model.gravity(robot.base_pose(), [0.0] * 120)) == 120
 
 
-def test_sdf_is_refused_and_the_way_out_of_the_docs_works(build, tmp_path):
+def test_sdf_is_refused_and_the_documented_conversion_works(build, tmp_path):
     sdf = DATA / "gripper" / "wsg50_one_motor_gripper_new.sdf"
     with pytest.raises(ConfigError, match=r"gripper_new.sdf is SDF, not URDF; see docs/robots.md for a conv"):
         build(sdf)

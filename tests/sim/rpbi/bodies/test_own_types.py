@@ -90,7 +90,7 @@ def test_own_types_come_after_rigid_bodies_and_before_soft_ones(tmp_path):
     assert list(files) == ["robot.yaml", "belt.yaml", "soft.yaml"]
 
 
-def test_an_object_may_tell_a_type_of_the_interface(tmp_path):
+def test_object_may_name_a_built_in_type(tmp_path):
     world = build(tmp_path, {**box("crate", basePosition=[0.0, 0.0, 1.0]), "type": "dynamic"})
     assert BODY_TYPES.name_of(world.bodies["crate"]) == "dynamic"
     world.close()
@@ -104,7 +104,7 @@ def test_a_type_of_the_interface_may_be_extended(tmp_path):
     world.close()
 
 
-def test_a_sensor_of_an_own_type_goes_on_any_body(tmp_path):
+def test_sensor_of_an_own_type_works_on_any_body(tmp_path):
     falling = box("falling", basePosition=[0.0, 0.0, 1.0], sensors=[DOWN, UP])
     world = build(tmp_path, dynamic=(falling,))
     samples = {sample.name: sample for sample in run(world, 10)}
@@ -114,7 +114,7 @@ def test_a_sensor_of_an_own_type_goes_on_any_body(tmp_path):
     world.close()
 
 
-def test_a_reset_and_a_fresh_world_are_the_same_to_the_last_bit(world, tmp_path):
+def test_reset_world_is_bitwise_identical_to_a_fresh_one(world, tmp_path):
     run(world, 700)
     add(world, CONVEYOR, name="visitor", size=[1, 1, 1], position=[0, 3, 1])
     world.put("belt/speed", -1.0)
@@ -128,7 +128,7 @@ def test_a_reset_and_a_fresh_world_are_the_same_to_the_last_bit(world, tmp_path)
     fresh.close()
 
 
-def test_a_world_and_what_comes_into_it_can_be_recorded(world):
+def test_world_with_own_types_can_be_recorded(world):
     again = World.from_description(WorldDescription(world.describe()))
     config = load_object(CONVEYOR, {**BELT, "name": "second", "sensors": [EYE]}, "second.yaml")
     for each, given in ((world, config), (again, from_text(to_text(config)))):
@@ -185,12 +185,12 @@ def test_a_world_and_what_comes_into_it_can_be_recorded(world):
         (thing(sensors=[gauge("UnmadeGauge")]), r"faulty_lab:UnmadeGauge failed in making 'thing/gauge': OSError: no"),
     ],
 )
-def test_a_mistake_is_told_with_file_and_key(tmp_path, data, message):
+def test_mistake_is_reported_with_file_and_key(tmp_path, data, message):
     with pytest.raises(ConfigError, match=message):
         build(tmp_path, data)
 
 
-def test_all_problems_are_told_at_once(tmp_path):
+def test_all_problems_are_reported_at_once(tmp_path):
     wrong = {**BELT, "size": 1, "sensors": [{**EYE, "hz": -1, "max_range": "far"}, {"type": "nowhere:X"}]}
     with pytest.raises(ConfigError) as caught:
         build(tmp_path, wrong, {"name": "other", "type": "nowhere:Y"})
@@ -221,7 +221,7 @@ def test_a_failing_add_leaves_the_world_as_it_was(world, keys):
         ({"sensors": [gauge("MisnamedGauge")]}, r"MisnamedGauge failed in .*: expected the sensor's name 'thing/gau"),
     ],
 )
-def test_a_class_that_fails_in_a_tick_is_named_with_its_file(tmp_path, keys, message):
+def test_class_failing_in_a_tick_is_named_with_its_file(tmp_path, keys, message):
     world = build(tmp_path, thing(**keys))
     with pytest.raises(PluginError, match=f"^faulty_lab:{message}"):
         run(world, 20)
@@ -243,7 +243,7 @@ def test_an_input_that_fails_is_named(tmp_path):
     world.close()
 
 
-def test_a_good_sensor_of_an_own_type_is_read_at_its_rate(tmp_path):
+def test_sensor_of_an_own_type_is_read_at_its_rate(tmp_path):
     world = build(tmp_path, thing(sensors=[gauge("Gauge", hz=250.0)]))
     samples = run(world, 1000)
     assert len(samples) == 250 and samples[0].values == (1.0, 2.0)

@@ -45,7 +45,7 @@ def nodes(world, name="jelly"):
     return np.array(world.bodies[name].state().nodes)
 
 
-def test_it_falls_freely_and_comes_to_rest_on_the_floor(build, tmp_path):
+def test_soft_body_falls_freely_and_rests_on_the_floor(build, tmp_path):
     world = build(block(tmp_path))
     assert isinstance(world.bodies["jelly"], SoftObject)
     run(world, 50)
@@ -56,7 +56,7 @@ def test_it_falls_freely_and_comes_to_rest_on_the_floor(build, tmp_path):
     assert 0.12 < heights.max() < 0.2, "its own weight presses it down a little"
 
 
-def test_it_gives_way_under_a_box(build, tmp_path):
+def test_soft_body_deforms_under_a_box(build, tmp_path):
     alone = build(block(tmp_path, load={"basePosition": [0, 0, 0.11]}))
     run(alone, 500)
     load = box(basePosition=[0, 0, 0.35], baseMass=3.0)
@@ -68,7 +68,7 @@ def test_it_gives_way_under_a_box(build, tmp_path):
     assert world.bodies["box"].base_pose().position[2] > 0.2, "it carries the box"
 
 
-def test_forces_of_the_floor_carry_its_weight_roughly(build, tmp_path):
+def test_forces_of_the_floor_carry_about_its_weight(build, tmp_path):
     world = build(block(tmp_path, load={"basePosition": [0, 0, 0.11]}, contacts={"hz": 250}))
     run(world, 500)
     samples = [sample for sample in run(world, 250) if isinstance(sample, ContactsSample)]
@@ -96,12 +96,12 @@ def resting(build, tmp_path):
     return world
 
 
-def test_at_rest_the_floor_still_carries_it(resting):
+def test_floor_still_carries_a_soft_body_at_rest(resting):
     samples = [sample for sample in run(resting, 50) if isinstance(sample, ContactsSample)]
     assert np.mean([sample.force[2] for sample in samples]) == pytest.approx(MASS_KG * 9.81, rel=0.1)
 
 
-def test_at_rest_it_gives_way_to_what_tf_moves(resting):
+def test_resting_soft_body_yields_to_a_body_moved_by_tf(resting):
     height_m = nodes(resting)[:, 2].max()
     for tick in range(250):
         resting.bodies["press"].set_base_pose(Pose((0.0, 0.0, height_m + 0.05 - 0.0002 * tick)))
@@ -109,7 +109,7 @@ def test_at_rest_it_gives_way_to_what_tf_moves(resting):
     assert nodes(resting)[:, 2].max() == pytest.approx(height_m - 0.05, abs=0.01)
 
 
-def test_its_surface_is_told_as_triangles_at_its_rate_and_in_its_colour(build, tmp_path):
+def test_surface_is_sampled_as_triangles_with_rate_and_colour(build, tmp_path):
     orange = [0.9, 0.5, 0.1, 1.0]
     world = build(block(tmp_path, surface_hz=25, changeVisualShape={"rgbaColor": orange}))
     surfaces = [sample for sample in run(world, 100) if isinstance(sample, SurfaceSample)]
@@ -204,7 +204,7 @@ def test_a_wrong_anchor_is_named_and_leaves_nothing_behind(build, tmp_path, anch
     assert told in str(caught.value)
 
 
-def test_a_world_that_is_not_set_up_for_it_is_told_what_to_write(build, tmp_path):
+def test_soft_body_requires_a_deformable_world(build, tmp_path):
     with pytest.raises(ConfigError) as caught:
         build(block(tmp_path), resetSimulation={})
     assert str(caught.value) == (
@@ -266,7 +266,7 @@ def test_a_broken_mesh_is_refused_before_pybullet_crashes_on_it(build, tmp_path,
         ({"createSoftBodyAnchors": []}, "did you mean 'createSoftBodyAnchor'?"),
     ],
 )
-def test_a_wrong_file_is_told_by_key(build, tmp_path, change, told):
+def test_faults_in_a_file_are_reported_by_key(build, tmp_path, change, told):
     with pytest.raises(ConfigError) as caught:
         build({**block(tmp_path), **change})
     assert told in str(caught.value)
@@ -344,7 +344,7 @@ def test_it_can_be_put_somewhere_at_rest(build, tmp_path):
     assert position == pytest.approx((1.0, 2.0, 5.0 - 0.5 * 9.81 * 0.1**2), abs=0.01)
 
 
-def test_what_makes_no_sense_for_it_is_refused(build, tmp_path):
+def test_unsupported_operations_on_a_soft_body_are_refused(build, tmp_path):
     world = build(block(tmp_path))
     with pytest.raises(PhysicsError, match="a soft body has no twist"):
         world.bodies["jelly"].base_twist()

@@ -94,7 +94,7 @@ def test_the_urdfs_damping_slows_a_joint_down_exponentially(build):
     assert hinge(world)[1] == pytest.approx(math.exp(-0.3 / HINGE_INERTIA * 0.5), rel=1e-3)
 
 
-def test_the_urdfs_friction_slows_a_joint_down_evenly_and_then_holds_it(build):
+def test_urdf_friction_slows_a_joint_evenly_and_then_holds_it(build):
     world = build('<dynamics friction="0.6"/>')
     turn(world, 1.0)
     run(world, 500)
@@ -145,7 +145,7 @@ def test_a_ball_pushes_the_door_open(build):
     assert hinge(world)[1] > 0.5
 
 
-def test_a_fixed_base_follows_a_tf_frame_with_its_urdf_frame(build):
+def test_fixed_base_follows_tf_with_its_urdf_frame(build):
     world = build(object_tf={"tf_id": "hand"})
     assert set(world.inputs) == {"door/pose", "door/external_wrench"}
     world.put("door/pose", Pose((1.0, 2.0, 3.0)))
@@ -153,7 +153,7 @@ def test_a_fixed_base_follows_a_tf_frame_with_its_urdf_frame(build):
     assert world.bodies["door"].base_pose().position == pytest.approx((1.0, 2.0, 3.0))
 
 
-def test_what_has_no_mass_counts_as_fixed(build):
+def test_body_without_mass_counts_as_fixed(build):
     world = build(load={"fileName": "plane.urdf", "useFixedBase": False}, object_tf={"tf_id": "hand"})
     assert list(world.inputs) == ["door/pose"]
 
@@ -182,7 +182,7 @@ def test_its_links_are_broadcast_at_the_rate_asked_for(build):
     assert samples[0].frames == ("rpbi/door/frame", "rpbi/door/leaf")
 
 
-def test_a_broken_urdf_is_told_with_file_and_key(tmp_path):
+def test_broken_urdf_is_reported_with_file_and_key(tmp_path):
     (tmp_path / "broken.urdf").write_text("<robot>")
     door = {"name": "door", "loadURDF": {"fileName": str(tmp_path / "broken.urdf")}}
     with pytest.raises(ConfigError, match=r"^door.yaml: loadURDF.fileName: .*broken.urdf is not XML"):

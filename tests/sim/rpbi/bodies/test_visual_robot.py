@@ -73,7 +73,7 @@ def test_a_robot_moves_through_it(build):
     assert joint(world) == 0.0
 
 
-def test_all_joints_are_put_in_one_call_since_each_takes_milliseconds_beside_a_window(build, monkeypatch):
+def test_all_joints_are_reset_in_one_call(build, monkeypatch):
     world = build(ghost())
     robot = world.bodies["ghost"]
     calls = []
@@ -87,7 +87,7 @@ def test_all_joints_are_put_in_one_call_since_each_takes_milliseconds_beside_a_w
     assert len(calls) == 1
 
 
-def test_it_is_where_targets_say_also_beyond_limits_which_is_told_by_joint(build, caplog):
+def test_visual_robot_follows_targets_beyond_limits_and_names_the_joint(build, caplog):
     world = build(ghost())
     world.put("ghost/target", JointCommand([JOINT], [0.7]))
     run(world, 1)

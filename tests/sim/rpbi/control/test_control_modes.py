@@ -51,7 +51,7 @@ def state(world: World, name: str = FIRST) -> tuple[float, float]:
     return robot.drive.measured()[robot.model[name].index]
 
 
-def test_a_velocity_target_moves_a_joint_at_that_velocity_until_it_expires(build):
+def test_velocity_target_moves_a_joint_until_it_expires(build):
     world = build("VELOCITY_CONTROL", target_timeout_s=0.2)
     world.put("iiwa/target", JointCommand([FIRST], velocity=[0.5]))
     run(world, 200)
@@ -61,7 +61,7 @@ def test_a_velocity_target_moves_a_joint_at_that_velocity_until_it_expires(build
     assert state(world)[0] == pytest.approx(0.1, rel=0.05)
 
 
-def test_a_target_that_is_renewed_does_not_expire_and_each_joint_has_its_own_time(build):
+def test_renewed_target_does_not_expire_and_joints_expire_separately(build):
     world = build("VELOCITY_CONTROL", target_timeout_s=0.1)
     world.put("iiwa/target", JointCommand([FIRST, JOINTS[6]], velocity=[0.5, 0.5]))
     for _ in range(5):
@@ -81,7 +81,7 @@ def test_velocity_targets_are_held_to_the_joints_velocity(build):
     assert state(world, JOINTS[6])[1] <= 1.001 * limit
 
 
-def test_a_torque_moves_a_joint_as_its_inertia_says_and_is_held_between_targets(build):
+def test_torque_accelerates_a_joint_by_its_inertia_and_is_held(build):
     world = without_damping(build("TORQUE_CONTROL", gravity=0.0))
     robot = world.bodies["iiwa"]
     mass_matrix = robot.pb.calculateMassMatrix(robot.body_id, [0.0] * 7)
@@ -91,7 +91,7 @@ def test_a_torque_moves_a_joint_as_its_inertia_says_and_is_held_between_targets(
     assert state(world)[1] == pytest.approx(inverse[0, 0] * 0.2 * 0.1, rel=0.05)
 
 
-def test_torque_control_releases_the_motors_and_an_expired_torque_is_none(build):
+def test_torque_control_releases_the_motors_and_torques_expire(build):
     world = build("TORQUE_CONTROL", initial_joint_position=BENT, target_timeout_s=0.05)
     run(world, 300)
     assert abs(state(world, SECOND)[0] - math.radians(30.0)) > 0.05, "an arm without torques falls"
@@ -104,7 +104,7 @@ def test_torque_control_releases_the_motors_and_an_expired_torque_is_none(build)
     assert state(still)[1] == pytest.approx(speed, rel=0.02), "after its time a torque accelerates no more"
 
 
-def test_joint_states_tell_the_torque_that_was_applied_within_the_limit(build):
+def test_joint_states_report_applied_torques_within_limits(build):
     world = build("TORQUE_CONTROL", gravity=0.0, joint_state_publisher_hz=1000.0)
     world.put("iiwa/target", JointCommand([FIRST, SECOND], effort=[1.5, 1e6]))
     (sample,) = world.step()
@@ -122,7 +122,7 @@ def test_gravity_compensation_holds_an_arm_for_a_minute(build):
     assert drift < 0.01
 
 
-def test_gravity_compensation_knows_how_the_base_stands_and_adds_to_targets(build):
+def test_gravity_compensation_respects_base_orientation_and_adds_to_targets(build):
     load = {
         "fileName": "kuka_iiwa/model.urdf",
         "useFixedBase": True,
@@ -171,13 +171,13 @@ def test_a_target_that_was_checked_for_another_mode_is_dropped(build):
         ("TORQUE_CONTROL", JointCommand([FIRST], position=[1.0]), "expected effort.*got position"),
     ],
 )
-def test_a_target_for_another_mode_is_refused_and_tells_what_is_expected(build, mode, target, message):
+def test_target_for_another_mode_is_refused_with_the_expected_quantity(build, mode, target, message):
     world = build(mode)
     with pytest.raises(WrongQuantityError, match=message):
         world.put("iiwa/target", target)
 
 
-def test_gains_may_be_one_for_all_one_for_each_or_by_joint(build):
+def test_gains_may_be_common_per_joint_or_by_name(build):
     weak = build("POSITION_CONTROL", gains={"positionGains": {SECOND: 1e-5}, "velocityGains": [1.0]})
     weak.put("iiwa/target", JointCommand([FIRST, SECOND], [0.5, 0.5]))
     run(weak, 1000)
@@ -211,7 +211,7 @@ def test_joints_that_were_not_put_keep_their_targets(build):
     assert (state(world)[0], state(world, JOINTS[6])[0]) == pytest.approx((0.8, 0.3), abs=1e-3)
 
 
-def test_a_position_beyond_the_limit_goes_to_the_limit_and_is_told_once(build, caplog):
+def test_target_beyond_a_limit_stops_there_and_is_reported_once(build, caplog):
     world = build("POSITION_CONTROL")
     for _ in range(3):
         world.put("iiwa/target", JointCommand([SECOND], [30.0]))
@@ -236,7 +236,7 @@ def test_a_joint_state_that_cannot_be_is_refused(build, target, message):
     assert state(world) == (0.0, 0.0)
 
 
-def test_a_start_beyond_the_limits_is_a_fault_of_the_file(build):
+def test_start_position_beyond_limits_is_a_fault_of_the_file(build):
     with pytest.raises(ConfigError, match=f"initial_joint_position.{SECOND}: joint '{SECOND}' must be within"):
         build("POSITION_CONTROL", initial_joint_position={SECOND: 400.0})
 

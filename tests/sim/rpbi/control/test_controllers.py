@@ -139,7 +139,7 @@ def push(world: World, link: str, force: tuple[float, float, float], ticks: int)
         world.step()
 
 
-def test_the_model_is_that_of_pinocchio_and_of_finite_differences(build):
+def test_robot_model_equals_pinocchio_and_finite_differences(build):
     base = {"basePosition": [0.3, -0.2, 0.1], "baseOrientation": [0.1825742, 0.3651484, 0.5477226, 0.7302967]}
     robot = build(lwr(loadURDF=base)).bodies["lwr"]
     model, where = robot.robot_model, robot.base_pose()
@@ -177,7 +177,7 @@ def test_the_model_is_that_of_pinocchio_and_of_finite_differences(build):
 
 @pytest.mark.parametrize("ratio", [0.1, 0.7, 1.0])
 @pytest.mark.parametrize("stiffness", [50.0, STIFFEST])
-def test_impedance_control_holds_as_springs_do_at_all_stiffnesses_of_the_real_arm(build, stiffness, ratio):
+def test_impedance_control_has_the_requested_stiffness_at_all_values(build, stiffness, ratio):
     robot = lwr(
         setJointMotorControlArray={"controlMode": "IMPEDANCE_CONTROL"},
         impedance={"stiffness": stiffness, "damping_ratio": ratio},
@@ -216,7 +216,7 @@ def test_position_targets_and_motions_drive_the_springs(build):
     assert any(abs(effort) > 1.0 for effort in efforts), "what is applied is told"
 
 
-def test_a_cartesian_spring_gives_way_by_its_stiffness(build):
+def test_cartesian_spring_yields_by_its_stiffness(build):
     world = build(lwr(controllers={"hold": {"type": "cartesian_impedance", "link": TIP, "stiffness": 500.0}}))
     controller = world.bodies["lwr"].controllers.of("hold")
     start = controller._pose().position
@@ -227,7 +227,7 @@ def test_a_cartesian_spring_gives_way_by_its_stiffness(build):
     assert moved == pytest.approx([0.0, 5.0 / 500.0, 0.0], abs=5e-5)
 
 
-def test_a_cartesian_spring_goes_to_its_target_at_the_largest_stiffness(build):
+def test_cartesian_spring_reaches_its_target_at_the_largest_stiffness(build):
     keys = {"stiffness": 5000.0, "rotational_stiffness": 300.0}
     world = build(lwr(controllers={"hold": {"type": "cartesian_impedance", "link": TIP, **keys}}))
     controller = world.bodies["lwr"].controllers.of("hold")
@@ -259,7 +259,7 @@ def over_a_floor(build, friction: float = 0.5, **keys) -> World:
     return build(lwr(loadURDF={"basePosition": [0.0, 0.0, -0.1]}, controllers=controllers), collision=(floor,))
 
 
-def test_a_force_touches_down_softly_and_is_what_was_asked_for(build):
+def test_force_control_touches_softly_and_reaches_the_requested_force(build):
     force = touch(over_a_floor(build, force=5.0), 2500)
     begin = int(np.argmax(force > 0.0))
     assert 500 < begin < 1000, "it comes at 0.05 m/s"
@@ -295,7 +295,7 @@ def test_a_force_stays_while_it_wipes(build):
     ],
     ids=["raises", "not finite", "too few", "tells nonsense", "slow"],
 )
-def test_a_controller_that_fails_is_stopped_and_named_and_the_world_goes_on(build, caplog, controller, told):
+def test_failing_controller_is_stopped_and_named_and_the_world_continues(build, caplog, controller, told):
     aside = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [2.0, 0.0, 0.0]}
     world = build(lwr(controllers={"bad": controller}), iiwa(loadURDF=aside))
     world.put("iiwa/target", JointCommand(["lbr_iiwa_joint_1"], [0.5]))
@@ -313,7 +313,7 @@ def test_a_controller_that_fails_is_stopped_and_named_and_the_world_goes_on(buil
     assert positions(world, "iiwa")[0] == pytest.approx(0.5, abs=1e-3)
 
 
-def test_set_points_move_joints_by_their_motors_and_others_keep_their_targets(build):
+def test_set_points_move_their_joints_and_others_keep_targets(build):
     world = build(lwr(controllers={"turn": wrong("Follows", joints=JOINTS[:1])}))
     world.put("lwr/target", JointCommand(JOINTS[6:], [0.3]))
     start = positions(world)
@@ -357,7 +357,7 @@ def test_one_joint_has_one_controller(build):
         ({}, "joint_impedance, cartesian_impedance, force, or module:Class"),
     ],
 )
-def test_what_is_wrong_with_a_controller_is_told_with_its_key(build, keys, told):
+def test_wrong_controller_options_are_reported_with_their_key(build, keys, told):
     with pytest.raises(ConfigError, match=told):
         build(lwr(controllers={"c": keys}))
 

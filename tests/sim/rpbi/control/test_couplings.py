@@ -42,7 +42,7 @@ def run(world: World, ticks: int) -> None:
         world.step()
 
 
-def test_a_finger_follows_as_the_urdf_says_from_the_start_on(build):
+def test_mimic_finger_follows_the_urdf_from_the_start(build):
     world = build()
     assert positions(world) == [0.03, 0.03]
     world.put("gripper/target", JointCommand(["left"], [0.05]))
@@ -134,7 +134,7 @@ def held(anchor: int, y: float = 0.0) -> tuple[dict, ...]:
 GRIP = JointCommand(["left", "right"], [0.0, 0.0])
 
 
-def test_what_coupled_fingers_hold_by_friction_with_anchors_does_not_drift(build):
+def test_object_held_by_coupled_fingers_with_anchors_does_not_drift(build):
     world = build(held(anchor=1))
     world.put("gripper/target", GRIP)
     run(world, 500)
@@ -185,6 +185,6 @@ def test_a_coupling_that_makes_no_sense_is_refused(build, coupled, message):
     assert message in str(caught.value)
 
 
-def test_a_urdf_that_mimics_what_is_not_there_is_refused(build):
+def test_urdf_that_mimics_an_unknown_joint_is_refused(build):
     with pytest.raises(ConfigError, match="loadURDF.fileName: joint 'right' follows 'thumb', which is none that moves"):
         build(mimic='<mimic joint="thumb"/>')

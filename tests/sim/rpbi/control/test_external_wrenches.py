@@ -47,7 +47,7 @@ def velocity(world):
     return world.bodies["box"].base_twist()
 
 
-def test_a_force_accelerates_for_as_long_as_it_is_to_act(world):
+def test_force_accelerates_for_its_duration(world):
     world.act("box", "push", ExternalWrench((1.0, 2.0, 3.0), duration_s=0.1))
     run(world, 300)
     assert velocity(world).linear == pytest.approx((0.1, 0.2, 0.3), rel=1e-6)
@@ -55,13 +55,13 @@ def test_a_force_accelerates_for_as_long_as_it_is_to_act(world):
 
 
 @pytest.mark.parametrize(("in_link_axes", "expected"), [(False, (0.1, 0.0, 0.0)), (True, (0.0, 0.1, 0.0))])
-def test_its_axes_are_those_of_the_world_or_of_the_link(world, in_link_axes, expected):
+def test_wrench_axes_are_those_of_the_world_or_the_link(world, in_link_axes, expected):
     world.act("box", "push", ExternalWrench((1.0, 0.0, 0.0), in_link_axes=in_link_axes, duration_s=0.1))
     run(world, 200)
     assert velocity(world).linear == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_torque_turns_and_a_force_beside_the_centre_does_both(world):
+def test_torque_turns_a_body_and_eccentric_force_also_moves_it(world):
     world.act("box", "push", ExternalWrench((0.0, 0.0, 0.0), (0.0, 0.0, 0.01), duration_s=0.1))
     run(world, 100)
     assert velocity(world).angular == pytest.approx((0.0, 0.0, 0.001 / INERTIA), rel=1e-4)
@@ -73,7 +73,7 @@ def test_a_torque_turns_and_a_force_beside_the_centre_does_both(world):
     assert velocity(world).linear == pytest.approx((0.01, 0.0, 0.0), rel=1e-3)
 
 
-def test_without_a_duration_it_acts_until_replaced_and_zero_ends_it(world):
+def test_wrench_without_duration_acts_until_replaced_or_zeroed(world):
     world.act("box", "push", ExternalWrench((1.0, 0.0, 0.0)))
     run(world, 1000)
     assert velocity(world).linear[0] == pytest.approx(1.0, rel=1e-6)
@@ -91,14 +91,14 @@ def test_as_an_input_it_acts_from_the_next_tick_on(world):
     assert velocity(world).linear[0] == pytest.approx(0.05, rel=1e-6)
 
 
-def test_the_wrist_feels_what_pushes_the_hand(world):
+def test_wrist_sensor_measures_a_push_on_the_hand(world):
     world.act("iiwa", "push", ExternalWrench((10.0, 0.0, 0.0), (0.0, 0.0, 0.5), HAND, (0.0, 0.0, 0.1), True))
     wrench = run(world, 1000)
     assert wrench.force == pytest.approx((-10.0, 0.0, 0.0), abs=1e-3)
     assert wrench.torque == pytest.approx((0.0, -1.0, -0.5), abs=1e-3)
 
 
-def test_nothing_acts_on_a_body_that_comes_later_or_after_a_reset(world):
+def test_wrench_does_not_act_after_a_reset(world):
     world.act("box", "push", ExternalWrench((1.0, 0.0, 0.0)))
     run(world, 10)
     world.reset()
@@ -129,7 +129,7 @@ def test_a_body_that_sleeps_is_woken(world):
         ("ball", ExternalWrench((1.0, 0.0, 0.0)), "unknown object 'ball'"),
     ],
 )
-def test_what_makes_no_sense_is_refused(world, name, wrench, message):
+def test_invalid_wrenches_are_refused(world, name, wrench, message):
     noted = world.commands.count
     with pytest.raises((InterfaceError, ValueError), match=re.escape(message)):
         world.act(name, "push", wrench)
@@ -138,7 +138,7 @@ def test_what_makes_no_sense_is_refused(world, name, wrench, message):
     assert velocity(world).linear == (0.0, 0.0, 0.0)
 
 
-def test_what_cannot_move_takes_no_wrenches(world):
+def test_immovable_bodies_accept_no_wrenches(world):
     assert "floor/external_wrench" not in world.inputs
     assert {"box/external_wrench", "iiwa/external_wrench"} <= set(world.inputs)
 

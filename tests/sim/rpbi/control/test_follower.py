@@ -86,7 +86,7 @@ def test_follows_a_smooth_trajectory_to_a_hair(tmp_path, mode):
     assert arm.position == pytest.approx(STILL, abs=1e-4)
 
 
-def test_line_arrives_with_a_velocity_and_has_its_goal_time_to_stop(tmp_path):
+def test_line_arrives_with_a_velocity_and_stops_within_goal_time(tmp_path):
     arm = Arm(tmp_path, {"constraints": {"goal_time": 0.2}})
     motion = arm.follow(Point(0.5, STRETCHED), Point(1.0, STILL))
     arm.step(1.2)
@@ -103,7 +103,7 @@ def test_holds_its_goal_when_it_has_ended(arm):
     assert arm.position == pytest.approx(STRETCHED, abs=1e-3)
 
 
-def test_begins_at_its_stamp_and_leaves_out_points_that_are_past(arm):
+def test_trajectory_begins_at_its_stamp_and_skips_past_points(arm):
     arm.follow(Point(0.5, STRETCHED, STILL), start_in_s=0.5)
     arm.step(0.5)
     assert arm.position == pytest.approx(STILL, abs=1e-4)
@@ -185,7 +185,7 @@ def test_cancelling_stops_the_arm_in_the_time_that_is_set(tmp_path, stop_s):
     assert arm.worst(0.3).speed < 5e-3
 
 
-def test_cancelling_what_is_not_followed_any_more_does_nothing(arm):
+def test_cancelling_a_replaced_trajectory_does_nothing(arm):
     first = arm.follow(Point(2.0, STRETCHED, STILL))
     second = arm.follow(Point(0.5, STRETCHED, STILL))
     arm.follower.cancel("late", arm.world.clock, first)
@@ -203,7 +203,7 @@ def test_empty_trajectory_makes_the_arm_hold(arm):
     assert arm.position == pytest.approx(held, abs=3e-3)
 
 
-def test_joints_that_are_left_out_go_on_with_theirs(tmp_path):
+def test_omitted_joints_continue_their_motion(tmp_path):
     arm = Arm(tmp_path, {"allow_partial_joints_goal": True})
     arm.follow(Point(2.0, (0.5, -0.5), (0.0, 0.0)), names=ARM[:2])
     arm.step(0.5)
@@ -233,13 +233,13 @@ def test_only_its_own_joints_are_driven(tmp_path):
     assert motion.result.result().success
 
 
-def test_torque_control_refuses_and_tells_why(tmp_path):
+def test_torque_control_refuses_with_a_reason(tmp_path):
     arm = Arm(tmp_path, robot={"setJointMotorControlArray": {"controlMode": "TORQUE_CONTROL"}})
     with pytest.raises(TrajectoryRefusedError, match="TORQUE_CONTROL"):
         arm.follow(Point(1.0, STRETCHED))
 
 
-def test_world_that_stands_still_keeps_the_trajectory_and_breaks_off_timed_motions(arm):
+def test_paused_world_keeps_the_trajectory_and_aborts_timed_motions(arm):
     motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.5)
     arm.world.pause("the simulation was stopped")
@@ -266,14 +266,14 @@ def test_goal_is_answered_when_robot_or_world_goes(arm, end):
     assert "lbr_iiwa_joint_1=" in result.message
 
 
-def test_timed_motion_takes_over_and_tells_so(arm):
+def test_timed_motion_replaces_the_trajectory_and_reports_it(arm):
     motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.2)
     arm.robot.drive.run(TimedMotion(arm.robot.model, {0: 0.0}, 0.5))
     assert "a newer motion replaced it" in motion.result.result(timeout=0).message
 
 
-def test_feedback_comes_at_its_rate_of_ticks_with_errors_of_one_time(tmp_path):
+def test_feedback_comes_at_its_tick_rate_with_simultaneous_errors(tmp_path):
     arm = Arm(tmp_path, {"action_monitor_rate": 25})
     fed: list[Any] = []
     arm.follow(Point(1.0, STRETCHED, STILL), feedback=fed.append)

@@ -72,7 +72,7 @@ def _speed(world, name):
     return world.bodies[name].base_twist().linear[0]
 
 
-def test_a_hand_carries_what_lies_on_it_and_stops_at_the_last_pose(build):
+def test_moving_hand_carries_a_load_and_stops_at_last_pose(build):
     world = build(LOAD, more=())
     for elapsed in _follow(world, lambda t: Pose((_course(t), 0.0, 0.0)), 2.5):
         assert _x(world, "load") == pytest.approx(_x(world, "hand"), abs=1e-4), f"it slips at {elapsed} s"
@@ -93,7 +93,7 @@ def test_put_anew_at_every_tick_instead_it_carries_nothing(build):
 
 
 @pytest.mark.parametrize("mass_kg", [1.0, 20.0])
-def test_a_hand_pushes_a_box_at_its_own_speed_and_is_not_held_up(build, mass_kg):
+def test_hand_pushes_a_box_at_its_own_speed_without_slowing(build, mass_kg):
     world = build(box("pushed", basePosition=[0.45, 0.0, 0.1], baseMass=mass_kg))
     speeds = []
     for elapsed in _follow(world, lambda t: Pose((_course(t), 0.0, 0.1)), 1.6):
@@ -105,14 +105,14 @@ def test_a_hand_pushes_a_box_at_its_own_speed_and_is_not_held_up(build, mass_kg)
     assert sum(speeds) / len(speeds) == pytest.approx(SPEED, rel=1e-3)
 
 
-def test_what_slips_is_dragged_along_with_the_force_of_friction(build):
+def test_slipping_load_is_dragged_by_the_force_of_friction(build):
     world = build(LOAD, more=(), object_tf={"hz": TICKS_A_SECOND})
     speeds = [_speed(world, "load") for _ in _follow(world, lambda t: Pose((t, 0.0, 0.0)), 0.1, hz=TICKS_A_SECOND)]
     assert speeds[-1] < 0.6 * _speed(world, "hand"), "it does not slip"
     assert (speeds[-1] - speeds[9]) * TICKS_A_SECOND / (len(speeds) - 10) == pytest.approx(MU * GRAVITY, rel=0.02)
 
 
-def test_a_jump_is_put_there_at_rest_and_told_once_and_flings_nothing(build, caplog):
+def test_jump_teleports_the_body_at_rest_and_is_reported_once(build, caplog):
     world = build(LOAD)
     jumps = {0.5: 1.0, 0.7: 1.5}
     fastest = 0.0
@@ -131,7 +131,7 @@ def test_a_jump_is_put_there_at_rest_and_told_once_and_flings_nothing(build, cap
     ]
 
 
-def test_the_first_pose_is_taken_at_once_and_later_ones_wait_for_ticks(build):
+def test_first_pose_applies_immediately_and_later_ones_wait_for_ticks(build):
     world = build(more=())
     for position in (3.0, 3.1):
         world.put("hand/pose", Pose((position, 0.0, 0.0)))
@@ -142,7 +142,7 @@ def test_the_first_pose_is_taken_at_once_and_later_ones_wait_for_ticks(build):
 
 
 @pytest.mark.parametrize("hz", [3, 30, 100])
-def test_it_lags_by_one_and_a_half_periods_and_speeds_up_evenly(build, hz):
+def test_follower_lags_one_and_a_half_periods_and_accelerates_evenly(build, hz):
     world = build(more=(), object_tf={"hz": hz})
     lags, speeds = [], [0.0]
     for elapsed in _follow(world, lambda t: Pose((SPEED * t, 0.0, 0.0)), 2.0 + 6.0 / hz, hz=hz):
@@ -186,7 +186,7 @@ def test_a_path_never_overshoots_nor_exceeds_its_speeds(seed):
 
 
 @pytest.mark.parametrize("dt_s", [0.001, 0.02])
-def test_an_arm_on_a_base_that_moves_and_turns_keeps_to_its_path_and_holds_its_joints(build, dt_s):
+def test_arm_on_a_moving_base_keeps_path_and_joint_positions(build, dt_s):
     arm = iiwa(
         initial_joint_position={"lbr_iiwa_joint_2": 40.0, "lbr_iiwa_joint_4": -60.0},
         object_tf={"tf_id": "carrier", "hz": 1.0 / dt_s, "max_angular_speed": 20.0},
@@ -209,7 +209,7 @@ def test_an_arm_on_a_base_that_moves_and_turns_keeps_to_its_path_and_holds_its_j
     assert body.joint_positions() == pytest.approx(start, abs=2e-3)
 
 
-def test_what_pybullet_gives_no_velocity_is_put_where_tf_says(build):
+def test_body_without_settable_velocity_is_placed_at_its_tf_pose(build):
     plate = {
         "name": "plate",
         "loadURDF": {"fileName": "cube.urdf", "useFixedBase": True, "useMaximalCoordinates": True},
@@ -221,7 +221,7 @@ def test_what_pybullet_gives_no_velocity_is_put_where_tf_says(build):
         assert _x(world, "plate") == pytest.approx(x)
 
 
-def test_a_session_with_streams_of_poses_is_the_same_when_it_is_replayed(build):
+def test_session_with_pose_streams_is_identical_when_replayed(build):
     world = build(LOAD, ball(basePosition=[0.35, 0.0, 0.1]))
     description = world.describe()
     states = []
@@ -235,7 +235,7 @@ def test_a_session_with_streams_of_poses_is_the_same_when_it_is_replayed(build):
     assert (result.difference, result.left_out, result.agreed) == (None, (), len(states) + 1)
 
 
-def test_dynamic_and_urdf_objects_tell_how_they_move_if_asked(build):
+def test_dynamic_and_urdf_objects_report_their_motion_if_requested(build):
     falling = ball(basePosition=[0.0, 0.0, 5.0], base_state_hz=100)
     cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [3.0, 0.0, 5.0]}}
     turning = {"angularVelocity": [0.0, 0.0, 2.0], "linearVelocity": [0.5, 0.0, 0.0]}

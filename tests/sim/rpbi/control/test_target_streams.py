@@ -62,7 +62,7 @@ def follow(world: World, every: int, velocities: bool = False) -> np.ndarray:
     return np.array(states)[300:]
 
 
-def test_a_stream_needs_no_more_effort_than_targets_at_every_tick(build):
+def test_stream_needs_no_more_effort_than_targets_at_every_tick(build):
     ideal = np.abs(follow(build(), 1)[:, 2]).max()
     smooth, hold = (np.abs(follow(build(mode), EVERY)[:, 2]).max() for mode in ("smooth", "hold"))
     assert smooth < 1.3 * ideal
@@ -196,7 +196,7 @@ def stalled(stall_s: float, has_stamps: bool, waits: bool = True) -> list[tuple[
 @pytest.mark.parametrize("waits", [True, False], ids=["come at once", "are lost"])
 @pytest.mark.parametrize("has_stamps", [True, False], ids=["stamps", "no stamps"])
 @pytest.mark.parametrize("stall_s", [0.05, 0.1, 0.18, 0.4, 0.8])
-def test_a_stall_that_is_longer_than_the_buffer_costs_little_effort(build, stall_s, has_stamps, waits):
+def test_stall_longer_than_the_buffer_costs_little_effort(build, stall_s, has_stamps, waits):
     assert lift_effort(build(), stalled(stall_s, has_stamps, waits)) < 1.5 * ideal_lift_effort(build())
 
 
@@ -205,7 +205,7 @@ def test_without_bounds_of_acceleration_a_stall_costs_the_whole_effort(build, mo
     assert lift_effort(build(), stalled(0.1, has_stamps=True)) > 4.0 * ideal_lift_effort(build())
 
 
-def test_a_stream_that_slows_down_for_late_targets_says_so_once(build, caplog):
+def test_stream_slowed_by_late_targets_is_reported_once(build, caplog):
     late = [20, 15, 25]
     targets = [(10 * n + (late[n // 100] if n in (100, 200, 299) else 0), 0.003 * n, 0) for n in range(300)]
     lift_effort(build(), [*targets, (3100, 0.9, 0)])
@@ -236,7 +236,7 @@ def test_targets_beyond_a_limit_go_to_the_limit(build):
     assert arm.drive.measured()[arm.model[FIRST].index][0] == pytest.approx(upper, abs=1e-3)
 
 
-def test_what_comes_between_ends_a_stream(build):
+def test_joint_reset_ends_a_stream_and_other_joints_hold(build):
     """Put elsewhere in the middle of a stream, a joint stays there; others of the stream hold."""
     world = build()
     arm = world.bodies["iiwa"]
@@ -255,7 +255,7 @@ def test_what_comes_between_ends_a_stream(build):
     assert 0.1 < held < 0.14
 
 
-def test_targets_that_come_while_it_stands_still_act_when_it_goes_on(build):
+def test_targets_received_while_paused_act_after_the_pause(build):
     world = build()
     for number in range(500):
         world.put("iiwa/target", JointCommand([FIRST], [0.001 * number], stamp_ns=1 + number * 20_000_000))

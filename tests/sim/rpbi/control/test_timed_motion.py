@@ -84,7 +84,7 @@ def test_the_path_has_minimum_jerk_and_other_joints_stay(build):
     assert all(abs(positions(world)[name]) < 2e-3 for name in JOINTS[1:])
 
 
-def test_a_motion_that_is_asked_to_be_too_fast_takes_the_time_that_the_joints_need(build):
+def test_too_fast_motion_takes_the_time_its_joints_need(build):
     world = build(timeStep=0.001)
     motion = start(world, {JOINTS[0]: 2.0}, 0.1)
     limit = world.bodies["iiwa"].model[JOINTS[0]].max_velocity
@@ -160,7 +160,7 @@ def test_a_newer_motion_replaces_the_older_which_answers(build):
         ("the simulation ended", lambda world: world.close()),
     ],
 )
-def test_what_ends_a_motion_early_is_told_with_the_state_reached(build, what, act):
+def test_interrupted_motion_reports_its_cause_and_the_reached_state(build, what, act):
     world = build()
     motion = start(world, {JOINTS[0]: 1.0}, 2.0)
     for _ in range(100):
@@ -173,7 +173,7 @@ def test_what_ends_a_motion_early_is_told_with_the_state_reached(build, what, ac
 
 
 @pytest.mark.parametrize("goal", [3.0, -1e8])
-def test_a_joint_that_is_to_go_beyond_its_limits_stops_there_which_is_no_success(build, goal):
+def test_motion_beyond_a_limit_stops_there_without_success(build, goal):
     world = build()
     success, message = finish(world, start(world, {JOINTS[0]: 0.5, JOINTS[1]: goal}, 1.0))
     assert not success
@@ -196,7 +196,7 @@ def test_under_torque_control_a_motion_is_refused(build):
         start(build("TORQUE_CONTROL"), {JOINTS[0]: 0.5}, 1.0)
 
 
-def test_under_velocity_control_a_motion_arrives_and_the_robot_then_stands_still(build):
+def test_motion_under_velocity_control_arrives_and_the_robot_then_rests(build):
     world = build("VELOCITY_CONTROL")
     assert finish(world, start(world, {JOINTS[0]: 0.5}, 1.0)).success
     for _ in range(200):
@@ -208,7 +208,7 @@ def test_under_velocity_control_a_motion_arrives_and_the_robot_then_stands_still
     assert world.bodies["iiwa"].drive.measured()[0][1] == pytest.approx(0.2, rel=0.05)
 
 
-def test_targets_of_joints_that_a_motion_drives_are_refused_and_others_obeyed(build):
+def test_targets_of_moving_joints_are_refused_and_others_obeyed(build):
     world = build()
     motion = start(world, {JOINTS[0]: 0.5}, 1.0)
     with pytest.raises(ValueError, match=f"a motion drives {JOINTS[0]}"):
@@ -230,7 +230,7 @@ def test_a_teleport_ends_a_motion(build):
     assert motion.result.result().message.startswith("the robot was put elsewhere")
 
 
-def test_a_goal_that_takes_for_ever_does_not_break_the_world(build, tmp_path):
+def test_very_long_motion_does_not_break_the_world(build, tmp_path):
     urdf = tmp_path / "wheel.urdf"
     urdf.write_text(
         "<robot name='r'><link name='a'/><link name='b'/><joint name='spin' type='continuous'><parent link='a'/>"

@@ -58,7 +58,7 @@ def world(tmp_path_factory):
         ("box/external_wrench", {"force": [1, 2, 3]}, ExternalWrench((1.0, 2.0, 3.0))),
     ],
 )
-def test_an_input_takes_a_mapping_for_what_it_takes(world, slot, plain, named):
+def test_input_accepts_a_mapping_instead_of_a_named_tuple(world, slot, plain, named):
     check = world.inputs[slot].check
     assert check(plain) == check(named)
 
@@ -82,7 +82,7 @@ def test_an_input_takes_a_mapping_for_what_it_takes(world, slot, plain, named):
         ("box/external_wrench", {"force": [1, 2, 3], "link": "lid"}, "unknown link of box 'lid'"),
     ],
 )
-def test_what_is_refused_is_named_and_nothing_waits_for_the_next_tick(world, slot, given, message):
+def test_refused_value_is_named_and_nothing_is_queued(world, slot, given, message):
     world.mailbox.drain()
     with pytest.raises((ValueError, UnknownNameError), match=message):
         world.put(slot, given)
@@ -109,7 +109,7 @@ ACTS = [
 ]
 
 
-def test_actions_with_mappings_do_what_those_with_named_tuples_do(tmp_path):
+def test_actions_with_mappings_equal_those_with_named_tuples(tmp_path):
     hashes = []
     for column in (2, 3):
         world = make_world(tmp_path)

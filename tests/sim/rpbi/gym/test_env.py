@@ -64,7 +64,7 @@ def test_seeds_decide_on_everything(tmp_path):
     again.close()
 
 
-def test_what_varies_is_what_was_asked_for(tmp_path):
+def test_variation_stays_within_the_configured_ranges(tmp_path):
     env = made(tmp_path, randomization=VARIED)
     masses, places, delays = [], [], set()
     for seed in range(20):

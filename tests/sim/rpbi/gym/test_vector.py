@@ -26,7 +26,7 @@ def world_file(tmp_path):
 
 
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.name)
-def test_each_mode_is_that_of_gymnasium(tmp_path, mode):
+def test_each_autoreset_mode_equals_that_of_gymnasium(tmp_path, mode):
     makers = [partial(made, tmp_path, randomization=VARIED)] * COUNT
     gymnasiums = AsyncVectorEnv if mode is AutoresetMode.NEXT_STEP else SyncVectorEnv
     ours, theirs = WorldVectorEnv(makers, 2, mode), gymnasiums(makers, autoreset_mode=mode)

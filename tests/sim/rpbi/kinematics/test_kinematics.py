@@ -128,7 +128,7 @@ def test_reachable_poses_are_reached_within_limits(arm, start):
         _assert_solved(kinematics, link, goal, kinematics.solve(problem))
 
 
-def test_from_near_a_limit_no_joint_goes_to_the_other_one(iiwa_arm):
+def test_joint_near_a_limit_never_jumps_to_the_other(iiwa_arm):
     """On the way to a near solution, joints overshoot their limits; there they stop."""
     generator = np.random.default_rng(7)
     for positions in _random_positions(iiwa_arm, 400):
@@ -155,7 +155,7 @@ def test_without_orientation_only_the_position_counts(iiwa_arm):
         assert solution.orientation_error_rad == 0.0
 
 
-def test_a_small_way_needs_no_large_motion(iiwa_arm):
+def test_short_displacement_needs_no_large_motion(iiwa_arm):
     here = iiwa_arm.forward(ELBOW, "lbr_iiwa_link_7")
     x, y, z = here.position
     solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", (x, y + 0.01, z), here.quat_xyzw, currentPosition=ELBOW))
@@ -184,7 +184,7 @@ def test_a_robot_that_is_there_stays(iiwa_arm):
 
 
 @pytest.mark.parametrize("position", [(1.0, 0.0, 1.0), (0.0, -3.0, 0.2), (1e9, 0.0, 0.0)])
-def test_an_unreachable_target_is_a_failure_with_the_residual_and_the_best_within_limits(iiwa_arm, position):
+def test_unreachable_target_fails_with_residual_and_best_pose_within_limits(iiwa_arm, position):
     solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", position, (0.0, 0.0, 0.0, 1.0), currentPosition=ELBOW))
     assert not solution.success
     _assert_within_limits(iiwa_arm, solution)
@@ -193,14 +193,14 @@ def test_an_unreachable_target_is_a_failure_with_the_residual_and_the_best_withi
     assert f"misses its target by {left * 1e3:.4g} mm and {solution.orientation_error_rad:.3g} rad" in solution.message
 
 
-def test_the_best_of_an_unreachable_target_is_the_arm_stretched_towards_it(iiwa_arm):
+def test_best_pose_for_an_unreachable_target_is_the_stretched_arm(iiwa_arm):
     reach = 0.42 + 0.40 + 0.081  # shoulder to link 7, which starts 0.36 m above the base
     solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", (reach + 0.5, 0.0, 0.36), currentPosition=ELBOW))
     assert solution.position_error_m == pytest.approx(0.5, abs=0.01)
     assert "0.01 rad" not in solution.message, "no orientation was asked for"
 
 
-def test_a_target_that_moves_on_out_of_reach_does_not_throw_the_arm_about(iiwa_arm):
+def test_target_that_moves_out_of_reach_causes_no_large_motion(iiwa_arm):
     link, q = "lbr_iiwa_link_7", np.array(ELBOW)
     (x, y, z), quat = iiwa_arm.forward(ELBOW, link)
     missed_m = []
@@ -213,7 +213,7 @@ def test_a_target_that_moves_on_out_of_reach_does_not_throw_the_arm_about(iiwa_a
     assert missed_m[-1] < 0.8
 
 
-def test_no_posture_nearby_is_nearer_to_a_target_out_of_reach(iiwa_arm):
+def test_no_nearby_posture_is_closer_to_an_unreachable_target(iiwa_arm):
     link, generator = "lbr_iiwa_link_7", np.random.default_rng(3)
 
     def off(q: np.ndarray) -> float:
@@ -231,7 +231,7 @@ def test_no_posture_nearby_is_nearer_to_a_target_out_of_reach(iiwa_arm):
             assert off(other) > 0.999 * least
 
 
-def test_the_same_problem_has_the_same_answer_whatever_was_solved_before(iiwa_arm):
+def test_solution_is_independent_of_previous_problems(iiwa_arm):
     goal = iiwa_arm.forward(_random_positions(iiwa_arm, 3)[2], "lbr_iiwa_link_7")
     problem = IKProblem("lbr_iiwa_link_7", *goal, currentPosition=ELBOW)
     first = iiwa_arm.solve(problem)
@@ -243,7 +243,7 @@ def test_the_same_problem_has_the_same_answer_whatever_was_solved_before(iiwa_ar
     fresh.close()
 
 
-def test_a_rest_posture_is_kept_as_near_as_the_target_allows(iiwa_arm):
+def test_rest_posture_is_kept_as_closely_as_the_target_allows(iiwa_arm):
     """An iiwa has one joint to spare: among its solutions, the elbow goes where the posture has it."""
     link, n = "lbr_iiwa_link_7", 7
     for goal in [iiwa_arm.forward(positions, link) for positions in _random_positions(iiwa_arm, 10)]:
@@ -306,7 +306,7 @@ def test_a_smaller_threshold_leaves_a_smaller_residual(iiwa_arm):
     assert max(fine) <= 1e-5 < max(coarse) <= 1e-3
 
 
-def test_a_threshold_that_cannot_be_met_does_not_lead_away_from_the_near_solution(iiwa_arm):
+def test_unattainable_threshold_does_not_lead_away_from_the_near_solution(iiwa_arm):
     link = "lbr_iiwa_link_7"
     for positions in _random_positions(iiwa_arm, 10):
         near = iiwa_arm.limits.wrap_to_limits(positions + 0.05, positions)[0]
@@ -347,18 +347,18 @@ def test_a_link_that_no_joint_moves_is_where_it_is(slider):
     assert (solution.positions, solution.chain) == ((0.1, 0.2, 0.3), ())
 
 
-def test_a_link_on_a_ball_joint_is_refused_and_the_joint_named(slider):
+def test_link_on_a_ball_joint_is_refused_and_named(slider):
     with pytest.raises(ValueError, match="link_name: 'bob' hangs on 'ball', a spherical joint; only revolute"):
         slider.solve(IKProblem("bob", (0.2, 0.3, 0.2)))
 
 
-def test_the_root_link_is_refused_as_what_it_is(slider):
+def test_root_link_is_refused_with_a_reason(slider):
     with pytest.raises(ValueError, match="link_name: 'rail' is the root link, which no joint moves"):
         slider.solve(IKProblem("rail", (0.2, 0.3, 0.2)))
 
 
 @pytest.mark.parametrize("link", ["pne", ""])
-def test_a_link_that_is_unknown_is_named_with_the_known_ones(slider, link):
+def test_unknown_link_is_reported_with_known_ones(slider, link):
     with pytest.raises(UnknownNameError, match=f"unknown link '{link}': known are carriage, disc, pen, bob, cover"):
         slider.solve(IKProblem(link, (0.2, 0.3, 0.2)))
 
@@ -370,7 +370,7 @@ def test_lists_of_the_wrong_length_are_refused_by_name(slider):
         slider.forward([0.0, math.nan, 0.0], "pen")
 
 
-def test_descriptions_with_text_around_them_load_and_broken_ones_are_named(tmp_path):
+def test_urdfs_with_surrounding_text_load_and_broken_ones_are_named(tmp_path):
     """PyBullet's own humanoid ends with a zero byte, and others have a comment before the XML declaration."""
     path = tmp_path / "around.urdf"
     path.write_text(f"\n<!-- a comment -->\n<?xml version='1.0'?>\n{SLIDER}\n\0")

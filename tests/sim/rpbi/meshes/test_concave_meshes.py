@@ -65,7 +65,7 @@ def height_in_cup_m(world):
     return heights["ball"] - RADIUS_M - heights["cup"]
 
 
-def test_a_ball_falls_into_a_cup_of_convex_parts_and_rests_on_its_hull_without(build, cache):
+def test_ball_enters_a_decomposed_cup_but_rests_on_a_hull(build, cache):
     parts = build(convexDecomposition=True)
     (kept,) = cache.glob("convex-*")
     assert [path.name for path in kept.iterdir()] == ["parts.obj"]
@@ -103,7 +103,7 @@ def test_volumes_are_those_of_closed_surfaces_only(tmp_path):
         ),
     ],
 )
-def test_what_cannot_be_divided_is_refused(build, changed, message):
+def test_invalid_decompositions_are_refused(build, changed, message):
     with pytest.raises(ConfigError) as refused:
         build(**changed)
     assert message in str(refused.value)
@@ -116,7 +116,7 @@ print(convex_parts(sys.argv[1], {"resolution": 10000}))
 """
 
 
-def test_without_a_cache_the_parts_last_as_long_as_the_process(tmp_path):
+def test_convex_parts_without_a_cache_are_removed_with_their_process(tmp_path):
     (tmp_path / "file").touch()
     command = [sys.executable, "-c", DIVIDES, write_cup(tmp_path / "cup.obj")]
     done = subprocess.run(

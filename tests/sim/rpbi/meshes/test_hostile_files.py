@@ -152,7 +152,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("case", FAULTS)
-def test_what_is_wrong_with_a_urdf_is_named(tmp_path, case):
+def test_faults_of_a_urdf_are_named(tmp_path, case):
     text, told = FAULTS[case]
     path = tmp_path / "robot.urdf"
     path.write_text(text)
@@ -161,7 +161,7 @@ def test_what_is_wrong_with_a_urdf_is_named(tmp_path, case):
     assert all(problem.startswith(str(path)) and len(problem) < 1000 for problem in problems)
 
 
-def test_a_urdf_of_which_nothing_is_wrong_is_left_alone(tmp_path):
+def test_valid_urdf_has_no_problems(tmp_path):
     path = tmp_path / "robot.urdf"
     weighed = MASSES.format("a", "1e0 ").replace("</inertial>", '<inertia ixx="1" iyy="1" izz="1"/></inertial>')
     path.write_text(_urdf(weighed, LINK.format("b"), JOINT.format("a", "fixed", "a", "b")))
@@ -186,7 +186,7 @@ class LoadsByItself(UrdfObject):
 
 
 @pytest.mark.parametrize("kind", ["urdf", f"{__name__}:LoadsByItself"])
-def test_whoever_loads_a_urdf_it_is_looked_at_before(tmp_path, kind):
+def test_urdf_of_every_kind_of_body_is_checked_before_loading(tmp_path, kind):
     path = tmp_path / "robot.urdf"
     path.write_text(FAULTS["two parents"][0])
     with (
@@ -212,7 +212,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_mesh_that_pybullet_does_not_stand_is_refused_and_named(tmp_path, case):
+def test_mesh_that_would_crash_pybullet_is_refused_and_named(tmp_path, case):
     key, name, text, told = BROKEN[case]
     (tmp_path / name).write_text(text)
     thing = {**ball(), key: {"shapeType": "GEOM_MESH", "fileName": name}}

@@ -54,7 +54,7 @@ READERS = {
 }
 
 
-def test_what_goes_wrong_is_seen(tmp_path, monkeypatch):
+def test_trials_detect_planted_failures(tmp_path, monkeypatch):
     cases = [*READERS.values()]
 
     def made(kind, seed, folder):

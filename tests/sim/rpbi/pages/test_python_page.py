@@ -38,7 +38,7 @@ def numbers(text: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
 
 
-def test_a_world_tells_what_is_in_it(page):
+def test_world_lists_its_bodies(page):
     assert page[0].splitlines()[-2:] == ["['work_area', 'floor', 'box', 'kuka_lwr']", "0 0.0 0.001"]
 
 
@@ -110,7 +110,7 @@ def test_the_page_on_speed_times_a_tick(tmp_path):
     assert re.search(r"^\d+ us a tick of 1000 us$", run(block, tmp_path).stdout, re.MULTILINE)
 
 
-def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
+def test_page_on_many_worlds_shows_true_output(tmp_path):
     found = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
     elsewhere = ("rospy", "belt.world")  # in test_predict_service.py and test_foreign_states.py
     blocks = [block for block in found if not any(word in block for word in elsewhere)]
@@ -122,7 +122,7 @@ def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
     assert len({*lines[1:3]}) == 2, "the forks go different ways"
 
 
-def test_the_page_on_environments_shows_what_it_says(tmp_path):
+def test_page_on_environments_shows_true_output(tmp_path):
     blocks = BLOCK.findall((ROOT / "docs/gym.md").read_text())
     assert len(blocks) == 7
     result = run("\nprint('-----')\n".join(blocks), tmp_path)
@@ -135,6 +135,6 @@ def test_the_page_on_environments_shows_what_it_says(tmp_path):
     assert (vector, mode) == ("(4, 3) (4,)\n", "AutoresetMode.SAME_STEP\n")
 
 
-def test_the_random_variation_of_the_page_is_that_of_the_example():
+def test_random_variation_on_the_page_equals_that_of_the_example():
     (block,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/gym.md").read_text(), re.DOTALL)
     assert yaml.safe_load(block) == yaml.safe_load(VARIATION.read_text())

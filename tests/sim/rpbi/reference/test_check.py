@@ -39,7 +39,7 @@ def package(folder: Path, name: str, floor: str) -> None:
     (configs / "world.yaml").write_text("collision_objects: ['{rpbi_examples}/configs/floor.yaml']")
 
 
-def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
+def test_warnings_differ_from_errors_and_only_errors_fail(tmp_path):
     sunk = box(basePosition=[0.0, 0.0, 0.05])
     write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=(sunk,))
     code, lines, told = check("world.yaml", tmp_path)
@@ -58,7 +58,7 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     ]
 
 
-def test_meshes_that_are_missing_are_told_together_with_all_else(tmp_path):
+def test_missing_meshes_are_reported_with_all_other_problems(tmp_path):
     mesh = "<visual><geometry><mesh filename='none.stl'/></geometry></visual>"
     (tmp_path / "cup.urdf").write_text(f"<robot name='cup'><link name='cup'>{mesh}</link></robot>")
     cup = {"loadURDF": {"fileName": "cup.urdf"}}
@@ -84,7 +84,7 @@ def test_the_world_of_the_docs_is_fine(tmp_path):
     assert [line.split()[:2] for line in lines[1:4]] == [["collision", "floor"], ["dynamic", "box"], ["robot", "arm,"]]
 
 
-def test_a_workspace_that_the_user_has_sourced_counts_and_its_examples_come_first(tmp_path):
+def test_packages_of_a_sourced_workspace_are_found_before_the_examples(tmp_path):
     package(tmp_path, "their_lab", "their_floor")
     code, lines, _ = check("{their_lab}/configs/world.yaml", tmp_path, ROS_PACKAGE_PATH=str(tmp_path))
     assert code == 0 and lines[1].split() == ["collision", "floor"], "that of our examples"
@@ -95,7 +95,7 @@ def test_a_workspace_that_the_user_has_sourced_counts_and_its_examples_come_firs
     assert code == 1 and "unknown ROS package 'their_lab'" in told[0]
 
 
-def test_classes_of_a_workspace_that_the_user_has_sourced_are_found(tmp_path):
+def test_classes_of_a_sourced_workspace_are_found(tmp_path):
     """Only those: other folders in PYTHONPATH may hold packages for other Pythons."""
     modules = tmp_path / "devel" / "lib" / "python3" / "dist-packages"
     modules.mkdir(parents=True)

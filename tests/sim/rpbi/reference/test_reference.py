@@ -40,7 +40,7 @@ def test_schemas_and_pages_are_fresh() -> None:
     assert left_over == [], "nothing writes these any more"
 
 
-def test_reference_world_has_a_body_of_each_type_and_names_it_after_the_type(world: World) -> None:
+def test_reference_world_has_a_body_named_after_each_type(world: World) -> None:
     assert {name: type(body) for name, body in world.bodies.items()} == dict(BODY_TYPES)
 
 
@@ -53,7 +53,7 @@ def test_all_that_the_page_lists_is_explained(world: World) -> None:
 
 
 @pytest.mark.parametrize("name", ["joint_trajectory_controller", "joint_states"])
-def test_a_controller_that_is_named_like_a_topic_of_its_robot_is_refused(tmp_path: Path, name: str) -> None:
+def test_controller_named_like_a_topic_of_its_robot_is_refused(tmp_path: Path, name: str) -> None:
     controllers = {name: {"type": "joint_impedance", "active": False}}
     robot = iiwa(joint_trajectory_controller={}, controllers=controllers)
     world = World.from_file(write_world(tmp_path, robots=(robot,)), connection_mode=pybullet.DIRECT)

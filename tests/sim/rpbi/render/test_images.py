@@ -46,7 +46,7 @@ def test_images_are_those_of_the_renderer_process(world, images, tmp_path):
     assert len(np.unique(frame.segmentation)) == 3, "floor, box, and nothing"
 
 
-def test_they_show_what_is_there_now(world, images):
+def test_images_show_the_current_world(world, images):
     world.put("eye/pose", looking_at(EYE, TARGET))
     first = world.bodies["box"].body_id
     assert (images.frame().segmentation == first).any()
@@ -61,7 +61,7 @@ def test_they_show_what_is_there_now(world, images):
     assert np.array_equal(images.frame().depth, before.depth), "a box is where it was, and the camera too"
 
 
-def test_a_camera_without_a_pose_and_one_that_is_not_there_are_named(images):
+def test_unknown_camera_and_camera_without_pose_are_named(images):
     with pytest.raises(ValueError, match="where is 'eye'\\? Put its pose into 'eye/pose'"):
         images.frame()
     with pytest.raises(UnknownNameError, match="unknown camera 'eyes'.*did you mean 'eye'?"):
@@ -76,7 +76,7 @@ def test_a_camera_that_came_later_has_its_own_size(world, images):
 
 
 @pytest.mark.parametrize("position", [EYE, (-1.0, 0.5, 0.1), (0.1, 0.2, 3.0), (0.1, 0.2, -3.0)])
-def test_looking_at_has_the_target_in_the_middle_and_the_horizon_level(position):
+def test_looking_at_centres_the_target_and_levels_the_horizon(position):
     K = Camera.of(RgbdSensorConfig.parse(CAMERA, "eye")).intrinsics.K
     pose = looking_at(position, TARGET)
     (u, v, depth), *beside = project([TARGET, np.add(TARGET, (0.0, 0.0, 0.1))], pose, K)

@@ -114,7 +114,7 @@ def box_mask(pose: Pose) -> np.ndarray:
 @pytest.mark.parametrize(
     "pose", [in_front(1.5, -0.2, 0.1, (0.4, 0.9, -0.3)), in_front(1.0, 0.1, -0.05, (-1.0, 0.3, 0.8))]
 )
-def test_box_covers_the_pixels_that_K_says_to_a_fraction_of_a_pixel(rendering, pose):
+def test_box_covers_the_pixels_predicted_by_the_camera_matrix(rendering, pose):
     clear_view(rendering.world)
     red = rendering.world.bodies["red"]
     red.set_base_pose(pose)
@@ -126,7 +126,7 @@ def test_box_covers_the_pixels_that_K_says_to_a_fraction_of_a_pixel(rendering, p
 
 
 @pytest.mark.parametrize("euler", [(0.4, 0.9, -0.3), (-1.0, 0.3, 0.8)])
-def test_depth_back_projected_with_K_lies_on_the_surface_of_the_box(rendering, euler):
+def test_back_projected_depth_lies_on_the_surface_of_the_box(rendering, euler):
     clear_view(rendering.world)
     pose = in_front(1.3, 0.1, -0.1, euler)
     red = rendering.world.bodies["red"]
@@ -140,7 +140,7 @@ def test_depth_back_projected_with_K_lies_on_the_surface_of_the_box(rendering, e
 
 
 @pytest.mark.parametrize("distance_m", [0.2, 1.0, 2.0, 3.0])
-def test_depth_of_a_wall_is_right_to_a_millimetre_though_the_near_plane_is_at_a_centimetre(rendering, distance_m):
+def test_depth_of_a_wall_is_exact_to_a_millimetre(rendering, distance_m):
     clear_view(rendering.world)
     rendering.world.bodies["wall"].set_base_pose(in_front(distance_m + 0.1))
     depth = rendering.look(EYE)["depth"]
@@ -152,7 +152,7 @@ def rays():
     return back_project(np.ones((INTRINSICS.height_px, INTRINSICS.width_px)), INTRINSICS.K)
 
 
-def test_depth_of_a_ball_is_right_to_two_millimetres_at_a_metre(rendering):
+def test_depth_of_a_ball_is_exact_to_two_millimetres(rendering):
     clear_view(rendering.world)
     ball = rendering.world.bodies["ball"]
     centre = np.array([0.1, -0.05, 1.0 + BALL_RADIUS_M])
@@ -183,7 +183,7 @@ def test_depth_of_a_slanted_plane_is_right_to_two_millimetres(rendering):
     assert np.abs(frame["depth"] - expected_m)[near].max() < 2e-3
 
 
-def test_mesh_whose_corners_stand_in_the_yaml_is_drawn(rendering):
+def test_mesh_with_corners_in_the_yaml_is_drawn(rendering):
     clear_view(rendering.world)
     triangle = rendering.world.bodies["triangle"]
     triangle.set_base_pose(in_front(1.0))
@@ -195,7 +195,7 @@ def test_mesh_whose_corners_stand_in_the_yaml_is_drawn(rendering):
     assert blue > 2 * red
 
 
-def test_glass_tints_what_is_behind_it_and_is_what_depth_and_segmentation_tell(rendering):
+def test_glass_tints_the_background_and_determines_depth_and_segmentation(rendering):
     clear_view(rendering.world)
     bodies = rendering.world.bodies
     bodies["wall"].set_base_pose(in_front(2.1))
@@ -223,7 +223,7 @@ def test_of_several_panes_the_nearest_is_in_depth_and_segmentation(rendering):
         assert frame["depth"][120, 160] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_what_has_no_opacity_is_in_no_image(rendering):
+def test_transparent_body_is_in_no_image(rendering):
     clear_view(rendering.world)
     bodies = rendering.world.bodies
     bodies["wall"].set_base_pose(in_front(2.1))
@@ -252,14 +252,14 @@ def test_glass_is_drawn_the_same_after_bodies_came_and_went(rendering):
     assert np.array_equal(before["colour"], after["colour"]) and np.array_equal(before["depth"], after["depth"])
 
 
-def test_pixels_that_see_nothing_tell_the_far_plane_and_no_body(rendering):
+def test_empty_pixels_have_far_plane_depth_and_no_body(rendering):
     clear_view(rendering.world)
     frame = rendering.look(EYE)
     assert frame["depth"] == pytest.approx(INTRINSICS.far_m, rel=1e-4)
     assert np.all(frame["segmentation"] == -1)
 
 
-def test_colour_is_that_of_the_body_in_view(rendering):
+def test_colour_is_that_of_the_visible_body(rendering):
     clear_view(rendering.world)
     rendering.world.bodies["red"].set_base_pose(in_front(1.0, -0.3))
     rendering.world.bodies["blue"].set_base_pose(in_front(1.0, 0.3))
@@ -285,7 +285,7 @@ def test_robot_is_shown_at_its_joint_positions(rendering):
     assert np.array_equal(silhouette(0.0), straight)
 
 
-def test_segmentation_tells_the_simulators_ids_after_bodies_came_and_went(rendering):
+def test_segmentation_has_the_simulators_ids_after_bodies_were_replaced(rendering):
     world = rendering.world
     red_config = next(entry.arguments for entry in world.log if entry.name == "red" and entry.what == "add")
     world.remove("red")
@@ -314,7 +314,7 @@ def quick(tmp_path_factory):
     rendering.close()
 
 
-def test_only_what_is_asked_for_is_drawn(quick):
+def test_only_requested_images_are_drawn(quick):
     quick.demand("depth")
     assert set(quick.look(EYE).files) == {"stamp_ns", "depth"}
     quick.demand("info", seen=2)
@@ -322,7 +322,7 @@ def test_only_what_is_asked_for_is_drawn(quick):
     assert set(quick.look(EYE).files) == {"stamp_ns"}
 
 
-def test_nobody_looking_is_known_to_the_simulator(quick):
+def test_simulator_knows_when_a_camera_has_no_viewer(quick):
     quick.demand("depth")
     assert quick.client.wanted == {"eye"}
     quick.demand()
@@ -336,7 +336,7 @@ def test_frame_carries_the_stamp_of_its_tick(quick):
     assert quick.frame(sample.tick)["stamp_ns"] == sample.stamp_ns
 
 
-def test_scenes_that_come_too_fast_replace_each_other_and_the_last_is_shown(quick):
+def test_fast_scenes_are_replaced_and_the_last_one_is_shown(quick):
     quick.demand("depth")
     samples = [quick.sample(EYE) for _ in range(20)]
     for sample in samples:
@@ -346,7 +346,7 @@ def test_scenes_that_come_too_fast_replace_each_other_and_the_last_is_shown(quic
     assert shown == [samples[0].tick, samples[-1].tick]
 
 
-def test_renderer_that_stands_still_neither_blocks_the_simulator_nor_fills_its_memory(quick):
+def test_frozen_renderer_neither_blocks_the_simulator_nor_fills_its_memory(quick):
     quick.demand("depth")
     os.kill(quick.client.process_id, signal.SIGSTOP)
     try:
@@ -382,7 +382,7 @@ def test_renderer_yields_to_the_simulator_but_not_to_everybody(tmp_path):
         rendering.close()
 
 
-def test_stopped_renderer_is_reported_though_nobody_looks(quick, monkeypatch, caplog):
+def test_frozen_renderer_is_reported_even_without_viewers(quick, monkeypatch, caplog):
     monkeypatch.setattr("rpbi.render.client.SILENT_AFTER_S", 0.0)  # the test stops it, not a busy machine
     process_id = quick.client.process_id
     os.kill(process_id, signal.SIGSTOP)
@@ -398,7 +398,7 @@ def test_stopped_renderer_is_reported_though_nobody_looks(quick, monkeypatch, ca
     assert said[-1] == "camera: the renderer answers again"
 
 
-def test_viewer_that_comes_while_the_world_stands_still_gets_the_last_scene_once(quick):
+def test_late_viewer_of_a_paused_world_gets_the_last_scene(quick):
     quick.demand("depth", seen=10)
     sample = quick.sample(EYE)
     quick.client.send(sample)
@@ -417,7 +417,7 @@ def test_viewer_that_comes_while_the_world_stands_still_gets_the_last_scene_once
     assert not path.exists()
 
 
-def test_killed_renderer_comes_back_by_itself_and_shows_the_world_as_it_is_now(quick, caplog):
+def test_killed_renderer_restarts_and_shows_the_current_world(quick, caplog):
     world = quick.world
     world.remove("blue")
     quick.demand("segmentation")
@@ -471,7 +471,7 @@ def test_two_cameras_each_have_their_own_size_and_view(tmp_path):
         rendering.close()
 
 
-def test_camera_that_comes_later_and_is_larger_is_drawn_whole_and_goes_again(quick):
+def test_larger_camera_added_later_is_drawn_whole_and_removable(quick):
     world = quick.world
     clear_view(world)
     red = world.bodies["red"]
@@ -494,7 +494,7 @@ def test_camera_that_comes_later_and_is_larger_is_drawn_whole_and_goes_again(qui
     assert quick.client.process_id == process_id
 
 
-def test_synchronous_camera_tells_when_its_frame_is_out(tmp_path):
+def test_synchronous_camera_reports_when_its_frame_is_published(tmp_path):
     rendering = Rendering(tmp_path, make_world(tmp_path), cameras=(CAMERA._replace(synchronous=True),))
     try:
         rendering.demand("depth")
@@ -508,7 +508,7 @@ def test_synchronous_camera_tells_when_its_frame_is_out(tmp_path):
         rendering.close()
 
 
-def test_first_image_of_a_renderer_is_the_same_as_those_after_it(tmp_path):
+def test_first_image_of_a_renderer_equals_the_following_ones(tmp_path):
     """Viewers that come late get the last scene drawn again, which has to be what the others have seen."""
     world = World.from_file(
         worlds.write_world(tmp_path, collision=(worlds.FLOOR,), dynamic=(worlds.box(basePosition=[0.0, 0.0, 0.1]),))
@@ -523,7 +523,7 @@ def test_first_image_of_a_renderer_is_the_same_as_those_after_it(tmp_path):
     assert np.array_equal(first, second)
 
 
-def test_noise_of_a_camera_is_in_its_depth_and_the_same_in_another_process(tmp_path):
+def test_camera_noise_changes_depth_identically_in_another_process(tmp_path):
     noise = DepthNoise(0.01, 0.0, 5)
     images = []
     for folder in (tmp_path / "one", tmp_path / "other"):

@@ -56,7 +56,7 @@ def test_the_sessions_have_every_kind_of_command(sessions):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_session_with_contacts_is_the_same_in_a_new_process(seed, sessions):
+def test_session_with_contacts_is_identical_in_a_new_process(seed, sessions):
     recorded = sessions[seed]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command, text = [sys.executable, script.__file__], json.dumps(recorded)
@@ -90,7 +90,7 @@ def test_a_command_that_is_changed_a_little_is_found(session):
     assert agreed.tick <= command.tick < differing.tick == agreed.tick + 500
 
 
-def test_a_recording_that_lacks_a_command_says_so_and_goes_no_further(session):
+def test_recording_without_a_command_reports_it_and_stops_there(session):
     lost = next(index for index, command in session["commands"] if command.tick > 1000)
     commands = [(index, command) for index, command in session["commands"] if index != lost]
     result = Replay(script.read({**session, "commands": commands})).run()
@@ -109,7 +109,7 @@ def test_a_recording_that_lacks_a_command_says_so_and_goes_no_further(session):
         {"data": "{{"},
     ],
 )
-def test_a_command_that_makes_no_sense_ends_the_replay_with_its_tick(session, senseless):
+def test_invalid_command_ends_the_replay_with_its_tick(session, senseless):
     index, command = session["commands"][0]
     commands = {**dict(session["commands"]), index: command._replace(**senseless)}
     result = Replay(script.read({**session, "commands": list(commands.items())})).run()
@@ -117,7 +117,7 @@ def test_a_command_that_makes_no_sense_ends_the_replay_with_its_tick(session, se
     assert f"from tick {command.tick} on" in result.left_out[0]
 
 
-def test_a_reset_is_a_new_start_and_can_be_replayed_alone(folder):
+def test_session_after_a_reset_can_be_replayed_alone(folder):
     world = script.build(folder)
     description = world.describe()
     script.run(world, 5, 200)
@@ -153,7 +153,7 @@ def test_a_world_whose_file_has_gone_is_refused(folder, session):
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 99}'])
-def test_what_is_no_description_is_refused(text):
+def test_invalid_description_is_refused(text):
     with pytest.raises(ValueError, match="description"):
         WorldDescription(text)
 
@@ -188,7 +188,7 @@ def test_the_configuration_of_every_example_reads_back_as_it_was(path):
         assert again.model_fields_set == config.model_fields_set
 
 
-def test_what_cannot_be_recorded_says_so():
+def test_values_that_cannot_be_recorded_are_refused():
     with pytest.raises(TypeError, match="object"):
         to_text((1, object()))
 
@@ -203,7 +203,7 @@ def test_a_recording_can_have_nothing_called_but_values(text):
 
 
 @pytest.mark.parametrize("how", ["relative", "full", "package"])
-def test_an_object_file_that_has_changed_is_warned_of_however_it_is_named(how, tmp_path, monkeypatch):
+def test_changed_object_file_is_reported_for_every_form_of_name(how, tmp_path, monkeypatch):
     folder = tmp_path / "my_lab"
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>my_lab</name></package>")

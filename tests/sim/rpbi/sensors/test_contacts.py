@@ -68,7 +68,7 @@ def test_a_contact_names_both_ends_and_points_towards_the_body(build):
     assert latest["box"].force == pytest.approx(tuple(-each for each in latest["floor"].force), abs=1e-9)
 
 
-def test_links_are_told_by_name(build):
+def test_contacts_name_the_links(build):
     world = build(
         ball("ball", 0.1, basePosition=[0.0, 0.0, 1.45], contacts=TOLD),
         robots=(iiwa(contacts=TOLD),),
@@ -117,7 +117,7 @@ def test_a_box_slides_iff_the_slope_exceeds_friction(build, friction, beyond_rad
         assert speed == pytest.approx(after_1_s, rel=0.1)
 
 
-def test_forces_on_a_sliding_box_account_for_what_it_loses_in_speed(build):
+def test_forces_on_a_sliding_box_explain_its_deceleration(build):
     world = build(
         resting_box(
             half_extents_m=(0.2, 0.2, 0.05),
@@ -137,7 +137,7 @@ def test_forces_on_a_sliding_box_account_for_what_it_loses_in_speed(build):
     assert mean[0] < -4.0
 
 
-def test_what_is_near_but_does_not_touch_is_no_contact(build):
+def test_near_body_without_touch_is_no_contact(build):
     world = build(resting_box(height_m=0.11))
     assert run(world, 10)["box"].points == ()
 
@@ -153,7 +153,7 @@ def test_pybullet_is_asked_once_a_tick_for_all(build, monkeypatch):
 
 
 @pytest.mark.parametrize("field", range(5, 14))
-def test_what_is_not_finite_is_refused_by_name_and_tick_and_only_where_it_is(build, monkeypatch, field):
+def test_non_finite_contacts_are_refused_with_name_and_tick(build, monkeypatch, field):
     world = build(resting_box("a"), resting_box("b", 0.3), floor={**FLOOR, "contacts": TOLD})
     run(world, 10)
     original = world.pb.getContactPoints
@@ -182,7 +182,7 @@ def test_arrows_are_the_forces_to_scale(build):
     assert sum(heights) == pytest.approx(0.02 * MASS_KG * GRAVITY, rel=0.01)
 
 
-def test_contacts_of_what_was_removed_are_gone_before_the_next_tick(build):
+def test_contacts_of_a_removed_body_disappear_at_once(build):
     world = build(resting_box("lower"), resting_box("upper", 0.3))
     run(world, 500)
     world.remove("upper")
@@ -197,7 +197,7 @@ def test_contacts_come_back_after_a_reset(build):
     assert run(world, 300)["box"] == first
 
 
-def test_without_the_key_there_are_none_and_a_visual_robot_has_none(build):
+def test_contacts_are_off_by_default_and_refused_for_visual_robots(build):
     assert run(build(box(basePosition=[0.0, 0.0, 0.1])), 10) == {}
     robot = {"name": "ghost", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}, "is_visual_robot": True}
     with pytest.raises(ConfigError, match="contacts: a visual robot touches nothing"):
@@ -212,7 +212,7 @@ def _sliding(told, hz):
     return boxes
 
 
-def test_means_add_up_to_all_that_was_felt_between_two_samples(build):
+def test_mean_contacts_contain_all_forces_between_two_samples(build):
     ticks, periods = 10, 20
     each, mean = build(*_sliding({}, 1000)), build(*_sliding({"average": True}, 100))
     for _ in range(periods):
@@ -234,7 +234,7 @@ def test_means_add_up_to_all_that_was_felt_between_two_samples(build):
     assert each.state_hash() == mean.state_hash()
 
 
-def test_means_lose_no_impact_between_two_samples_and_the_last_tick_does(build):
+def test_mean_contacts_include_impacts_that_the_last_tick_misses(build):
     lost = {}
     for average in (False, True):
         dropped = resting_box("box", 0.2, contacts={"hz": 10, "average": average})
@@ -246,7 +246,7 @@ def test_means_lose_no_impact_between_two_samples_and_the_last_tick_does(build):
     assert abs(lost[False]) > 1.0
 
 
-def test_means_are_those_of_ticks_that_somebody_wants_and_stay_while_the_world_stands(build):
+def test_mean_contacts_cover_only_wanted_ticks_and_persist_when_paused(build):
     world = build(resting_box(contacts={"hz": 10, "average": True}))
     (sensor, _) = world.sensors_of("box")
     assert sensor.read(0).points == ()

@@ -83,7 +83,7 @@ def assert_within_one_percent(found, expected, what=""):
 
 
 @pytest.mark.parametrize("feedback_mode", [None, 0, 1, 2, 3])
-def test_standing_in_20_poses_all_joints_read_what_newton_and_euler_say(world_of, feedback_mode):
+def test_joints_at_rest_read_newton_euler_wrenches_in_20_poses(world_of, feedback_mode):
     main = {} if feedback_mode is None else {"setPhysicsEngineParameter": {"jointFeedbackMode": feedback_mode}}
     world = world_of(main=main)
     random = np.random.default_rng(1)
@@ -99,7 +99,7 @@ def test_standing_in_20_poses_all_joints_read_what_newton_and_euler_say(world_of
 
 
 @pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"])
-def test_moving_in_20_states_all_joints_read_what_newton_and_euler_say(world_of, mode):
+def test_moving_joints_read_newton_euler_wrenches_in_20_states(world_of, mode):
     world = world_of(mode=mode, target_interpolation="hold")
     random = np.random.default_rng(2)
     still = dict.fromkeys(MOVING, 0.0)
@@ -136,7 +136,7 @@ def test_effort_of_the_motor_is_in_the_reading_once(world_of, sign):
 
 
 @pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"])
-def test_along_a_moving_axis_the_urdfs_damping_is_taken_off_the_effort(world_of, mode):
+def test_urdf_damping_is_subtracted_from_effort_along_a_moving_axis(world_of, mode):
     world = world_of(mode=mode)
     arm = world.bodies["arm"]
     for link in arm.link_indices:
@@ -157,7 +157,7 @@ def test_along_a_moving_axis_the_urdfs_damping_is_taken_off_the_effort(world_of,
         assert along_axis(index, (wrench.force, wrench.torque)) == pytest.approx(expected, rel=0.01, abs=0.01)
 
 
-def test_joint_at_its_limit_reads_what_the_stop_holds(world_of):
+def test_joint_at_its_limit_reads_the_load_on_its_stop(world_of):
     description = urdf().replace('lower="-3" upper="3"', 'lower="-0.2" upper="0.2"')
     world = world_of(mode="TORQUE_CONTROL", description=description)
     still = dict.fromkeys(MOVING, 0.0)
@@ -313,7 +313,7 @@ def test_robot_on_a_mobile_base_feels_its_weight(world_of):
     assert standing == pytest.approx(9.81 * sum(link.mass for link in ARM), rel=1e-3)
 
 
-def test_joints_that_are_put_elsewhere_leave_no_blow_in_the_reading(world_of):
+def test_resetting_joints_leaves_no_peak_in_the_reading(world_of):
     world = world_of(sensors=["upper_joint"])
     weight = np.linalg.norm(step(world, 300)["upper_joint"][:3])
     arm = world.bodies["arm"]
@@ -366,7 +366,7 @@ def test_each_sensor_has_its_own_rate_and_frame(world_of):
     assert counts == [25, 25, 100]
 
 
-def test_there_is_no_sample_before_the_first_tick_and_one_for_each_tick_after(world_of):
+def test_samples_begin_after_the_first_tick_one_per_tick(world_of):
     world = world_of(sensors=[{"joint": "flange_joint", "hz": 10}])
     assert not [sample for sample in world.read_rest() if isinstance(sample, WrenchSample)]
     for _ in range(3):
@@ -397,13 +397,13 @@ def test_noise_and_bias_are_as_configured_over_100_000_samples(world_of):
     assert np.abs(lagged).max() < 0.01, "ticks are independent"
 
 
-def test_one_number_of_noise_is_that_of_each_axis(world_of):
+def test_single_noise_value_applies_to_each_axis(world_of):
     sensor = {"joint": "hook", "noise_force_n": 0.3, "noise_torque_nm": 0.1}
     values = six(samples(world_of(sensors=[sensor], description=HOOK), 10_000))
     assert np.std(values, axis=0) == pytest.approx([0.3] * 3 + [0.1] * 3, rel=0.05)
 
 
-def test_noise_is_the_same_in_the_same_world_whatever_was_read_between(tmp_path):
+def test_noise_is_reproducible_whatever_was_read_in_between(tmp_path):
     runs = []
     for name, peeks in (("a", False), ("b", True)):
         folder = tmp_path / name
@@ -438,7 +438,7 @@ def test_low_pass_runs_at_every_tick_whatever_the_rate(world_of):
     assert forces == pytest.approx([9.81 * (2.0 + 3.0 * part) for part in grown])
 
 
-def test_nothing_that_is_not_finite_is_told(world_of):
+def test_non_finite_wrench_is_never_reported(world_of):
     world = world_of(sensors=["flange_joint"], joint_state_publisher_hz=1)
     arm = world.bodies["arm"]
     step(world, 1)
@@ -491,7 +491,7 @@ def test_zeroing_that_is_given_up_leaves_the_old_zero(world_of):
         ("wrist_joint", "enabled_joint_force_torque_sensors", "expected a list"),
     ],
 )
-def test_what_is_wrong_is_named_with_its_key(world_of, sensors, key, message):
+def test_faulty_sensor_options_are_named_with_their_key(world_of, sensors, key, message):
     with pytest.raises(ConfigError) as caught:
         world_of(sensors=sensors)
     problems = {problem.key: f"{problem.file} {problem.message}" for problem in caught.value.problems}

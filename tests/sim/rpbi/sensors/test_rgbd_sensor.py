@@ -39,7 +39,7 @@ def scenes(world, ticks):
     return [sample for _ in range(ticks) for sample in world.step() if getattr(sample, "name", None) == "eye"]
 
 
-def test_nothing_is_collected_while_nobody_looks(world):
+def test_no_scene_is_collected_without_viewers(world):
     world.put("eye/pose", POSE)
     assert not scenes(world, 100)
 
@@ -51,7 +51,7 @@ def test_there_is_no_scene_before_the_camera_has_a_pose(world):
     assert scenes(world, 100)
 
 
-def test_scenes_come_at_the_cameras_rate_with_the_stamps_of_their_ticks(world):
+def test_scenes_come_at_the_camera_rate_with_tick_stamps(world):
     world.put("eye/pose", POSE)
     world.cameras["eye"].wanted = True
     found = scenes(world, 1000)
@@ -59,7 +59,7 @@ def test_scenes_come_at_the_cameras_rate_with_the_stamps_of_their_ticks(world):
     assert all(scene.stamp_ns == (scene.tick + 1) * world.clock.dt_ns for scene in found)
 
 
-def test_scene_tells_where_every_body_is(world):
+def test_scene_contains_the_pose_of_every_body(world):
     world.put("eye/pose", POSE)
     world.cameras["eye"].wanted = True
     scene = scenes(world, 40)[0]
@@ -83,7 +83,7 @@ def topic_names(world):
     return {name: camera.topic_name for name, camera in world.cameras.items()}
 
 
-def test_first_camera_is_called_camera_in_topics_and_others_by_their_names(tmp_path):
+def test_first_camera_uses_topic_camera_and_others_their_names(tmp_path):
     files = [further(tmp_path, "left"), {"file": "left.yaml", "name": "right"}]
     world = World.from_file(write_world(tmp_path, rgbd_sensor=CAMERA, rgbd_sensors=files))
     assert topic_names(world) == {"eye": "camera", "left": "left", "right": "right"}
@@ -108,14 +108,14 @@ def test_cameras_come_and_go_and_their_names_are_free_again(world):
 
 
 @pytest.mark.parametrize("name, complaint", [("eye", "is taken"), ("box", "is taken"), ("camera", "the first camera")])
-def test_camera_whose_name_is_taken_is_refused_and_the_world_is_as_it_was(world, name, complaint):
+def test_camera_with_a_used_name_is_refused_without_any_change(world, name, complaint):
     cameras = dict(world.cameras)
     with pytest.raises(ConfigError, match=f"late.yaml: name: .*{complaint}"):
         world.add_camera(RgbdSensorConfig.parse({**CAMERA, "name": name}, "late.yaml"), "late.yaml")
     assert world.cameras == cameras
 
 
-def test_reset_keeps_the_pose_of_cameras_and_drops_those_that_came_later(world):
+def test_reset_keeps_camera_poses_and_removes_cameras_added_later(world):
     world.put("eye/pose", POSE)
     world.step()
     world.add_camera(RgbdSensorConfig.parse({**CAMERA, "name": "late"}, "late.yaml"))
@@ -127,7 +127,7 @@ def test_reset_keeps_the_pose_of_cameras_and_drops_those_that_came_later(world):
     assert topic_names(world) == {"eye": "camera"}
 
 
-def test_all_problems_of_further_cameras_are_told_with_their_files(tmp_path):
+def test_problems_of_all_further_cameras_are_reported_with_their_files(tmp_path):
     (tmp_path / "bad.yaml").write_text("{name: eye, hz: fast, depth_noise_m: -1.0}")
     (tmp_path / "camera.yaml").write_text("{name: camera, object_tf: {tf_id: eye}}")
     files = ["bad.yaml", "camera.yaml", "nowhere.yaml", 3]

@@ -56,7 +56,7 @@ def pose(world: World, name: str = "box") -> Pose:
     return world.bodies[name].base_pose()
 
 
-def test_it_keeps_to_the_path_in_the_air_whatever_gravity_does(build) -> None:
+def test_tracked_body_keeps_to_its_path_despite_gravity(build) -> None:
     world = build()
 
     def pose_at(t: float) -> Pose:
@@ -70,7 +70,7 @@ def test_it_keeps_to_the_path_in_the_air_whatever_gravity_does(build) -> None:
     assert world.bodies["box"].base_twist().linear == pytest.approx((SPEED, 0.0, 0.0), abs=1e-3)
 
 
-def test_it_pushes_what_is_before_it_at_its_own_velocity(build) -> None:
+def test_tracked_body_pushes_others_at_its_own_velocity(build) -> None:
     world = build()
     speeds = []
     for t in follow(world, lambda t: Pose((0.2 + SPEED * t, 0.0, 0.1)), 1.0):
@@ -80,7 +80,7 @@ def test_it_pushes_what_is_before_it_at_its_own_velocity(build) -> None:
     assert pose(world, "other").position[0] - pose(world).position[0] == pytest.approx(0.2, abs=2e-3)
 
 
-def test_unseen_it_goes_on_as_physics_has_it_and_seen_again_it_comes_back_on_a_path(build, caplog) -> None:
+def test_unseen_body_follows_physics_and_returns_along_a_path(build, caplog) -> None:
     timeout_s = 0.02
     world = build(tracked_tf={"tf_id": "seen", "hz": HZ, "timeout_s": timeout_s})
     for _ in follow(world, lambda t: Pose((SPEED * t, 0.0, 2.0)), 0.5):
@@ -101,7 +101,7 @@ def test_unseen_it_goes_on_as_physics_has_it_and_seen_again_it_comes_back_on_a_p
     assert caplog.text == "", "no jump"
 
 
-def test_what_is_put_somewhere_is_left_to_physics_until_it_is_seen_again(build) -> None:
+def test_teleported_body_follows_physics_until_it_is_seen_again(build) -> None:
     world = build()
     list(follow(world, lambda _: Pose((0.0, 0.0, 1.0)), 0.1))
     world.act("box", "teleport", Pose((0.0, 1.0, 1.0)))
@@ -112,7 +112,7 @@ def test_what_is_put_somewhere_is_left_to_physics_until_it_is_seen_again(build) 
     assert pose(world).position == pytest.approx((0.0, 1.0, 1.0), abs=1e-6)
 
 
-def test_a_session_that_tracks_and_loses_is_the_same_when_it_is_replayed(build) -> None:
+def test_session_with_lost_tracking_is_identical_when_replayed(build) -> None:
     world = build(tracked_tf={"tf_id": "seen", "hz": HZ, "timeout_s": 0.05})
     description = world.describe()
     states = set()
@@ -126,7 +126,7 @@ def test_a_session_that_tracks_and_loses_is_the_same_when_it_is_replayed(build) 
     assert (result.difference, result.left_out, result.agreed) == (None, (), len(states) + 1)
 
 
-def test_its_marker_is_where_it_is_and_not_where_it_was_seen(build) -> None:
+def test_marker_is_at_the_body_not_at_the_seen_frame(build) -> None:
     assert followed_frame(build().bodies["box"]) is None
 
 

@@ -61,7 +61,7 @@ def test_vicon_reports_where_the_body_was_and_how_long_ago(build) -> None:
         assert sample.pose.quat_xyzw == pytest.approx(poses[tick - 30].quat_xyzw)
 
 
-def test_noise_has_the_deviation_that_it_is_given_and_is_the_same_again(build) -> None:
+def test_noise_has_its_configured_deviation_and_is_reproducible(build) -> None:
     world = build(sliding(hz=1000, noise_m=[0.001, 0.002, 0.0], noise_rad=0.01, seed=3))
     samples, poses = run(world, 1000, ViconSample)
     errors = np.array(
@@ -80,7 +80,7 @@ def test_noise_has_the_deviation_that_it_is_given_and_is_the_same_again(build) -
     assert again == samples
 
 
-def test_occlusion_hides_it_for_a_share_of_the_time_and_physics_does_not_notice(build) -> None:
+def test_occlusion_hides_samples_for_its_share_without_affecting_physics(build) -> None:
     world = build(sliding(hz=1000, occlusion={"share": 0.3, "length_s": 0.02}, seed=5))
     samples, poses = run(world, 2000, ViconSample)
     assert len(samples) / 2000 == pytest.approx(0.7, abs=0.1)
@@ -90,7 +90,7 @@ def test_occlusion_hides_it_for_a_share_of_the_time_and_physics_does_not_notice(
     assert run(seen_by_nobody, 2000, ViconSample) == ([], poses)
 
 
-def test_each_segment_of_a_subject_is_a_link_of_the_body(build) -> None:
+def test_each_segment_of_a_subject_is_a_body_link(build) -> None:
     segments = [("foot", None), ("hand", "lbr_iiwa_link_7")]
     sensors = [{"type": "vicon", "name": name, "hz": 100, "link": link} for name, link in segments]
     world = build(robots=(iiwa("person", sensors=sensors),))

@@ -108,7 +108,7 @@ def test_with_both_poses_they_are_pulled_together(world):
 
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("kind", ["fixed", "ball"])
-def test_the_wrist_feels_what_hangs_on_it(world, kind, swapped):
+def test_wrist_sensor_measures_an_attached_load(world, kind, swapped):
     bare = run(world, 300)
     robot = world.bodies["iiwa"]
     hand = robot.link_pose(robot.model["lbr_iiwa_joint_7"].index).position
@@ -185,7 +185,7 @@ def test_removing_a_body_ends_its_attachments_and_says_so_once(world, caplog, go
         ({"name": "b", "child": "other", "child_pose": {"orientation": [0.0] * 4}}, "child_pose.orientation"),
     ],
 )
-def test_what_makes_no_sense_is_refused_and_nothing_changes(world, keys, message):
+def test_invalid_attachment_is_refused_without_any_change(world, keys, message):
     attach(world)
     noted, held = world.commands.count, world.attachments.configs
     with pytest.raises((InterfaceError, ValueError), match=re.escape(message)):
@@ -225,7 +225,7 @@ def test_a_name_that_is_not_attached_cannot_be_detached(world):
         world.detach("tool")
 
 
-def test_what_is_held_is_not_put_elsewhere(world):
+def test_attached_bodies_cannot_be_teleported(world):
     attach(world)
     for name, what, value in (
         ("box", "teleport", START),
@@ -238,7 +238,7 @@ def test_what_is_held_is_not_put_elsewhere(world):
     world.act("box", "teleport", START)
 
 
-def test_a_reset_brings_back_what_the_main_file_has_and_nothing_else(build):
+def test_reset_restores_exactly_the_attachments_of_the_main_file(build):
     world = build(attachments=[CARRIED])
     start = world.state_hash()
     run(world, 300)
@@ -253,6 +253,6 @@ def test_a_reset_brings_back_what_the_main_file_has_and_nothing_else(build):
     assert world.pb.getNumConstraints() == 1
 
 
-def test_a_main_file_that_attaches_what_is_not_there_is_refused_with_file_and_key(build):
+def test_attachment_of_an_unknown_object_names_file_and_key(build):
     with pytest.raises(ConfigError, match=r"world.yaml: attachments\[1\]: unknown object 'bx': known are"):
         build(attachments=[CARRIED, {**CARRIED, "name": "b", "child": "bx"}])

@@ -72,7 +72,7 @@ def start(tmp_path):
         process.communicate()
 
 
-def test_a_copy_predicts_with_what_the_script_has_and_keeps_nothing_open(start):
+def test_copied_process_predicts_with_the_scripts_classes_and_closes_pipes(start):
     process, lines, _ = start()
     assert lines == ["predicted True True", "forked True", "_Copy 1", "end of a pipe b''"]
     process.communicate(timeout=20)

@@ -25,7 +25,7 @@ def test_a_session_is_the_same_in_another_process(visitors):
     assert here == there
 
 
-def test_a_session_is_the_same_in_a_world_built_after_others_in_the_same_process():
+def test_session_is_identical_in_a_world_built_after_others():
     hashes = set()
     for _ in range(2):
         world = session.build()

@@ -55,7 +55,7 @@ def test_box_slides_once_its_friction_is_lowered(make):
     assert world.bodies["box"].base_pose().position[0] - held == pytest.approx(acceleration / 2, rel=0.05)
 
 
-def test_without_change_dynamics_an_object_has_what_pybullet_gives_it(make):
+def test_object_without_change_dynamics_has_the_defaults_of_pybullet(make):
     plain = {key: value for key, value in box().items() if key != "changeDynamics"}
     bare = Client()
     shape = bare.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.1] * 3)
@@ -78,7 +78,7 @@ def pressing(world):
     return sum(touch[9] for touch in world.pb.getContactPoints(world.bodies["box"].body_id))
 
 
-def test_link_by_its_name_gets_heavier_and_its_sensor_feels_it(make):
+def test_link_changed_by_name_is_heavier_for_its_sensor(make):
     robot = iiwa(enabled_joint_force_torque_sensors=[{"joint": "lbr_iiwa_joint_7", "hz": 1000}])
     world = make(robots=(robot,))
     run(world, 500)
@@ -145,7 +145,7 @@ def test_renderer_takes_changes_of_dynamics(make, caplog):
     client.disconnect()
 
 
-def test_change_of_what_was_removed_does_not_come_back(make):
+def test_change_of_a_removed_body_does_not_return(make):
     world = make(dynamic=(box(),))
     world.change_dynamics("box", ChangeDynamics(mass=3.0))
     kind, config = next(entry.arguments for entry in world.log if entry.name == "box")
@@ -170,7 +170,7 @@ def test_change_of_what_was_removed_does_not_come_back(make):
         ("box", {"mass": 0.0, "jointDamping": 1.0}, "mass: .*jointDamping: "),
     ],
 )
-def test_what_makes_no_sense_is_refused_whole(make, name, change, message):
+def test_invalid_changes_are_refused_as_a_whole(make, name, change, message):
     shape = {"shapeType": "GEOM_SPHERE", "radius": 0.1}
     ghost = {"name": "ghost", "createVisualShape": shape}
     world = make(dynamic=(box(),), robots=(iiwa(),), visual=(ghost,))
@@ -182,7 +182,7 @@ def test_what_makes_no_sense_is_refused_whole(make, name, change, message):
 
 
 @pytest.mark.parametrize("name", ["bix", "box/lid", "iiwa/lbr_iiwa_link_9", ""])
-def test_unknown_names_are_told_with_the_known_ones(make, name):
+def test_unknown_names_are_reported_with_known_ones(make, name):
     world = make(dynamic=(box(),), robots=(iiwa(),))
     for call in (lambda: world.dynamics(name), lambda: world.change_dynamics(name, ChangeDynamics(mass=1.0))):
         with pytest.raises(UnknownNameError, match="known are"):
@@ -206,7 +206,7 @@ def test_root_link_of_a_mobile_base_is_the_urdfs(make):
 PRESENT = LinkDynamics(1.0, 0.5, (0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0, 1), 0.0, 0.0, 0.0, -1.0, -1.0, 2, 0.001)
 
 
-def test_only_what_differs_is_changed():
+def test_only_differing_values_are_changed():
     assert difference(PRESENT, PRESENT) == {}
     assert difference(PRESENT, PRESENT._replace(mass=2.0, local_inertia_pos=())) == {"mass": 2.0}
     wanted = PRESENT._replace(contact_stiffness=100.0, contact_damping=3.0)
@@ -233,7 +233,7 @@ def test_nonsense_is_named_by_field(fields, message):
         difference(PRESENT, PRESENT._replace(**fields))
 
 
-def test_model_of_the_yaml_agrees_with_pybullet_on_stiffness_of_links(make):
+def test_link_stiffness_and_damping_are_as_requested(make):
     """Stiffness and damping of a link are what was asked for, as those of a base are."""
     world = make(robots=(iiwa(),))
     name = "iiwa/lbr_iiwa_link_5"

@@ -68,7 +68,7 @@ def heap(tmp_path):
         (streaming_session, 101),
     ],
 )
-def test_all_ways_from_a_keyframe_are_the_same(tmp_path, session, seed):
+def test_save_fork_predict_and_restore_agree_after_a_keyframe(tmp_path, session, seed):
     world = session.build(tmp_path, seed)
     session.run(world, seed, 500)
     file = tmp_path / "here.world"
@@ -90,7 +90,7 @@ def test_all_ways_from_a_keyframe_are_the_same(tmp_path, session, seed):
     world.close()
 
 
-def test_another_process_goes_on_from_a_keyframe(heap, tmp_path):
+def test_another_process_continues_from_a_keyframe(heap, tmp_path):
     heap.save(tmp_path / "here.world", keyframe=True)
     command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "here.world"), str(AHEAD)]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "2"})
@@ -202,7 +202,7 @@ def test_looking_at_bodies_changes_no_keyframe(heap):
     other.close()
 
 
-def test_a_keyframe_is_that_of_the_same_files_elsewhere(tmp_path):
+def test_keyframe_is_identical_for_the_same_files_elsewhere(tmp_path):
     texts = []
     for name in ("here", "there"):
         (folder := tmp_path / name).mkdir()
@@ -296,7 +296,7 @@ def test_no_keyframe_is_made_while_a_state_is_restored(heap):
     assert not heap.save().keyframe
 
 
-def test_the_process_that_forks_goes_on_at_later_keyframes(heap, monkeypatch):
+def test_forking_process_continues_at_later_keyframes(heap, monkeypatch):
     monkeypatch.setattr(shadows, "MAX_COPIED_MB", 0.0)  # so that it is a program
     processes = set()
     for target in (0.4, 0.6, 0.2):
@@ -312,7 +312,7 @@ def test_the_process_that_forks_goes_on_at_later_keyframes(heap, monkeypatch):
     assert prediction.state_hash == hash_later(heap)
 
 
-def test_worlds_that_keep_what_is_not_known_are_refused(heap, tmp_path):
+def test_worlds_with_unknown_state_are_refused(heap, tmp_path):
     soft = World.from_file(write_world(tmp_path, collision=(GROUND,), soft=(block(tmp_path),), **DEFORMABLE))
     with pytest.raises(InterfaceError, match="is soft"):
         soft.keyframe()

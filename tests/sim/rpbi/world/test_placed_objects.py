@@ -42,7 +42,7 @@ def at(world, name):
 
 
 @pytest.mark.parametrize("maximal", [False, True])
-def test_visual_and_collision_objects_stand_where_their_files_say(build, maximal):
+def test_visual_and_collision_objects_are_placed_as_in_their_files(build, maximal):
     shelf = still("shelf", useMaximalCoordinates=maximal, **PLACE)
     on_it = ball("on_it", basePosition=[1.0, 2.0, 0.7])
     world = build(visual=(picture("sign", **PLACE), picture("origin")), collision=(shelf,), dynamic=(on_it,))
@@ -54,7 +54,7 @@ def test_visual_and_collision_objects_stand_where_their_files_say(build, maximal
     assert world.bodies["on_it"].base_pose().position[2] == pytest.approx(0.7, abs=1e-3)
 
 
-def test_what_follows_a_frame_of_the_main_file_is_there_at_the_first_tick_and_after_a_reset(build):
+def test_object_following_a_configured_frame_is_placed_before_tick_one(build):
     poses = [{"tf_id": "rpbi/table", "position": [1.0, 0.0, 0.5]}, {"tf_id": "eye", "position": [0.0, 0.0, 3.0]}]
     arm = iiwa(object_tf={"tf_id": "rpbi/table"}, loadURDF={"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True})
     table = still("table", object_tf={"tf_id": "rpbi/table"})

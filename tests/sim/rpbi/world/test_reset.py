@@ -30,7 +30,7 @@ def arm(tmp_path):
 
 
 @pytest.mark.parametrize("before", [0, 1, 2])
-def test_what_follows_is_that_of_a_fresh_world(before):
+def test_session_after_a_reset_equals_one_in_a_fresh_world(before):
     world = session.build()
     for turn in range(before):
         session.run(world, ticks=700, visitors=bool(turn))
@@ -57,7 +57,7 @@ def test_nothing_that_was_done_outlives_it(rich, tmp_path, seed):
     fresh.close()
 
 
-def test_ticks_begin_anew_and_stamps_go_on(arm):
+def test_ticks_restart_and_stamps_continue(arm):
     for _ in range(10):
         arm.step()
     stamp_ns = arm.clock.stamp_ns
@@ -75,7 +75,7 @@ def test_motions_end_with_the_reason(arm):
     assert arm.bodies["iiwa"].drive.motion is None
 
 
-def test_the_first_target_after_it_is_obeyed_and_none_from_before(arm):
+def test_first_target_after_reset_is_obeyed_and_earlier_ones_dropped(arm):
     arm.put("iiwa/target", JointCommand(["lbr_iiwa_joint_1"], [1.0]))
     arm.reset()
     arm.step()
@@ -85,7 +85,7 @@ def test_the_first_target_after_it_is_obeyed_and_none_from_before(arm):
     assert arm.bodies["iiwa"].motors.targets[0] == 0.7
 
 
-def test_a_target_that_was_checked_before_it_and_comes_after_is_dropped(arm):
+def test_target_checked_before_reset_is_dropped_when_it_comes_after(arm):
     generation = arm.mailbox.generation
     checked = arm.inputs["iiwa/target"].check(JointCommand(["lbr_iiwa_joint_1"], [1.0]))
     arm.reset()
@@ -131,7 +131,7 @@ def test_inputs_are_taken_all_the_time(arm):
     assert len(missed) > 100 and not any(missed)
 
 
-def test_the_log_is_that_of_the_new_start(rich):
+def test_load_log_begins_anew(rich):
     entries = len(rich.log)
     script.run(rich, 1, 500)
     rich.reset()
@@ -150,7 +150,7 @@ def test_a_world_that_is_not_finite_any_more_is_mended(arm):
         arm.step()
 
 
-def test_a_file_that_has_gone_is_told_and_a_later_reset_finds_it_again(tmp_path):
+def test_missing_file_is_reported_and_found_by_a_later_reset(tmp_path):
     from mobile_base import mobile_base
 
     camera = {"name": "eye", "hz": 10, "object_tf": {"tf_id": "eye"}}

@@ -47,7 +47,7 @@ def height(world, name="box"):
     return world.bodies[name].base_pose().position[2]
 
 
-def test_what_falls_falls_by_the_gravity_of_the_moment(make):
+def test_falling_body_follows_the_current_gravity(make):
     world = make(dynamic=(box(basePosition=[0.0, 0.0, 5.0], changeDynamics={"linearDamping": 0.0}),))
     world.change_physics(MOON)
     ticks(world, 1000)
@@ -58,7 +58,7 @@ def test_what_falls_falls_by_the_gravity_of_the_moment(make):
     assert height(world) == pytest.approx(before - 1.62, rel=1e-3), "it goes on as fast as it was"
 
 
-def test_what_sleeps_wakes_up(make):
+def test_change_of_gravity_wakes_a_sleeping_body(make):
     sleeper = box(basePosition=[0.0, 0.0, 0.1], changeDynamics={"activationState": "ACTIVATION_STATE_ENABLE_SLEEPING"})
     world = make(dynamic=(sleeper,))
     ticks(world, 3000)
@@ -125,7 +125,7 @@ def test_contact_forces_are_those_of_the_whole_step(make, sub_steps):
     ],
     ids=lambda change: ", ".join(change.kwargs()),
 )
-def test_a_change_has_an_effect_and_a_reset_takes_it_back(change):
+def test_change_has_an_effect_that_a_reset_reverts(change):
     world = build()
     untouched = run(world, 250)
     world.reset()
@@ -136,7 +136,7 @@ def test_a_change_has_an_effect_and_a_reset_takes_it_back(change):
     world.close()
 
 
-def test_all_parameters_can_be_changed_and_are_the_commands_of_a_replay():
+def test_all_parameters_can_be_changed_and_are_replayed():
     world, again = build(), build()
     changes = [SetPhysicsEngineParameter(**{key: _other(key)}) for key in SetPhysicsEngineParameter.model_fields]
     for change in changes:
@@ -158,7 +158,7 @@ def _other(key):
     return special.get(key, False if "bool" in annotation else 3 if "int" in annotation else 0.015)
 
 
-def test_log_has_the_changes_and_the_renderers_copy_stays_as_it_is(make):
+def test_log_has_the_changes_but_the_renderers_copy_ignores_gravity(make):
     world = make()
     world.change_physics(MOON)
     client = Client()

@@ -73,7 +73,7 @@ def arm(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [301, pytest.param(302, marks=pytest.mark.thorough), SLEEPY])
-def test_a_session_of_everything_goes_on_the_same_in_all_ways(tmp_path, seed):
+def test_session_continues_identically_when_saved_forked_or_predicted(tmp_path, seed):
     if seed == SLEEPY:
         world = sleeping_session.build(tmp_path, seed)
         sleeping_session.run(world, seed, 700)
@@ -92,7 +92,7 @@ def test_a_session_of_everything_goes_on_the_same_in_all_ways(tmp_path, seed):
     world.close()
 
 
-def test_what_pybullet_saves_by_itself_does_not_suffice(tmp_path):
+def test_state_saved_by_pybullet_alone_does_not_suffice(tmp_path):
     world = script.build(tmp_path)
     script.run(world, 301, 700)
     saved = world.pb.saveState()
@@ -103,7 +103,7 @@ def test_what_pybullet_saves_by_itself_does_not_suffice(tmp_path):
     world.close()
 
 
-def test_what_is_predicted_is_what_happens(arm):
+def test_prediction_equals_the_later_outcome(arm):
     candidates = [
         [(20 * k, TARGET, {"lbr_iiwa_joint_1": 0.1 * turn + 0.01 * k}) for k in range(5)] for turn in range(3)
     ]
@@ -135,7 +135,7 @@ def test_a_prepared_world_predicts_from_its_present_state(arm):
     assert hash_later(arm, 30) == prediction.state_hash
 
 
-def test_a_process_that_ends_while_it_starts_is_named_and_the_next_one_predicts(arm):
+def test_process_killed_at_start_is_reported_and_the_next_predicts(arm):
     arm.prepare_forks()
     arm._shadow._process.kill()
     with pytest.raises(InterfaceError, match="the process that follows the world has ended"):
@@ -153,7 +153,7 @@ def test_a_process_that_ends_while_it_starts_is_named_and_the_next_one_predicts(
         ("nowhere:cost", "nowhere"),
     ],
 )
-def test_a_cost_that_fails_is_named_and_the_world_goes_on(arm, cost, fault):
+def test_failing_cost_is_named_and_the_world_continues(arm, cost, fault):
     before = arm.state_hash()
     (prediction,) = arm.predict([[]], 5, cost=cost)
     assert fault in prediction.fault and prediction.cost == float("inf")

@@ -47,7 +47,7 @@ def test_sessions_are_those_after_loading_again(world):
     assert ends[0] == ends[1] and len(set(ends[0].values())) == 25
 
 
-def test_what_it_cannot_undo_is_loaded_again(world):
+def test_body_with_irreversible_changes_is_loaded_again(world):
     def does(what) -> bool:
         world.reset(rebuild=False)
         world.reset(rebuild=False)
@@ -67,7 +67,7 @@ def test_what_it_cannot_undo_is_loaded_again(world):
     assert does(lambda: world.attach({"name": "rope", "parent": "arm/bar", "child": "box", "kind": "ball"}))
 
 
-def test_a_state_that_was_saved_after_such_a_reset_is_restored(world):
+def test_state_saved_after_a_reset_without_rebuild_is_restored(world):
     session(world, 1)
     world.reset(rebuild=False)
     end = session(world, 2)

@@ -42,7 +42,7 @@ def test_it_is_the_same_in_another_process(world, path):
     assert f"hash: {world.state_hash()}" in printed
 
 
-def test_it_differs_from_tick_to_tick_and_reading_it_changes_nothing(path):
+def test_hash_changes_every_tick_and_reading_it_changes_nothing(path):
     hashes = []
     for read_often in (True, False):
         world = World.from_file(path)
@@ -75,14 +75,14 @@ def test_the_last_bit_of_anything_counts(world, disturb):
     assert world.state_hash() != before
 
 
-def test_the_order_of_bodies_does_not_count_but_their_names_do(world):
+def test_hash_ignores_the_order_of_bodies_but_not_their_names(world):
     reversed_order = dict(reversed(world.bodies.items()))
     assert state_hash(0, reversed_order) == world.state_hash()
     renamed = {"bell" if name == "ball" else name: body for name, body in world.bodies.items()}
     assert state_hash(0, renamed) != world.state_hash()
 
 
-def test_worlds_that_differ_by_one_target_are_told_apart():
+def test_worlds_that_differ_by_one_target_have_different_hashes():
     world = session.build()
     session.run(world, ticks=100)
     one = world.state_hash()

@@ -68,13 +68,13 @@ def test_a_box_without_collision_shape_is_fallen_through(build):
     assert world.bodies["box"].base_pose().position[2] < -1.0
 
 
-def test_a_collision_object_holds_what_falls_on_it(build):
+def test_collision_object_holds_a_falling_body(build):
     world = build(collision=(FLOOR,), dynamic=(box(basePosition=[0.0, 0.0, 0.3]),))
     _run(world, 1500)
     assert world.bodies["box"].base_pose().position[2] == pytest.approx(0.1, abs=2e-3)
 
 
-def test_a_robot_reaches_its_target_and_joints_not_named_keep_theirs(build):
+def test_robot_reaches_its_target_and_other_joints_keep_theirs(build):
     world = build(robots=(iiwa(initial_joint_position={"lbr_iiwa_joint_2": 30.0}),))
     world.put("iiwa/target", JointCommand(["lbr_iiwa_joint_4"], [-0.7]))
     _run(world, 3000)
@@ -99,7 +99,7 @@ def test_start_positions_in_radians_are_taken_as_such(build):
     assert _positions(world)["lbr_iiwa_joint_2"] == 0.5
 
 
-def test_motors_are_held_to_the_effort_and_velocity_limits_of_the_description(build):
+def test_motors_obey_effort_and_velocity_limits_of_the_urdf(build):
     world = build(robots=(iiwa(joint_state_publisher_hz=1000),))
     robot = world.bodies["iiwa"]
     limit = robot.model["lbr_iiwa_joint_1"]
@@ -129,7 +129,7 @@ def test_samples_come_at_their_rates(build):
     assert sum(sample.name == "ball" for sample in poses) == 30
 
 
-def test_link_poses_are_those_of_urdf_frames_not_of_mass_centres(build):
+def test_link_poses_are_those_of_urdf_frames(build):
     world = build(robots=(iiwa(broadcast_link_states=True),))
     robot = world.bodies["iiwa"]
     assert robot.inertial_pose_in_base.position != (0.0, 0.0, 0.0)  # else this test would show nothing
@@ -204,7 +204,7 @@ def test_a_window_without_a_screen_is_refused_and_ends_nothing(build, monkeypatc
         build(connect={"connection_mode": "GUI"})
 
 
-def test_removing_what_is_not_there_names_what_is(build):
+def test_removing_an_unknown_body_names_known_ones(build):
     world = build(dynamic=(ball(),))
     with pytest.raises(UnknownNameError, match="ball"):
         world.remove("bal")
@@ -229,7 +229,7 @@ def test_a_failing_add_leaves_the_world_as_it_was(build, kind, data):
     _run(world, 10)
 
 
-def test_all_problems_of_all_bodies_come_at_once_with_their_files(tmp_path):
+def test_problems_of_all_bodies_are_reported_with_their_files(tmp_path):
     path = write_world(
         tmp_path,
         robots=(

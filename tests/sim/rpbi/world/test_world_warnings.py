@@ -47,7 +47,7 @@ def test_a_sound_world_has_none(warnings_of):
     assert warnings_of(collision=(BOX_FLOOR,), dynamic=(resting,), robots=(iiwa(),)) == []
 
 
-def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_meant(tmp_path, warnings_of):
+def test_missing_gravity_is_reported_if_bodies_could_fall(tmp_path, warnings_of):
     weightless = {"name": "free", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 0, 1]}}
     path = write_world(tmp_path, dynamic=(ball(),), urdfs=(weightless,), robots=(iiwa(),), collision=(BOX_FLOOR,))
     text = (tmp_path / "world.yaml").read_text().replace("setGravity:\n  gravZ: -9.81\n", "")
@@ -60,7 +60,7 @@ def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_m
     assert warnings_of(robots=(iiwa(),), collision=(BOX_FLOOR,), setGravity={}) == []
 
 
-def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
+def test_overlapping_bodies_are_reported_with_their_depth(warnings_of):
     low = box("low", basePosition=[1.0, 0.0, 0.06])
     other = box("other", basePosition=[1.18, 0.0, 0.1])
     told = warnings_of(collision=(BOX_FLOOR,), dynamic=(low, other), robots=(iiwa(),))
@@ -70,7 +70,7 @@ def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
     ]
 
 
-def test_the_link_of_a_robot_that_is_in_something_is_named_but_not_what_stands_still_anyway(warnings_of):
+def test_overlapping_robot_link_is_named_unless_both_are_fixed(warnings_of):
     plinth = {**follower("plinth", "x"), "basePosition": [0.0, 0.0, -0.05]}  # the foot of the arm is in it
     del plinth["object_tf"]
     hit = ball("hit", radius_m=0.05, basePosition=[0.0, 0.0, 1.2])
@@ -78,7 +78,7 @@ def test_the_link_of_a_robot_that_is_in_something_is_named_but_not_what_stands_s
     assert len(told) == 1 and "'hit' and 'iiwa/lbr_iiwa_link_" in told[0]
 
 
-def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(warnings_of):
+def test_bodies_that_follow_a_configured_frame_are_checked_there(warnings_of):
     table = follower("table", "rpbi/table")
     thing = box("thing", basePosition=[3.0, 0.0, 0.15])
     poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.0]}]
@@ -88,7 +88,7 @@ def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(wa
     assert warnings_of(collision=(table,), dynamic=(at_origin,), poses=poses) == []
 
 
-def test_frames_that_nobody_publishes_are_told_with_who_follows_them_and_what_to_do(warnings_of):
+def test_unpublished_frames_are_reported_with_their_followers_and_a_remedy(warnings_of):
     lone, near = follower("lone", "bench"), follower("near", "rpbi/tabel", basePosition=[9.0, 0.0, 0.0])
     held, kept = follower("held", "rpbi/iiwa/lbr_iiwa_link_7"), follower("kept", "rpbi/ball")
     camera = {"name": "eye", "object_tf": {"tf_id": "rpbi/iiwa/lbr_iiwa_link_9"}}
@@ -119,13 +119,13 @@ def test_frames_that_nobody_publishes_are_told_with_who_follows_them_and_what_to
     assert twice == ["world.yaml: poses[0].tf_id: 'ball' publishes 'rpbi/ball' too"]
 
 
-def test_links_that_robot_state_publisher_makes_are_taken_to_be_there(warnings_of):
+def test_links_published_by_robot_state_publisher_count_as_present(warnings_of):
     held = follower("held", "rpbi/iiwa/lbr_iiwa_link_7")
     assert warnings_of(collision=(held,), robots=(iiwa(broadcast_root_tf_hz=10.0),)) == []
 
 
 @pytest.mark.parametrize("kind", ["robots", "urdfs"])
-def test_joints_that_start_beyond_their_limits_are_told(tmp_path, warnings_of, kind):
+def test_joints_that_start_beyond_limits_are_reported(tmp_path, warnings_of, kind):
     (tmp_path / "pin.urdf").write_text(PIN)
     pin = {"name": "pin", "loadURDF": {"fileName": "pin.urdf", "useFixedBase": True}}
     if kind == "robots":
@@ -136,7 +136,7 @@ def test_joints_that_start_beyond_their_limits_are_told(tmp_path, warnings_of, k
         assert warnings_of(robots=({**pin, "initial_joint_position": {"slide": 0.15}},)) == []
 
 
-def test_a_robot_that_waits_for_another_is_told(warnings_of):
+def test_robot_that_waits_for_another_is_reported(warnings_of):
     [told] = warnings_of(robots=(iiwa(initial_joint_state_topic="real/joint_states"),))
     assert (
         told == "iiwa.yaml: initial_joint_state_topic: the world only starts if joint states come on real/joint_states"
@@ -148,14 +148,14 @@ ADVICE = "use a box, such as {shapeType: GEOM_BOX, halfExtents: [50, 50, 0.5], c
 
 
 @pytest.mark.parametrize("height_m", [0.1, 0.1001, 3.0])
-def test_what_rests_on_a_plane_or_falls_onto_it_is_told_with_the_remedy(warnings_of, height_m):
+def test_body_resting_on_a_plane_is_reported_with_the_remedy(warnings_of, height_m):
     thing = box(basePosition=[1.0, 0.0, height_m])
     [told] = warnings_of(collision=(FLOOR,), dynamic=(thing,), robots=(iiwa(),))
     assert told.startswith(f"{PLANE}'box' rests on this plane: planes lose contact points") and told.endswith(ADVICE)
     assert warnings_of(collision=(BOX_FLOOR,), dynamic=(thing,), robots=(iiwa(),)) == []
 
 
-def test_many_on_a_plane_are_one_warning_and_urdfs_count_too(warnings_of):
+def test_several_bodies_on_a_plane_give_one_warning(warnings_of):
     boxes = tuple(box(f"box_{index}", basePosition=[0.5 * index, 0.0, 0.1]) for index in range(4))
     cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 3, 0.5]}}
     [told] = warnings_of(collision=(FLOOR,), dynamic=boxes, urdfs=(cube,))
@@ -165,7 +165,7 @@ def test_many_on_a_plane_are_one_warning_and_urdfs_count_too(warnings_of):
     assert told.startswith("plane.yaml: loadURDF.fileName: 'box_0' rests on this plane: ")
 
 
-def test_a_ball_on_a_plane_a_box_on_a_table_a_wall_and_weightlessness_are_fine(warnings_of):
+def test_bodies_without_plane_problems_are_not_reported(warnings_of):
     table = follower("table", "rpbi/table")
     poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.1]}]
     upon = box("upon", basePosition=[3.0, 0.0, 0.3])
@@ -178,7 +178,7 @@ def test_a_ball_on_a_plane_a_box_on_a_table_a_wall_and_weightlessness_are_fine(w
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT / "src")))
-def test_shipped_worlds_have_no_warnings_but_of_frames_of_other_nodes(path):
+def test_shipped_worlds_warn_only_of_frames_of_other_nodes(path):
     world = World.from_file(str(path), connection_mode=pybullet.DIRECT)
     found = [str(warning) for warning in world_warnings(world) if "follows it" not in warning.message]
     world.close()
@@ -194,7 +194,7 @@ def test_no_page_and_no_template_shows_a_plane_to_copy():
     assert [path.name for path, text in texts.items() if "GEOM_PLANE" in text] == []
 
 
-def test_bodies_in_maximal_coordinates_of_which_pybullet_tells_no_shapes_have_warnings_too(warnings_of):
+def test_bodies_in_maximal_coordinates_are_checked_without_pybullets_shapes(warnings_of):
     cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "useMaximalCoordinates": True}}
     found = warnings_of(
         collision=(FLOOR,), urdfs=({**cube, "loadURDF": {**cube["loadURDF"], "basePosition": [0, 0, 1]}},)
@@ -219,7 +219,7 @@ def test_gravity_upwards_and_positions_in_millimetres(warnings_of):
 
 
 @pytest.mark.parametrize("shape", [{"shapeType": "GEOM_SPHERE", "radius": 0.1}, {"shapeType": "GEOM_CAPSULE"}])
-def test_round_bodies_without_rolling_friction_on_a_level_floor(warnings_of, shape):
+def test_round_bodies_without_rolling_friction_on_level_floors_are_reported(warnings_of, shape):
     def round_body(**dynamics):
         return ball(basePosition=[0.0, 0.0, 2.0], createCollisionShape=shape, changeDynamics=dynamics)
 

@@ -43,7 +43,7 @@ def test_a_slippery_cup_stays_on_the_table(env, monkeypatch):
     assert result.figures["balls inside"] == 5
 
 
-def test_the_arm_is_that_of_the_extra_but_for_its_fingers():
+def test_arm_equals_that_of_the_extra_except_for_fingers():
     original, ours = (joints_of(name) for name in (ORIGINAL, "{rpbi_examples}/robots/kinova_hand.urdf"))
     assert original.keys() == ours.keys()
     for name, joint in ours.items():
@@ -53,7 +53,7 @@ def test_the_arm_is_that_of_the_extra_but_for_its_fingers():
             assert speed_of(joint) == speed_of(original[name])
 
 
-def test_without_the_extra_it_is_said_what_to_install(monkeypatch):
+def test_missing_extra_is_reported_with_its_install_command(monkeypatch):
     def fail() -> Path:
         raise ValueError("'example-robot-data' is not installed: ./rpbi setup assets")
 

@@ -21,7 +21,7 @@ def env():
     found.close()
 
 
-def test_a_camera_sees_parts_that_the_belt_carries_and_no_others(env):
+def test_camera_detects_exactly_the_parts_on_the_belt(env):
     belt_y_m = []
     env.task.seed = 201
     env.reset()
@@ -50,7 +50,7 @@ class Stand:
 
 
 @pytest.mark.parametrize("least_m, is_sent", [(0.05, False), (-1.0, True)])
-def test_an_arm_waits_before_it_comes_too_near_to_the_other(env, least_m, is_sent):
+def test_arm_waits_instead_of_approaching_the_other_too_closely(env, least_m, is_sent):
     robot = env.world.bodies["nextage"]
     env.reset(seed=200)
     names = {joint.index: joint.name for joint in robot.model.moving}
@@ -66,7 +66,7 @@ def test_an_arm_waits_before_it_comes_too_near_to_the_other(env, least_m, is_sen
     assert arms.send("right", RIGHT_OUT), "the way out is always free"
 
 
-def test_a_hand_grasps_as_the_shape_of_the_part_lets_it():
+def test_grasp_yaw_follows_the_shape_of_the_part():
     block, cube, cylinder = (PARTS[name] for name in ("block_1", "cube_1", "cylinder_1"))
     assert grasp_yaw(block, 2.0, -1.0) == pytest.approx(2.0 - 3.14159265)
     assert grasp_yaw(cube, 2.0, -1.0) == pytest.approx(2.0 - 3.14159265)
@@ -95,7 +95,7 @@ class RoughStage(EnvStage):
 
 
 @pytest.mark.thorough
-def test_a_grasp_that_misses_is_tried_again_and_a_part_that_falls_is_left_and_named(env, monkeypatch):
+def test_missed_grasp_is_repeated_and_fallen_part_is_named(env, monkeypatch):
     monkeypatch.setattr(factory, "HELD_M", 1.0)
     monkeypatch.setattr(factory.Factory, "longest_s", 7.0)
     env.task.seed = 202

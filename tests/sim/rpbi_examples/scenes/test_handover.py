@@ -29,13 +29,13 @@ def test_a_thing_without_friction_slips_off_the_palm(env, monkeypatch):
 
 
 @pytest.mark.thorough
-def test_a_palm_beyond_reach_is_told(env, monkeypatch):
+def test_palm_beyond_reach_is_reported(env, monkeypatch):
     monkeypatch.setattr(handover, "PLACES_M", ((0.9, -0.2, 1.1), (0.9, -0.2, 1.1)))
     result = run_episode(env, 205)
     assert not result.success and result.reason.startswith("human: (") and "is out of reach" in result.reason
 
 
-def test_a_policy_moves_the_robot_alone_and_a_lost_thing_ends_its_episode(env):
+def test_policy_moves_only_the_robot_and_losing_the_object_ends(env):
     assert env.action_space.shape == (8,)
     *_, has_ended, _, _ = act_at_random(env, 30)
     scene = env.task.scene

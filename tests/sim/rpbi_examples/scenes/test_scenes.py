@@ -56,7 +56,7 @@ def start_score(folder: Path, path: Path, *options: str, **environment: str) -> 
     return subprocess.Popen(command, cwd=folder, env=variables, start_new_session=True, **pipes)
 
 
-def test_a_seed_leads_to_the_same_episode_in_any_order_and_process_until_an_interrupt(env, tmp_path):
+def test_seed_gives_the_same_episode_in_any_order_and_process(env, tmp_path):
     first = run_episode(env, 5), env.world.state_hash()
     run_episode(env, 6)
     assert (run_episode(env, 5), env.world.state_hash()) == first
@@ -129,7 +129,7 @@ def test_scores_are_tables_json_and_pictures(tmp_path, monkeypatch, capsys):
     assert sheet.size == (320, 240) and np.asarray(sheet).std() > 10.0
 
 
-def test_a_seed_whose_world_fails_is_a_failed_row_and_the_next_has_a_new_world(tmp_path, monkeypatch, capsys):
+def test_failing_world_gives_a_failed_row_and_is_replaced(tmp_path, monkeypatch, capsys):
     worlds, step = set(), WorldEnv.step
 
     def fail_first(self, action):
@@ -175,7 +175,7 @@ def test_an_unknown_scene_is_named():
         command.score("cop")
 
 
-def test_ways_are_from_rest_to_rest_and_straight():
+def test_paths_are_straight_from_rest_to_rest():
     shares = np.linspace(0.0, 1.0, 1001)
     velocity = np.gradient([smooth(share) for share in shares], shares)
     assert velocity[0] < 1e-4 and velocity[-1] < 1e-4 and velocity.max() == pytest.approx(1.875, abs=1e-3)

@@ -37,7 +37,7 @@ def test_a_push_beyond_its_strength_throws_it_over(env):
 
 
 @pytest.mark.thorough
-def test_a_target_out_of_reach_is_told_of(env):
+def test_target_out_of_reach_is_reported(env):
     scene = begin(env, 2)
     x, y, z = scene.target.position
     scene.target = scene.target._replace(position=(x + 1.0, y, z))

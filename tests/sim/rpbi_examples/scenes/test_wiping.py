@@ -42,7 +42,7 @@ def test_another_force_than_that_asked_for_fails_in_one_line(env, monkeypatch):
     assert result.figures["stains gone [%]"] == 0.0
 
 
-def test_a_policy_wipes_where_it_leads_the_sponge_that_is_pressed(env):
+def test_policy_wipes_along_the_path_of_the_pressed_sponge(env):
     observation, *_ = act_at_random(env, 3)
     scene = env.task.scene
     assert env.action_space.shape == (6,) and list(observation["goal"]) == pytest.approx([scene.force])
@@ -54,7 +54,7 @@ def test_a_policy_wipes_where_it_leads_the_sponge_that_is_pressed(env):
     assert scene.stamps[-1].y - scene.stamps[0].y == pytest.approx(0.05, abs=0.02)
 
 
-def test_the_arm_is_that_of_the_other_examples():
+def test_arm_equals_that_of_the_other_examples():
     arm, other = (ElementTree.parse(ROBOTS / f"{name}.urdf").getroot() for name in ("kuka_lwr_sponge", "kuka_lwr"))
     for root, tools in ((arm, ["sponge"]), (other, ["sponge", "ball"])):
         for tool in tools:
