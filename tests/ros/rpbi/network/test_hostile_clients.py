@@ -207,7 +207,9 @@ def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node):
             _is_well(ros, node)
 
 
-@pytest.mark.parametrize("kind", ["urdf", "mesh", "yaml"])
+@pytest.mark.parametrize(
+    "kind", ["urdf", *(pytest.param(kind, marks=pytest.mark.thorough) for kind in ("mesh", "yaml"))]
+)
 def test_check_and_node_agree_on_hostile_files(ros, node, tmp_path, kind):
     program = str(ROOT / "dev/robustness/hostile_files/verdicts.py")
     command = [sys.executable, program, "node", str(tmp_path), "2000", str(FILES_EACH), kind]

@@ -7,6 +7,7 @@ import signal
 from contextlib import contextmanager
 from xmlrpc.client import ServerProxy
 
+import pytest
 from node_world import main_config
 from ros_system import LimitedTransport, wait_until
 from worlds import FLOOR, iiwa
@@ -99,6 +100,7 @@ def _connected(master, topic):
     return [(number, other) for number, other, way, _, name, *_ in connections if name == topic and way == "o"]
 
 
+@pytest.mark.thorough
 def test_a_world_that_stands_still_is_found_again_and_again_while_somebody_waits_for_a_service(
     ros, tmp_path, second_master
 ):
