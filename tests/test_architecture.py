@@ -163,7 +163,7 @@ def test_robot_model_needs_neither_ros_nor_pybullet():
     assert not names & {"rospy", "rospkg", "pybullet", "pybullet_data", "rpbi", "ros_pybullet_interface"}
 
 
-def test_only_the_world_and_its_parts_call_pybullet_from_the_simulator_node():
+def test_only_the_world_calls_pybullet_in_the_simulator_node():
     """Rule 1: nothing in the ROS layer reaches into PyBullet, but the robot's description on request."""
     for path in (SRC / "ros_pybullet_interface/src/rpbi/ros").rglob("*.py"):
         calls = re.findall(r"\bpb\.\w+", path.read_text())
@@ -200,7 +200,7 @@ def test_every_plug_in_is_explained(family):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_plug_in_has_a_file_of_its_own_and_a_line_in_the_table(family):
+def test_every_plug_in_has_a_file_and_table_entry(family):
     table, base, _ = FAMILIES[family]
     package = table.split(":")[0]
     for module in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
@@ -234,7 +234,7 @@ assert not sys.modules.keys() & {"PyKDL", "pytracik", "pinocchio", "daqp", "casa
     assert done.returncode == 0, done.stderr
 
 
-def test_every_solver_is_shown_in_the_example_and_held_to_the_conformance_suite():
+def test_every_solver_is_in_the_example_and_the_conformance_suite():
     from ik_ros.solvers import SOLVERS
 
     tests = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))

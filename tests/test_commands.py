@@ -38,7 +38,7 @@ def run(command: list[str | Path], **sourced: str) -> subprocess.CompletedProces
 
 
 @pytest.mark.parametrize("command", SECTIONS)
-def test_help_of_a_command_is_its_section_and_sets_nothing_up(bare, command):
+def test_help_of_a_command_is_its_section_without_any_setup(bare, command):
     for words in ([command, "--help"], [command, "-h"], ["help", command]):
         done = run([bare, *words])
         assert (done.returncode, done.stderr) == (0, "")
@@ -57,7 +57,7 @@ def test_the_list_has_a_line_for_each_command(bare):
 
 
 @pytest.mark.quick
-def test_the_page_names_all_extras_and_all_benchmarks_that_run_only_when_named():
+def test_page_names_all_extras_and_all_benchmarks_run_by_name():
     extras = {path.stem for path in ROOT.glob("requirements/extras/*.txt")}
     assert words_of("setup", "EXTRA") >= extras
     (named,) = re.findall(
@@ -79,7 +79,7 @@ def test_an_unknown_command_is_refused_with_the_list(bare):
     assert run([bare, "qqq"]).stderr.startswith("There is no command 'qqq'.\n")
 
 
-def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
+def test_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     done = run([bare, "check", WORLD])
     assert done.returncode == 1
     assert done.stderr.startswith(f"This checkout is in '{bare.parent}': ")
@@ -88,7 +88,7 @@ def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
 
 @pytest.mark.thorough
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may install packages without being asked")
-def test_the_first_set_up_without_a_network_says_what_it_waits_for_and_gives_up(tmp_path):
+def test_first_setup_without_network_names_its_server_and_gives_up(tmp_path):
     """The only server of packages takes connections and never answers, as behind many a firewall."""
     checkout = tmp_path / "checkout"
     (checkout / "requirements").mkdir(parents=True)
@@ -123,7 +123,7 @@ def test_check_says_nothing_but_its_own(tmp_path):
     assert done.stdout.startswith(f"{world}: fine; ")
 
 
-def test_a_sourced_workspace_takes_the_place_of_our_examples_but_not_of_the_simulator(tmp_path):
+def test_sourced_workspace_replaces_our_examples_but_not_the_simulator(tmp_path):
     """Files of launch files are found by CMAKE_PREFIX_PATH, those in YAML by ROS_PACKAGE_PATH: of the same package."""
     package = tmp_path / "src/rpbi_examples"
     (package / "configs").mkdir(parents=True)
@@ -156,7 +156,7 @@ PROGRAMS: dict[str, list[str]] = {
 
 
 @pytest.mark.parametrize(("kilobytes", "code"), [(300_000, 1), (500_000, 0)])
-def test_a_limit_of_memory_is_refused_in_one_line_or_does_not_matter(kilobytes, code):
+def test_memory_limit_is_refused_in_one_line_or_harmless(kilobytes, code):
     done = run(["bash", "-c", f"ulimit -v {kilobytes}; exec {ROOT}/rpbi check {WORLD}"])
     assert done.returncode == code
     assert done.stderr == ("memory is limited to 307 MB (ulimit -v); expected at least 500 MB\n" if code else "")

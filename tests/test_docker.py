@@ -25,7 +25,7 @@ def test_fresh_machine_understands_the_dockerfile():
     assert start.startswith("./rpbi demo") and folder == "in /rpbi" and release.startswith("debian ")
 
 
-def test_fresh_machine_refuses_a_dockerfile_with_steps_that_it_does_not_execute(tmp_path):
+def test_fresh_machine_refuses_a_dockerfile_with_unknown_steps(tmp_path):
     (tmp_path / "tests").mkdir()
     (tmp_path / "docker").mkdir()
     script = tmp_path / "tests" / "fresh_machine.sh"
@@ -36,7 +36,7 @@ def test_fresh_machine_refuses_a_dockerfile_with_steps_that_it_does_not_execute(
     assert "docker/Dockerfile: ENV is not known here" in answer.stderr
 
 
-def test_what_git_ignores_does_not_get_into_the_image():
+def test_files_ignored_by_git_are_not_in_the_image():
     """`/x/` of git is `x` of Docker, where a pattern without a slash is that of the top folder alone."""
     wanted = {re.sub(r"^/", "", line) if "/" in line[:-1] else f"**/{line}" for line in _patterns(".gitignore")}
     missing = {line.rstrip("/") for line in wanted} - set(_patterns(".dockerignore"))

@@ -60,7 +60,7 @@ def test_extras_are_wanted_unless_tests_are_chosen(arguments, chosen):
 
 
 @pytest.mark.parametrize("lenient", [True, pytest.param(False, marks=pytest.mark.thorough)])
-def test_chosen_tests_that_miss_an_extra_are_skipped_with_its_name(lenient):
+def test_chosen_tests_that_miss_an_extra_are_skipped_with_name(lenient):
     """Without the option, which `./rpbi test PATH` adds, they fail."""
     files = ["test_tasks.py", "test_tasks_solver.py", "test_trajectory_solver.py", "test_schemas.py"]
     options = ["-n", "0", "-p", "without_extras", *["--skip-missing-extras"] * lenient]
@@ -72,7 +72,7 @@ def test_chosen_tests_that_miss_an_extra_are_skipped_with_its_name(lenient):
 
 
 @pytest.mark.parametrize("wanted", [[], ["mpc"]], ids=["none", "mpc"])
-def test_what_is_installed_is_known_with_and_without_extras(tmp_path, wanted):
+def test_installed_requirements_are_known_with_and_without_extras(tmp_path, wanted):
     """Where the list of files ended with an error, set-up without extras failed at its last step."""
     script = (ROOT / "rpbi").read_text()
     functions = script[script.index("known_extras()") : script.index("# What Python files say")]

@@ -232,7 +232,7 @@ BREAKS = {
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
-def test_a_broken_rule_is_told_with_its_file(rule, tmp_path):
+def test_broken_rule_is_reported_with_its_file(rule, tmp_path):
     src = tmp_path / "src"
     for package in ("custom_ros_tools", "robot_model", "ros_pybullet_interface", "ik_ros"):
         others = shutil.ignore_patterns("__pycache__")  # whose files come and go while other tests run

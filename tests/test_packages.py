@@ -110,7 +110,7 @@ def test_packages_of_the_release_are_built_over_ours(tool: str, tmp_path: Path) 
     assert found == [tmp_path / "src/rpbi_examples", ROOT / "src/compatibility/ik_ros_examples"]
 
 
-def test_pip_is_refused_with_what_to_do_instead(tmp_path: Path) -> None:
+def test_pip_is_refused_with_the_command_to_use_instead(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--dry-run"]
     for target in ([str(ROOT)], ["-e", str(ROOT)]):
         done = subprocess.run([*command, *target], cwd=tmp_path, capture_output=True, text=True, timeout=300.0)

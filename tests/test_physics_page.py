@@ -19,7 +19,7 @@ measured = cache(lambda name: physics.TABLES[name]())
 CHEAP = ("turning", "falling", "swinging", "tumbling", "resting")
 
 
-def test_every_table_has_its_place_and_the_other_way_round():
+def test_every_table_has_a_place_and_every_place_a_table():
     assert sorted(re.findall("<!-- table (.*) -->", PAGE)) == sorted(physics.TABLES)
     for name in physics.TABLES:
         begin, end = physics.place(PAGE, name)
@@ -27,11 +27,11 @@ def test_every_table_has_its_place_and_the_other_way_round():
 
 
 @pytest.mark.parametrize("name", CHEAP)
-def test_page_has_what_is_measured(name):
+def test_page_contains_the_measured_values(name):
     assert physics.with_tables(PAGE, {name: measured(name)}) == PAGE, "run ./rpbi bench physics"
 
 
-def test_rolling_spinning_falling_and_swinging_are_as_the_closed_forms_say():
+def test_undamped_motions_match_their_closed_forms():
     ratios = {
         result.figure: result.ratio
         for name in ("turning", "falling", "swinging")
@@ -43,12 +43,12 @@ def test_rolling_spinning_falling_and_swinging_are_as_the_closed_forms_say():
     assert ratios["falling: damping not given, default, 1 ms"] < 0.95
 
 
-def test_a_table_without_a_place_is_told_by_name():
+def test_table_without_a_place_is_reported_by_name():
     with pytest.raises(ValueError, match="expected one '<!-- table lost -->', found 0"):
         physics.with_tables(PAGE, {"lost": Table(("", "a"), [])})
 
 
-def test_cells_become_figures_beside_their_closed_form():
+def test_cells_become_figures_next_to_their_closed_form():
     table = Table(("what", "text", "span", "value", "closed form"), [("one", ("x", Span(0.9, 1.1), 2.0, 4.0))])
     assert table.markdown().split("\n")[2] == "| one | x | 0.900 to 1.100 | 2 | 4 |"
     found = {result.figure: (result.value, result.floor) for result in table.results("t")}

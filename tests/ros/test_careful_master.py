@@ -25,7 +25,7 @@ def start(ros, name: str, port: int = 0) -> subprocess.Popen:
     return process
 
 
-def test_a_node_whose_name_is_taken_ends_and_one_that_has_come_to_its_address_does_not(ros):
+def test_taken_name_ends_only_the_older_node_of_that_name(ros):
     first = start(ros, "twin")
     port = Port()  # one that the kernel gives to nobody else when it is free again
     second = start(ros, "twin", port.number)

@@ -109,7 +109,7 @@ def test_every_kind_of_the_list_is_looked_for():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_name_is_found_or_its_reason_is_on_the_page(kind):
+def test_each_name_of_the_release_exists_or_is_explained(kind):
     is_there, names = KINDS[kind]
     missing = [name for name in names if not is_there(name)]
     assert [name for name in missing if not explained(name)] == [], f"neither found nor explained; {missing=}"

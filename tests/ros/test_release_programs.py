@@ -233,7 +233,7 @@ def test_run_teleop_moves_the_arm_by_keys(ros, where, tmp_path):
 
 
 @pytest.mark.thorough
-def test_run_human_interaction_moves_the_arm_by_the_release_s_driver_and_renders_its_force(ros, where, tmp_path):
+def test_run_human_interaction_moves_the_arm_and_renders_its_force(ros, where, tmp_path):
     soft = {"contactStiffness": 2000.0, "contactDamping": 50.0, "lateralFriction": 1.0}
     table = box(name="box", changeDynamics=soft, object_tf={"tf_id": "box", "hz": 30})
     table = {key: value for key, value in table.items() if not key.startswith("base")}

@@ -36,14 +36,14 @@ collector.join()
 """
 
 
-def test_an_error_of_a_window_that_is_kept_does_not_keep_the_window(screen):
+def test_kept_error_does_not_keep_its_window_alive(screen):
     """Tcl aborts the process when another thread than the window's frees it, as a garbage collector may."""
     program = [sys.executable, "-c", KEEPS_AN_ERROR]
     ended = subprocess.run(program, env={**os.environ, **screen.environment}, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
 
 
-def test_keyboard_of_the_release_tells_keys_and_lets_go_at_the_end(ros, screen):
+def test_keyboard_node_of_the_release_publishes_keys_and_final_releases(ros, screen):
     """`rosrun keyboard keyboard`; with no axes it is silent on `joy`, which `keyboard_to_joy.py` has."""
     down, up = ros.listen("keyboard/keydown", Key), ros.listen("keyboard/keyup", Key)
     node = ros.start(["rosrun", "keyboard", "keyboard"], **screen.environment)

@@ -102,7 +102,7 @@ def test_keys_have_the_codes_and_modifiers_of_the_message(screen, keyboard):
     assert all(reading.axes == reading.buttons == () for reading in reader.readings)
 
 
-def test_a_key_that_is_held_goes_down_once_and_up_once(screen, keyboard):
+def test_held_key_gives_one_press_and_one_release(screen, keyboard):
     """Though X, and this is checked by what a bare window gets, says that it goes up and down again and again."""
     reader = keyboard()
     raw = []
@@ -141,7 +141,7 @@ def test_who_types_elsewhere_holds_nothing_here(screen, keyboard):
     screen.run("xdotool", "keyup", "b")
 
 
-def test_what_is_held_when_it_closes_goes_up(screen, keyboard):
+def test_closing_releases_held_keys(screen, keyboard):
     reader = keyboard()
     screen.run("xdotool", "keydown", "a", "keydown", "F5")
     reader.until(lambda: len(reader.events) == 2, "they are held")
@@ -152,7 +152,7 @@ def test_what_is_held_when_it_closes_goes_up(screen, keyboard):
     ]
 
 
-def test_the_window_shows_what_is_held(screen, keyboard):
+def test_window_shows_held_keys(screen, keyboard):
     reader = keyboard(axes=AXES, buttons=["1"])
     (place,) = (each for each in screen.windows() if each.title == "keyboard")
 
@@ -195,7 +195,7 @@ def test_a_key_of_a_terminal_is_held_for_a_time(terminal, keyboard):
     assert reader.is_at_rest
 
 
-def test_a_key_that_is_typed_as_soon_as_the_terminal_is_open_counts(terminal, keyboard):
+def test_key_typed_right_after_opening_the_terminal_counts(terminal, keyboard):
     reader = keyboard(terminal=True, terminal_hold_s=60.0, axes=[["LEFT", "RIGHT"]])
     os.write(terminal, b"\x1b[C")
     reader.until(lambda: bool(reader.events), "it has come")

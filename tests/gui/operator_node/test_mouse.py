@@ -80,7 +80,7 @@ def reader(open_mouse):
     return open_mouse()
 
 
-def test_a_drag_counts_as_a_share_of_half_the_window_from_where_it_began(screen, reader):
+def test_drag_is_measured_from_its_start_in_half_windows(screen, reader):
     place = window(screen)
     x, y = place.x + 60, place.y + 80
     screen.run("xdotool", "mousemove", str(x), str(y), "mousedown", "1", "mousemove", str(x + 50), str(y + 100))
@@ -101,7 +101,7 @@ def test_notches_of_the_wheel_add_up(screen, open_mouse):
     assert reader.last.axes == (0.0, 0.0, -0.5)
 
 
-def test_the_wheel_returns_by_itself_once_it_was_told(screen):
+def test_wheel_returns_by_itself_after_it_was_read(screen):
     """Though the time is over before anybody asks."""
     device = DEVICES.make("mouse", {"wheel_return_s": 1e-6})
     device.open()
@@ -134,7 +134,7 @@ def test_closing_the_window_is_the_end(screen, reader):
     wait_until(lambda: not [each for each in screen.windows() if each.title == "mouse"], "its window has gone")
 
 
-def test_without_a_screen_it_says_what_to_set(monkeypatch):
+def test_missing_screen_is_reported_with_the_variable_to_set(monkeypatch):
     monkeypatch.delenv("DISPLAY")
     with pytest.raises(DeviceError, match="DISPLAY"):
         DEVICES.make("mouse", {}).open()

@@ -76,7 +76,7 @@ def test_mouse_moves_the_handle_and_the_force_is_an_arrow(screen, device):
     wait_until(closed, "the device says that its window was closed")
 
 
-def test_a_handle_that_returns_goes_back_when_it_is_let_go(screen, monkeypatch):
+def test_returning_handle_goes_back_when_released(screen, monkeypatch):
     monkeypatch.setenv("DISPLAY", screen.environment["DISPLAY"])
     device = VirtualDevice(VirtualConfig(returns=True))
     device.open()

@@ -32,7 +32,7 @@ CAMERA = {
 
 
 @pytest.mark.quick
-def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, start):
+def test_window_has_its_configured_view_and_content(ros, screen, start):
     target = np.array(CAMERA["cameraTargetPosition"])
     aside = target + [0.5, 0.2, 0.3]
     start(
@@ -68,7 +68,7 @@ def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, 
     assert np.abs(edges - 255 * np.array(BACKGROUND)).max() < 3  # no panels there
 
 
-def test_node_with_a_window_publishes_joint_states_and_images_and_ends_on_interrupt(ros, screen, start):
+def test_node_with_a_window_publishes_and_ends_on_interrupt(ros, screen, start):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     images = ros.listen("/rpbi/camera/colour/image", Image)
     place = ["0", "0", "3", "0", "0", "3.1416", "rpbi/world", "rpbi/eye"]
@@ -130,7 +130,7 @@ def test_a_world_that_its_window_slows_down_says_so_once(ros, start):
     "running",
     [pytest.param(True, id="running"), pytest.param(False, id="stopped", marks=pytest.mark.thorough)],
 )
-def test_closed_window_ends_the_node_with_one_line_and_exit_code_1(ros, screen, start, running):
+def test_closed_window_ends_the_node_with_one_line_and_code(ros, screen, start, running):
     node = start(
         setAdditionalSearchPath="pybullet_data_path",
         robots=[ros.write_yaml("iiwa.yaml", iiwa())],

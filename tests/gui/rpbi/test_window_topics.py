@@ -114,14 +114,14 @@ def test_taps_are_neither_lost_nor_doubled(screen, keys):
         assert [state for key, state in happened(keys) if key == ord(letter)] == [PRESSED, RELEASED]
 
 
-def test_keys_without_a_letter_have_pybullets_code_and_unknown_ones_are_left_out(screen, keys):
+def test_special_keys_have_pybullet_codes_and_unknown_keys_are_omitted(screen, keys):
     screen.run("xdotool", "key", "Tab")
     screen.run("xdotool", "key", "Left")
     wait_until(lambda: (LEFT_ARROW, RELEASED) in happened(keys), "the arrow key has come", SLOW_S)
     assert happened(keys) == [(LEFT_ARROW, PRESSED), (LEFT_ARROW, RELEASED)]
 
 
-def test_mouse_tells_where_it_moves_and_what_its_buttons_do(screen, place, mouse):
+def test_mouse_topic_reports_positions_and_buttons(screen, place, mouse):
     move(screen, place, 100, 70)
     mouse.wait_for(1, SLOW_S)
     for count, button in ((2, "mousedown"), (3, "mouseup")):
@@ -142,7 +142,7 @@ def test_mouse_tells_where_it_moves_and_what_its_buttons_do(screen, place, mouse
     assert [each.button_state_str for each in mouse.messages] == [each.button_state for each in mouse.messages]
 
 
-def test_camera_goes_where_it_is_sent_and_tells_where_the_mouse_has_turned_it(ros, screen, place):
+def test_camera_goes_where_it_is_sent_and_reports_mouse_turns(ros, screen, place):
     told = ros.listen("/rpbi/debug_visualizer_camera", ResetDebugVisualizerCamera)
     told.wait_for(1, SLOW_S)
     wanted = (2.5, 50.0, -30.0, 0.25, 0.0, 0.5)
@@ -190,7 +190,7 @@ def test_camera_that_makes_no_sense_is_refused_and_named(ros, place, values, com
     assert present_camera(ros) == before
 
 
-def test_images_show_what_the_window_shows(ros, screen, place):
+def test_images_show_the_content_of_the_window(ros, screen, place):
     with camera_orders() as publisher:
         publisher.publish(ResetDebugVisualizerCamera(*CAMERA.values()))
         wait_until(lambda: present_camera(ros)[0] == pytest.approx(2.0), "it looks from there", SLOW_S)

@@ -217,7 +217,7 @@ def grown(mask, by_px):
     return mask
 
 
-def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(shipped):
+def test_rviz_of_the_example_shows_the_cloud_without_complaints(shipped):
     panels, printed = shipped
     assert complaining_pixels(panels) < 10
     complaints = [line for line in printed.splitlines() if re.search(r"\[ *(WARN|ERROR|FATAL)\]", line)]
@@ -225,7 +225,7 @@ def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(ship
 
 
 @pytest.mark.thorough
-def test_robot_display_paints_the_arm_where_tf_says_and_nothing_else(show, bare, links):
+def test_robot_display_paints_the_arm_exactly_where_tf_has_it(show, bare, links):
     def is_shown(picture, view):
         arm = view.silhouette(np.concatenate(list(links.values())))
         return picture.shape == bare.shape and differs(picture, bare)[arm].mean() > 0.9
@@ -241,7 +241,7 @@ def test_robot_display_paints_the_arm_where_tf_says_and_nothing_else(show, bare,
 
 
 @pytest.mark.thorough
-def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cloud):
+def test_depth_display_paints_the_cameras_view_in_its_colours(show, bare, cloud):
     def is_shown(picture, view):
         covered = view.paint(*cloud, point_size())[1]
         return picture.shape == bare.shape and differs(picture, bare)[covered].mean() > 0.95
@@ -254,7 +254,7 @@ def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cl
 
 
 @pytest.mark.thorough
-def test_marker_display_paints_the_box_where_tf_says_on_a_floor_and_leaves_the_robot_out(show, bare, frames, links):
+def test_marker_display_paints_box_and_floor_without_the_robot(show, bare, frames, links):
     box = moved(cube_triangles() * BOX_SIZE_M, frames["rpbi/box"])
 
     def is_orange(picture):

@@ -112,7 +112,7 @@ def nothing() -> None:
     """Does nothing: the device is moved already."""
 
 
-def test_keys_move_the_arm_and_targets_are_recorded_on_both_sides_of_the_guard(example, screen, follows, tmp_path):
+def test_keys_move_the_arm_and_both_guard_sides_are_recorded(example, screen, follows, tmp_path):
     recorder = example.start(["rosrun", "episodes", "record_node.py", f"_folder:={tmp_path}", "_disk_reserve_mb:=1.0"])
     wait_until(lambda: example.call("/record/start", Trigger).success, "it is recorded")
     screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync")

@@ -120,7 +120,7 @@ def controls(module_ros, screen, tmp_path_factory):
     return Controls(module_ros, screen, tmp_path_factory.mktemp("controls"))
 
 
-def test_a_world_with_the_key_opens_it_and_without_a_display_it_ends(ros, tmp_path):
+def test_world_key_opens_the_window_and_missing_displays_end_it(ros, tmp_path):
     world = write_world(tmp_path, visual=(), controls={"robot_name": "iiwa"})
     launch = ros.start([sys.executable, str(CONSOLE), "launch", str(world), "rviz:=false"], DISPLAY=":12345")
     ended = wait_until(lambda: ENDED.search(ros.output(launch)), "the window has ended")
@@ -156,7 +156,7 @@ def test_start_step_and_stop(controls):
     wait_until(lambda: controls.text("tick") == "0", "the world is at its first tick")
 
 
-def test_the_pace_is_set_and_follows_what_others_set(controls):
+def test_real_time_factor_can_be_set_and_follows_other_clients(controls):
     controls.have_running()
     states = controls.system.listen("/rpbi/state", SimulationState)
     controls.type("factor", "0.5")
@@ -254,7 +254,7 @@ def test_buttons_of_a_controller_call_its_services(controls):
     wait_until(lambda: "mpc_step" not in controls.widgets, "the buttons go with the controller")
 
 
-def test_no_joint_state_is_lost_beside_the_window(controls):
+def test_window_causes_no_loss_of_joint_states(controls):
     controls.have_running()
     states = controls.system.listen("/rpbi/iiwa/joint_states", JointState)
     stamps = [message.header.stamp.to_nsec() for message in states.wait_for(2000)]

@@ -99,7 +99,7 @@ def window(module_ros: RosSystem, screen: Screen, tmp_path_factory: pytest.TempP
     wave.close()
 
 
-def test_a_topic_that_comes_later_is_drawn_as_it_was_sent(window: _Window) -> None:
+def test_topic_published_later_is_drawn_as_sent(window: _Window) -> None:
     wait_until(lambda: len(window.data().get(FIELD, ())) > HZ, "a second is drawn", every_s=0.2)
     line = window.data()[FIELD]
     np.testing.assert_allclose(line, [_value(time_s) for time_s in line.index], atol=1e-6)
@@ -173,7 +173,7 @@ def test_it_ends_on_ctrl_c(window: _Window) -> None:
         ([], 2, "the following arguments are required: TOPIC/FIELD"),
     ],
 )
-def test_what_it_cannot_do_is_named_in_one_line(ros: RosSystem, words: list[str], code: int, message: str) -> None:
+def test_impossible_requests_are_named_in_one_line(ros: RosSystem, words: list[str], code: int, message: str) -> None:
     node = ros.start([find_executable("rpbi_utils", "live_plot"), *words], DISPLAY=":12345")
     assert node.wait(60.0) == code
     assert message in ros.output(node).splitlines()[-1]

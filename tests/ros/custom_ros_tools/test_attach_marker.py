@@ -36,7 +36,7 @@ def test_names_of_types_and_actions_are_constants_of_the_message():
 
 
 @pytest.mark.quick
-def test_marker_is_that_of_the_configuration(ros):
+def test_marker_equals_its_configuration(ros):
     start(ros, CUP)
     [marker] = ros.listen("/cup/marker", Marker).wait_for(1)[:1]
     assert (marker.header.frame_id, marker.type, marker.action) == ("table", Marker.CYLINDER, Marker.ADD)
@@ -49,7 +49,7 @@ def test_marker_is_that_of_the_configuration(ros):
     assert marker.header.stamp > rospy.Time(0)
 
 
-def test_pose_of_the_marker_is_broadcast_if_it_is_asked_for(ros):
+def test_marker_pose_is_broadcast_on_request(ros):
     start(ros, CUP)
     [transform] = ros.listen("/tf", TFMessage).wait_for(1)[0].transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ("table", "cup")
@@ -97,14 +97,14 @@ def test_wrong_configuration_is_named_and_ends_the_node(ros, config, told):
     assert told in ros.output(process) and "Traceback" not in ros.output(process)
 
 
-def test_without_a_configuration_it_says_what_is_missing(ros):
+def test_missing_configuration_is_named(ros):
     process = ros.start(["rosrun", "custom_ros_tools", "attach_marker"])
     assert process.wait(60.0) == 1
     for key in ("node", "type", "scale"):
         assert f"~config: {key}: missing" in ros.output(process)
 
 
-def test_marker_that_cannot_be_seen_is_told(ros):
+def test_invisible_marker_is_reported(ros):
     process = start(ros, {**CUP, "type": "line_strip"})
     [marker] = ros.listen("/cup/marker", Marker).wait_for(1)[:1]
     assert marker.type == Marker.LINE_STRIP

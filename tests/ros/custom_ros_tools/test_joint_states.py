@@ -59,7 +59,7 @@ def test_state_that_does_not_come_in_time_is_an_error(ros):
         get_joint_state("/silent", timeout=0.05)
 
 
-def test_newest_state_is_kept_in_order_and_handed_to_the_callback(topic):
+def test_newest_state_is_kept_in_order_and_passed_to_callbacks(topic):
     called = []
     heard = JointStateSubscriber(topic.resolved_name, ["c", "a"], callback=called.append)
     assert (heard.received(), heard.recieved(), heard.get(), heard.get_position()) == (False, False, None, None)
@@ -83,7 +83,7 @@ def test_faulty_states_are_named_and_the_last_sound_one_stays(ros, topic):
     np.testing.assert_array_equal(heard.get_position(), [1.0])
 
 
-def test_what_is_published_carries_names_stamp_and_only_what_is_given(ros):
+def test_published_state_has_names_stamp_and_only_the_given_values(ros):
     publisher = JointStatePublisher("/published", ["a", "b"])
     heard = ros.listen("/published", JointState)
     wait_until(publisher.get_num_connections, "somebody listens")

@@ -24,7 +24,7 @@ NEW = {("publishes", "/new"), ("serves", "/new_too")} | OWN
 
 
 @pytest.mark.parametrize("way", ["is killed", "hangs"])
-def test_what_is_opened_and_closed_while_the_master_is_away(ros, tmp_path, second_master, way):
+def test_changes_while_the_master_is_away_are_registered_later(ros, tmp_path, second_master, way):
     sign = tmp_path / "now"
     node = ros.start_program("busy_without_master.py", str(sign), **second_master.environment)
     wait_until(lambda: "ready" in ros.output(node), "the node is up")
@@ -51,7 +51,7 @@ def test_what_is_opened_and_closed_while_the_master_is_away(ros, tmp_path, secon
 
 
 @pytest.mark.quick
-def test_a_master_that_ends_while_a_node_starts_is_told_in_one_line(ros, second_master):
+def test_master_lost_at_the_start_of_a_node_is_reported(ros, second_master):
     node = ros.start_program("loses_its_master.py", str(second_master.process.pid), **second_master.environment)
     assert node.wait(60.0) == 1
     said = ros.output(node)

@@ -70,7 +70,7 @@ def test_without_a_configuration_all_positions_come_as_they_are(ros, start):
     ],
     ids=["missing joint", "not a number", "other quantity"],
 )
-def test_message_that_cannot_be_remapped_is_refused_and_the_topic_named(ros, start, message, told):
+def test_message_that_cannot_be_remapped_is_refused_with_its_topic(ros, start, message, told):
     rosout = Rosout(ros)
     start(ARRAY_NODE, config={"joint_names": ["b", "a"]}, start_on_init=True)
     numbers = ros.listen("joint_states/floatarray", Float64MultiArray)
@@ -102,7 +102,7 @@ def test_not_a_number_in_another_quantity_does_not_matter(ros, start):
         ),
     ],
 )
-def test_either_name_of_the_service_switches_it_and_what_it_is_already_is_refused(ros, start, executable, services):
+def test_both_service_names_switch_remapping_and_refuse_repetition(ros, start, executable, services):
     """Defect 52: clients of the release wait for names that it did not offer."""
     start(executable)
     for one, other in (services, services[::-1]):
@@ -113,7 +113,7 @@ def test_either_name_of_the_service_switches_it_and_what_it_is_already_is_refuse
 
 
 @pytest.mark.parametrize("executable", ["remap_joint_state", "remap_joint_state_to_joint_state"])
-def test_joint_states_pass_only_while_it_is_on_and_stay_as_they_are(ros, start, executable):
+def test_joint_states_pass_unchanged_only_while_remapping_is_on(ros, start, executable):
     start(executable)
     passed = ros.listen("joint_states/to", JointState)
     source = rospy.Publisher("joint_states/from", JointState, queue_size=10)

@@ -14,7 +14,7 @@ from custom_ros_tools.ros_comm import ToggleService, get_srv_handler, get_srv_ha
 
 
 @pytest.mark.quick
-def test_toggle_service_calls_the_right_handler_and_answers_what_it_returns(ros):
+def test_toggle_service_calls_its_handler_and_returns_the_answer(ros):
     service = ToggleService("/lamp", lambda: (True, "shines"), lambda: (False, "was dark"))
     for to, expected in ((True, (True, "shines")), (False, (False, "was dark"))):
         answer = ros.call("/lamp", SetBool, to)
@@ -22,7 +22,7 @@ def test_toggle_service_calls_the_right_handler_and_answers_what_it_returns(ros)
     service.shutdown()
 
 
-def test_handler_waits_for_its_service_and_says_so_after_a_while(ros, monkeypatch: pytest.MonkeyPatch):
+def test_handler_waits_for_its_service_and_reports_it(ros, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(service_proxies, "PATIENCE_S", 0.1)
     rosout = Rosout(ros, own=True)
     got: list[rospy.ServiceProxy] = []

@@ -12,7 +12,7 @@ from std_msgs.msg import Empty
 
 
 @pytest.mark.parametrize("interrupted", [True, False], ids=["both are interrupted", "the other node dies"])
-def test_a_service_whose_node_goes_is_told_unless_both_are_interrupted(ros, interrupted):
+def test_lost_service_node_is_reported_unless_both_are_interrupted(ros, interrupted):
     server, client = (ros.start_program("calls_a_service.py", role, role) for role in ("serve", "call"))
     wait_until(lambda: "asked" in ros.output(server), "the service is called")
     if interrupted:
@@ -37,7 +37,7 @@ def test_the_master_knows_nothing_of_a_node_that_has_ended(ros):
         master.lookupNode("/leaver")
 
 
-def test_a_node_goes_on_when_its_output_is_on_a_full_disk(ros):
+def test_node_continues_when_its_output_is_on_a_full_disk(ros):
     beats, logged = ros.listen("/beats", Empty), ros.listen("/rosout", Log)
     program = SUPPORT / "programs/warns_often.py"
     ros.start(["bash", "-c", f"exec {sys.executable} {program} > /dev/full 2>&1"], **support_on_path())

@@ -47,7 +47,7 @@ def xyzw(quat: Quaternion) -> tuple[float, float, float, float]:
 
 @pytest.mark.parametrize("executable", NAMES)
 @pytest.mark.parametrize("rotation", ["0 0 1.5707963267948966", "0 0 1 1"], ids=["angles", "quaternion"])
-def test_transform_of_the_arguments_is_told_with_new_stamps(ros, executable, rotation):
+def test_transform_of_the_arguments_is_published_with_new_stamps(ros, executable, rotation):
     start(ros, "1", "-2", "3", *rotation.split(), "world", "box", executable=executable)
     told = ros.listen("/tf", TFMessage).wait_for(20)
     assert xyz(of(told[0]).translation) == (1.0, -2.0, 3.0)
@@ -67,7 +67,7 @@ def test_service_replaces_the_transform(ros):
     assert xyzw(of(heard.messages[-1]).rotation) == pytest.approx(xyzw(QUARTER_TURN)), "its length is 1"
 
 
-def test_service_refuses_what_is_no_transform_and_tells_the_old_one_on(ros):
+def test_service_refuses_invalid_transforms_and_keeps_the_old_one(ros):
     start(ros, *"1 2 3 0 0 0 world box".split())
     heard = ros.listen("/tf", TFMessage)
     for transform, told in (
@@ -102,7 +102,7 @@ def test_arguments_that_roslaunch_adds_are_not_counted(ros, tmp_path, executable
     wait_until(lambda: heard.messages and of(heard.messages[-1]).translation.x == 7.0, "the new one is told")
 
 
-def test_rate_is_that_of_the_parameter(ros):
+def test_rate_equals_the_parameter(ros):
     rospy.set_param(f"/{NAMES[0]}/hz", 10)
     start(ros, *"0 0 0 0 0 0 world box".split())
     told = ros.listen("/tf", TFMessage).wait_for(21)
@@ -119,7 +119,7 @@ def clock(ros) -> Iterator[rospy.Publisher]:
 
 
 @pytest.mark.parametrize("stamp", [rospy.Time(0), rospy.Time(5, 0)], ids=["no clock", "clock stands still"])
-def test_who_comes_while_simulated_time_stands_still_hears_it_once(ros, clock, stamp):
+def test_late_listener_hears_once_while_simulated_time_is_paused(ros, clock, stamp):
     """Stamps that repeat would make each listener warn a hundred times a second."""
     if stamp:
         clock.publish(stamp)
@@ -134,7 +134,7 @@ def test_who_comes_while_simulated_time_stands_still_hears_it_once(ros, clock, s
     wait_until(lambda: stamp_of(late.messages[-1]) == rospy.Time(6, 0), "it goes on with the clock")
 
 
-def test_what_is_set_while_simulated_time_stands_still_reaches_who_comes(ros, clock):
+def test_transform_set_while_time_is_paused_reaches_late_listeners(ros, clock):
     clock.publish(rospy.Time(5, 0))
     start(ros, *"1 2 3 0 0 0 world box".split())
     assert ros.call("reset_tf", SetTransform, Transform(Vector3(4, 5, 6), QUARTER_TURN)).success

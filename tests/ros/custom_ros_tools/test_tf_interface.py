@@ -27,7 +27,7 @@ def tf(own_tf) -> TfInterface:
 
 
 @pytest.mark.quick
-def test_transform_that_is_told_can_be_asked_for(tf):
+def test_published_transform_can_be_looked_up(tf):
     tf.set_tf("world", "box", [1, 2, 3], [0, 0, 1, 1])
     position, quat = tf.wait_for_tf("world", "box", timeout=60)
     np.testing.assert_allclose(position, [1, 2, 3])
@@ -45,7 +45,7 @@ def test_three_numbers_are_roll_pitch_yaw(tf, orientation, in_deg):
     np.testing.assert_allclose(tf.wait_for_tf("world", "turned", 60)[1], [0, 0, HALF, HALF], atol=1e-12)
 
 
-def test_matrix_can_be_told(tf):
+def test_matrix_can_be_published(tf):
     tf.set_matrix("world", "matrix", MATRIX)
     np.testing.assert_allclose(tf.msg_to_matrix(tf.wait_for_tf_msg("world", "matrix", 60)), MATRIX, atol=1e-12)
 
@@ -60,7 +60,7 @@ def test_frame_that_is_not_there_is_none(tf):
 @pytest.mark.parametrize(
     "faulty", [([math.nan, 0, 0], (0, 0, 0, 1)), ([0, 0, 0], (0, 0, 0, 0)), ([0, 0], (0, 0, 0)), ([0, 0, 0], (0, 0))]
 )
-def test_what_is_no_transform_is_refused(tf, faulty):
+def test_invalid_transform_is_refused(tf, faulty):
     with pytest.raises(ValueError):
         tf.set_tf("world", "faulty", *faulty)
 
@@ -108,7 +108,7 @@ print(tf.wait_for_tf("world", "box", timeout=float("{timeout}")), flush=True)
 """
 
 
-def test_waiting_ends_in_time_though_simulated_time_stands_still(ros):
+def test_waiting_times_out_while_simulated_time_is_paused(ros):
     rospy.set_param("/use_sim_time", True)
     clock = rospy.Publisher("/clock", Clock, latch=True, queue_size=1)
     clock.publish(rospy.Time(5))

@@ -79,7 +79,7 @@ def test_rows_are_resampled_and_have_true_stamps_and_errors(rows, demos):
 
 
 @pytest.mark.parametrize("timing", ["next", "previous"])
-def test_actions_are_the_newest_targets_and_before_them_the_measured_positions(timing, rows, demos, tmp_path, run):
+def test_actions_are_the_newest_targets_after_initial_measured_positions(timing, rows, demos, tmp_path, run):
     """The default, next, has the target that was in force at the end of the row, which LeRobot records."""
     columns, _ = rows
     if timing == "previous":
@@ -214,7 +214,7 @@ def test_bad_episodes_are_named_and_the_others_exported(tmp_path, run, caplog):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "mcap", "out"]
 
 
-def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run, file_limit):
+def test_full_disk_is_named_and_complete_episodes_are_kept(demos, tmp_path, run, file_limit):
     code, text = run("export", demos.path, "--out", tmp_path / "none", "--disk-reserve-mb", "1e9")
     assert code == 1 and "MB free on the disk, less than the reserve" in text
     folder = EpisodeFolder(tmp_path / "demos")
@@ -247,7 +247,7 @@ def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run,
         ("mcap", export_steps, "write_episode", 2, "1"),
     ],
 )
-def test_an_episode_without_room_for_its_facts_is_taken_back(
+def test_episode_without_space_for_its_facts_is_removed(
     demos, tmp_path, run, monkeypatch, name, owner, step, nth, left_out
 ):
     calls, write = [], getattr(owner, step)

@@ -38,7 +38,7 @@ def plain(export):
     return export()[1]
 
 
-def test_deltas_are_targets_from_the_measured_positions_but_for_the_gripper(export, plain):
+def test_deltas_are_relative_to_measured_positions_except_for_the_gripper(export, plain):
     names, rows = export("--action", "deltas", "--gripper", "elbow")
     assert names["observation.state"] == ["shoulder", "wrist"] and names["observation.gripper"] == ["elbow"]
     assert names["action"] == ["shoulder", "wrist", "elbow"]
@@ -48,7 +48,7 @@ def test_deltas_are_targets_from_the_measured_positions_but_for_the_gripper(expo
     assert rows["action"][:, 2] == pytest.approx(plain["action"][:, 1]) and np.abs(changes[:, 0]).max() > 0.05
 
 
-def test_poses_of_the_end_effector_are_those_of_the_next_row(export):
+def test_end_effector_actions_are_poses_of_the_next_row(export):
     words = ("--end-effector", "box", "--gripper", "elbow", "--action", "pose")
     names, rows = export(*words)
     pose = ["x", "y", "z", "qx", "qy", "qz", "qw"]
@@ -84,7 +84,7 @@ def test_observations_can_be_selected(export):
         (("--max-time-error", "0.01"), "'observation.images.camera_colour': the nearest message is 0.0"),
     ],
 )
-def test_what_cannot_be_exported_is_named(demos, run, tmp_path, words, message):
+def test_impossible_exports_are_named(demos, run, tmp_path, words, message):
     code, text = run("export", demos.path, "--to", "robomimic", "--out", tmp_path / "out", *words)
     assert code == 1 and message in text, text
     assert not (tmp_path / "out").exists()

@@ -160,7 +160,7 @@ def test_an_episode_that_kills_its_workers_is_left_out(world, alone, run, tmp_pa
 
 
 @pytest.mark.parametrize("way", [pytest.param(signal.SIGINT, marks=pytest.mark.thorough), signal.SIGKILL])
-def test_a_farm_that_ends_early_goes_on_from_there(world, alone, run, tmp_path, way):
+def test_interrupted_farm_continues_from_its_episodes(world, alone, run, tmp_path, way):
     folder = tmp_path / "farm"
     farm = start(words(world, folder, jobs=2), tmp_path)
     wait_until(lambda: folder.is_dir() and len(digests(folder)) >= 2, "there are episodes")
@@ -226,7 +226,7 @@ def test_a_world_that_has_changed_is_refused(run, tmp_path):
         ("Steps", "Steps failed in act at tick 0 with the seed (0, 1): ValueError: expected a policy that neither"),
     ],
 )
-def test_a_policy_that_fails_is_named_and_its_episode_not_written(world, tmp_path, policy, fault):
+def test_failing_policy_is_named_and_its_episode_not_written(world, tmp_path, policy, fault):
     maker = EpisodeMaker(Farm(world, f"farm_policies:{policy}", ticks=50).job)
     folder = EpisodeFolder(tmp_path)
     outcomes = [maker.make(folder, number) for number in (1, 2)]
@@ -235,7 +235,7 @@ def test_a_policy_that_fails_is_named_and_its_episode_not_written(world, tmp_pat
     assert folder.numbers() == [2] and folder.partial() == []
 
 
-def test_a_farm_goes_on_after_a_policy_that_fails(world, run, tmp_path):
+def test_farm_continues_after_a_failing_policy(world, run, tmp_path):
     code, text = run(*words(world, tmp_path, "Raises", 4, ticks=50))
     assert code == 1 and f"2 of 4 episodes are in {tmp_path}; new: 2 timeout" in text, text
     for number in (0, 1):
@@ -244,7 +244,7 @@ def test_a_farm_goes_on_after_a_policy_that_fails(world, run, tmp_path):
     assert "KeyError: 'gripper'" in (tmp_path / LOG).read_text(), "with its traceback"
 
 
-def test_what_cannot_be_started_is_named(world, run, tmp_path):
+def test_farm_that_cannot_start_is_named(world, run, tmp_path):
     code, text = run(*words(world, tmp_path, "Slidd"))
     assert code == 1 and "--policy: policy 'farm_policies:Slidd': 'farm_policies' has no 'Slidd'; did you mean" in text
     code, text = run(*words(world, tmp_path, policy="FAULTY"))

@@ -63,6 +63,6 @@ def test_hostile_folders_are_taken_or_refused_in_words(tmp_path: Path) -> None:
     assert all(int(row[2]) for row in rows), "some are taken"
 
 
-def test_the_trial_notices_what_none_may_do(tmp_path: Path) -> None:
+def test_trial_detects_each_forbidden_effect(tmp_path: Path) -> None:
     done = _run("-c", CONTROL, str(ROOT), folder=tmp_path)
     assert done.stdout.split() == ["outside", "outside", "outside", "code", "traceback", "taken"], done.stderr

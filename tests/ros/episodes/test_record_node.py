@@ -108,7 +108,7 @@ def _answer(answer: Any) -> str:
 
 
 @pytest.mark.quick
-def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: Any, tmp_path: Path) -> None:
+def test_episodes_are_recorded_listed_verified_and_changed_files_named(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path, seeds="3")
     folder = session.folder
     session.move(0.3)  # the first episode; a start is refused meanwhile
@@ -162,7 +162,7 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
 
 
 @pytest.mark.thorough
-def test_the_session_of_the_page_with_resets_keys_and_buttons_and_a_changed_urdf(
+def test_session_of_the_page_works_with_resets_keys_and_buttons(
     ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -232,7 +232,7 @@ def test_a_second_recorder_leaves_the_running_episode_alone(ros: Any, tmp_path: 
     assert "expected a label of at most" in ros.call("/second/label", SetString, "x" * 101).message
 
 
-def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_path: Path) -> None:
+def test_node_repairs_partial_episodes_and_names_a_full_disk(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path)
     session.move(0.2)
     recorder, (part,) = _recorder_pid(session.folder), session.folder.partial()

@@ -227,7 +227,7 @@ def test_links_that_are_not_on_tf_follow_from_joint_states(page: _Page) -> None:
     assert np.ptp(tips, axis=0).max() > 0.5 and (steps > 0.005).sum() > 5
 
 
-def test_what_comes_and_goes_is_shown_while_it_is_there(page: _Page, tables: dict[str, Any]) -> None:
+def test_object_is_shown_only_while_it_is_present(page: _Page, tables: dict[str, Any]) -> None:
     on_tf = tables["/tf"].query("child == 'rpbi/ball'").index - tables["/rpbi/state"].index[0]
     assert not page.is_visible("/ball/link0", 0.0) and not page.is_visible("/ball/link0", page.seconds)
     seen = [at_s for at_s in np.arange(0.0, page.seconds, 0.02) if page.is_visible("/ball/link0", at_s)]
@@ -244,7 +244,7 @@ def test_first_view_shows_all_links_from_above_the_floor(episode: EpisodeFolder)
     assert len(names) > 18 and {name: count for name, count in zip(names, pixels) if count < 10} == {}
 
 
-def test_first_view_is_that_of_the_world_if_it_has_one() -> None:
+def test_first_view_follows_the_camera_of_the_world() -> None:
     own = ResetDebugVisualizerCamera(cameraDistance=2.0, cameraPitch=-90.0, cameraTargetPosition=(1.0, 2.0, 0.0))
     position, target = first_view(own, [], {})
     np.testing.assert_allclose([position, target], [[1.0, 2.0, 2.0], [1.0, 2.0, 0.0]], atol=1e-9)
@@ -287,7 +287,7 @@ def test_a_bag_by_itself_with_a_soft_body(tmp_path: Path) -> None:
     assert _Page(tmp_path / "soft.html").plots["panels"] == []
 
 
-def test_what_cannot_be_shown_is_named_in_one_line(episode: EpisodeFolder, tmp_path: Path) -> None:
+def test_impossible_views_are_named_in_one_line(episode: EpisodeFolder, tmp_path: Path) -> None:
     empty = tmp_path / "empty.bag"
     with rosbag.Bag(str(empty), "w") as bag:
         bag.write("/text", String("a"), Time(1))

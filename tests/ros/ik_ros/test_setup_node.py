@@ -85,7 +85,7 @@ def test_target_start_tolerances_and_previous_solutions_come_together(ros, targe
     assert rospy.get_param("ik_ros/interface") == "kdl"
 
 
-def test_nothing_is_published_before_there_is_a_target_or_when_its_tf_stops(ros, target):
+def test_no_problem_is_published_without_current_tf_of_a_target(ros, target):
     rosout = Rosout(ros)
     start_setup(ros, **FRAMES, tf_timeout_s=0.2)
     problems = ros.listen("ik", IKProblem)
@@ -110,7 +110,7 @@ def test_nothing_is_published_before_the_first_start(ros):
     assert problems.messages[0].start.position == pytest.approx(HOME)
 
 
-def test_target_that_is_absurdly_far_away_is_refused_and_the_next_one_taken(ros, target):
+def test_absurdly_distant_target_is_refused_and_the_next_accepted(ros, target):
     rosout = Rosout(ros)
     start_setup(ros, **FRAMES)
     problems = ros.listen("ik", IKProblem)

@@ -66,7 +66,7 @@ def test_problems_become_targets_that_reach(ros, solver):
 
 
 @pytest.mark.quick
-def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros):
+def test_problems_of_the_release_work_by_topic_and_service(ros):
     start_solver(ros, "trac_ik", timeout=5.0)
     targets = ros.listen("joint_states/target", JointState)
     pose = forward(BENT)
@@ -99,7 +99,7 @@ def test_service_answers_whether_the_node_is_on_or_off(ros):
     assert list(ros.call("ik/solver/kdl/joint_names", JointNames).joint_names) == JOINTS
 
 
-def test_global_solver_tells_alternatives_that_reach_too(ros):
+def test_global_solver_returns_reaching_alternatives(ros):
     start_solver(ros, "global", start_on_init=False)
     answer = ros.call("ik/solver/global/solve", SolveIK, problem(BENT))
     assert answer.success and len(answer.alternatives) >= 1
@@ -141,7 +141,7 @@ def test_poses_of_other_frames_are_turned_into_the_base(ros):
     assert not refused.success and "'nowhere'" in refused.message and "'foot'" in refused.message
 
 
-def test_continuity_holds_the_velocities_of_the_joints_and_the_target_when_it_is_out_of_reach(ros):
+def test_continuity_obeys_joint_velocities_and_holds_unreachable_targets(ros):
     start_solver(ros, continuity={"max_velocity": 0.5, "hold": True})
     targets = ros.listen("joint_states/target", JointState)
     solutions = ros.listen("ik/solution", IKSolution)
@@ -163,7 +163,7 @@ def test_continuity_holds_the_velocities_of_the_joints_and_the_target_when_it_is
     assert any("of the way there" in solution.message for solution in solutions.messages)
 
 
-def test_targets_start_where_the_robot_is_though_nobody_listened_to_the_first_ones(ros):
+def test_targets_start_at_the_robot_despite_earlier_unheard_ones(ros):
     """A guard that starts late would halt at a target that is away from the robot."""
     start_solver(ros, continuity={"max_velocity": 0.5, "hold": True})
     asked = problem_at(np.add(HOME, 0.4))
@@ -211,7 +211,7 @@ def test_wrong_parameters_end_it_with_1_and_their_names(ros, solver, parameters,
     assert "Traceback" not in output
 
 
-def test_without_a_solver_it_tells_which_there_are(ros):
+def test_missing_solver_argument_is_answered_with_known_names(ros):
     process = ros.start(["rosrun", "ik_ros", "ik_solver_node.py"])
     assert process.wait(60.0) == 2
     assert "kdl" in ros.output(process) and "trac_ik" in ros.output(process)
@@ -232,7 +232,7 @@ def lazy_lab(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_switched_off_it_tells_nothing_more_of_what_it_is_about(ros, lazy_lab):
+def test_switched_off_solver_publishes_no_result_of_its_running_problem(ros, lazy_lab):
     begun, over = lazy_lab / "begun", lazy_lab / "over"
     parameters = {"position": 0.25, "begun": str(begun), "over": str(over), "start_on_init": True}
     start_node(ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", **parameters)

@@ -21,7 +21,7 @@ def kdl(module_ros):
     return start_solver(module_ros)
 
 
-def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ros, kdl):
+def test_unsolvable_problem_is_reported_with_reason_and_moves_nothing(ros, kdl):
     rosout = Rosout(ros)
     targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
     with publishing("ik", IKProblem) as ik:
@@ -47,7 +47,7 @@ def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ro
     ],
     ids=["no target", "not a number", "no rotation", "unknown joint", "too few", "no names", "negative tolerance"],
 )
-def test_problem_that_makes_no_sense_is_refused_and_the_next_one_solved(ros, kdl, wrong, told):
+def test_invalid_problem_is_refused_and_the_next_one_solved(ros, kdl, wrong, told):
     targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
     with publishing("ik", IKProblem) as ik:
         solution = send_until(ik, wrong, solutions)
@@ -63,7 +63,7 @@ def test_messages_of_another_type_are_refused_and_the_types_named(ros, kdl):
     assert "sensor_msgs/JointState" in rosout.logs("ik_ros/IKProblem or")[0].msg
 
 
-def test_targets_go_on_from_the_last_one_when_problems_have_no_start(ros, kdl):
+def test_targets_continue_from_the_last_one_without_a_start(ros, kdl):
     targets = ros.listen("joint_states/target", JointState)
     with publishing("ik", IKProblem) as ik:
         send_until(ik, problem(BENT, start=start_at(BENT)), targets)

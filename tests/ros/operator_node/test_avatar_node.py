@@ -66,7 +66,7 @@ def follow(ros, hinges, position, condition, what):
     wait_until(is_so, what, every_s=0.0)
 
 
-def test_what_it_carries_is_felt_by_its_forearm(avatar):
+def test_carried_load_is_measured_at_the_forearm(avatar):
     forces = avatar.listen("avatar/segment_forces", SegmentForces)
 
     def carries() -> bool:
@@ -81,7 +81,7 @@ def test_what_it_carries_is_felt_by_its_forearm(avatar):
     assert not any(newest.forces[n].z or newest.sums[n] or newest.largest[n] for n in others)
 
 
-def test_a_squeeze_is_the_sum_of_magnitudes_and_no_force_as_a_vector(avatar):
+def test_squeeze_sums_magnitudes_and_cancels_as_a_vector(avatar):
     forces = avatar.listen("avatar/segment_forces", SegmentForces)
     own = ContactPoint(link="Head", other_body="human", normal=Vector3(1, 0, 0), normal_force=9.0)
     squeeze = [
@@ -102,7 +102,7 @@ def test_a_squeeze_is_the_sum_of_magnitudes_and_no_force_as_a_vector(avatar):
     assert squeezed.forces[hand] == Vector3(0.0, 0.0, 0.0)
 
 
-def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar, own_tf):
+def test_avatar_follows_the_person_without_jumps(avatar, own_tf):
     states = avatar.listen("rpbi/human/joint_states", JointState)
     targets = avatar.listen("rpbi/human/joint_states/target", JointState)
     place = (0.3, 0.2, 0.93)
@@ -123,7 +123,7 @@ def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar, own_tf):
     assert ahead.max() < 2e-3, "no target is further away than the time since the one before it allows"
 
 
-def test_silence_is_told_and_the_pose_is_held_until_it_goes_on(avatar):
+def test_silence_is_reported_and_the_pose_held_until_messages_return(avatar):
     log = Rosout(avatar)
     targets = avatar.listen("rpbi/human/joint_states/target", JointState)
     follow(avatar, {HINGE: 1.2}, (0.3, 0.2, 0.93), lambda: targets.messages, "it follows")
@@ -133,7 +133,7 @@ def test_silence_is_told_and_the_pose_is_held_until_it_goes_on(avatar):
     assert avatar.call("avatar/engage", Trigger).success
 
 
-def test_what_makes_no_sense_is_refused_and_named(avatar):
+def test_invalid_messages_are_refused_and_named(avatar):
     log = Rosout(avatar)
     wrong = message({})
     wrong.poses[6].position.x = math.nan

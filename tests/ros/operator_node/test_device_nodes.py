@@ -68,7 +68,7 @@ def _moved(daemon: SpacenavDaemon, joy) -> bool:
     return any(any(message.axes) for message in joy.messages)
 
 
-def test_daemon_that_dies_in_the_middle_of_a_motion_leaves_it_at_rest(ros, tmp_path):
+def test_daemon_killed_during_a_motion_leaves_the_axes_at_rest(ros, tmp_path):
     """And one that comes back is taken up; the emulator for users moves each axis in turn."""
     path = str(tmp_path / "spnav.sock")
     command = ["rosrun", "operator_node", "spacenavd_emulator.py", "--socket", path]

@@ -57,7 +57,7 @@ def haply():
     emulator.stop()
 
 
-def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stops(ros, haply):
+def test_haply_moves_a_frame_and_forces_end_with_the_simulator(ros, haply):
     force, pose, joy = (
         ros.listen(topic, kind)
         for topic, kind in (("/haptics/force", WrenchStamped), ("/haptics/pose", PoseStamped), ("/joy", Joy))
@@ -94,7 +94,7 @@ def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stop
     assert all(math.hypot(f.x, f.y, f.z) <= 8.0 for f in (each.wrench.force for each in force.messages))
 
 
-def test_a_haply_that_hangs_up_is_back_by_itself_and_nothing_jumps(ros):
+def test_disconnected_haply_returns_by_itself_without_a_jump(ros):
     emulator = HaplyEmulator(lambda time_s: DOWN)
     emulator.start()
     _, state = start_haptic_node(ros, "haply", {"url": f"ws://localhost:{emulator.port}"})
@@ -122,7 +122,7 @@ def loop_of(node: subprocess.Popen) -> int:
     return int(subprocess.check_output(["pgrep", "-P", str(node.pid), "-f", "operator_node.haptics.process"]))
 
 
-def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros):
+def test_touch_receives_zero_when_the_simulator_or_node_ends(ros):
     """The driver holds the last force for ever, so that silence on our side would not do."""
     rospy.set_param("/touch_emulator", {"depth": 0.03})
     ros.start(["rosrun", "operator_node", "touch_emulator.py"])
@@ -143,7 +143,7 @@ def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros)
     wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
 
 
-def test_touch_is_sent_zero_by_the_node_when_the_loop_is_killed_and_by_the_loop_when_the_node_is(ros):
+def test_touch_receives_zero_when_either_loop_or_node_is_killed(ros):
     rospy.set_param("/touch_emulator", {"depth": 0.03})
     ros.start(["rosrun", "operator_node", "touch_emulator.py"])
     felt, sent = ros.listen("/phantom/felt", Vector3), ros.listen("/phantom/force_feedback", OmniFeedback)
@@ -209,7 +209,7 @@ def is_open(device: TouchDevice) -> bool:
     return True
 
 
-def test_switched_off_there_is_no_device_and_wrong_forces_are_refused(ros):
+def test_switched_off_node_has_no_device_and_refuses_wrong_forces(ros):
     options = {"depth_m": 0.02, "wait_s": 30.0}
     process, state = start_haptic_node(ros, "scripted", options, energy_allowance_j=0.1, energy_refill_w=0.1)
     force = ros.listen("/haptics/force", WrenchStamped)

@@ -14,7 +14,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerI
 TARGET = Pose(Point(0.3, -0.2, 0.5), Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)))
 
 
-def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
+def test_frame_dragged_in_rviz_is_broadcast_at_its_handles(ros):
     """Under the name that it had in ik_ros."""
     parameters = {"parent_frame_id": "foot", "child_frame_id": "dragged", "position": [0.1, 0.2, 0.3]}
     rospy.set_param("/interactive_target_node", parameters)

@@ -96,7 +96,7 @@ class TestScaleNode:
         assert [any(each) for each in data(signals)[:said]].count(False) == 1, "one zero signal"
         assert data(signals)[said] == (0.5, 0.0), "what came while it was off counts for nothing"
 
-    def test_message_that_cannot_be_mapped_is_refused_and_ends_the_signal(self, ros, joy, signals):
+    def test_message_that_cannot_be_mapped_is_refused_with_zero_signal(self, ros, joy, signals):
         rosout = Rosout(ros)
         told = "/joy: message refused: expected at least 2 axes (axes_idx has 1), got 1"
         for axes in ([1.0], [1.0, math.nan]):
@@ -112,7 +112,7 @@ class TestScaleNode:
         assert rosout.is_throttled("message refused"), "one warning in 5 s, of 40 messages"
 
 
-def test_device_that_tells_changes_only_counts_until_its_node_has_gone(ros, signals):
+def test_device_that_reports_only_changes_counts_until_its_node_ends(ros, signals):
     """By default nothing times out; a node that is killed is noticed all the same."""
     start(ros, "isometric_node.py", config={"axes_idx": [0, 1], "scale": 0.5}, start_on_init=True)
     device = ros.start(["rostopic", "pub", "-l", "/joy", "sensor_msgs/Joy", "{axes: [1.0, 1.0]}"])
@@ -124,7 +124,7 @@ def test_device_that_tells_changes_only_counts_until_its_node_has_gone(ros, sign
     assert zeros(signals) == 1
 
 
-def test_bad_configuration_ends_the_node_with_what_is_wrong(ros):
+def test_bad_configuration_ends_the_node_with_its_faults(ros):
     rospy.set_param("/operator_node", {"config": {"axes_idx": [0, -1], "scale": "fast"}})
     process = ros.start(["rosrun", "operator_node", "isometric_node.py"])
     assert process.wait(60.0) == 1
@@ -133,7 +133,7 @@ def test_bad_configuration_ends_the_node_with_what_is_wrong(ros):
     assert "Traceback" not in ros.output(process)
 
 
-def test_mapping_of_another_package_and_a_node_that_ends_leaves_a_zero_signal(ros, signals):
+def test_ending_node_with_an_own_mapping_leaves_a_zero_signal(ros, signals):
     node = start(ros, "mapping_node.py", "cubed:Cubed", config={"axes_idx": [0]})
     assert switch(ros, True)[0]
     with publishing("joy", Joy) as joy:
@@ -143,7 +143,7 @@ def test_mapping_of_another_package_and_a_node_that_ends_leaves_a_zero_signal(ro
         wait_until(lambda: zeros(signals) == 2, "it says zero")
 
 
-def test_operator_node_of_a_user_in_the_manner_of_the_release(ros, signals):
+def test_own_operator_node_works_as_in_the_release(ros, signals):
     rosout = Rosout(ros)
     rospy.set_param("/operator_node", {"config": {"gain": 2.0}, "start_on_init": True})
     node = ros.start_program("polar_node.py")

@@ -87,7 +87,7 @@ def sender(node):
 
 
 @pytest.mark.quick
-def test_frames_become_tf_poses_and_joy_until_the_stream_falls_silent(module_ros, topics, sender):
+def test_frames_become_tf_poses_and_joy_until_the_stream_ends(module_ros, topics, sender):
     tf, poses, joy = (topics[name] for name in ("/tf", "/mvn/segments", "/joy"))
     for sample in itertools.count(150, 6):  # hands count anew after each silence, also of a machine that stands still
         before = len(poses.messages)

@@ -58,7 +58,7 @@ def held(signal: rospy.Publisher, values: list[float], condition: Any, what: str
 
 
 @pytest.mark.quick
-def test_frame_moves_while_a_signal_comes_and_stops_when_it_ceases(ros):
+def test_frame_moves_only_while_a_signal_is_received(ros):
     rosout = Rosout(ros)
     frame = start(ros, timeout_s=0.2)
     wait_until(lambda: frame.positions, "it is broadcast where it starts")
@@ -73,7 +73,7 @@ def test_frame_moves_while_a_signal_comes_and_stops_when_it_ceases(ros):
         assert frame.positions[-1][0] == x
 
 
-def test_it_stops_when_the_operator_node_has_gone_also_without_a_time_out(ros):
+def test_frame_stops_when_the_operator_node_ends_without_timeout(ros):
     frame = start(ros, timeout_s=0.0)
     with publishing("operator_node/signal", Float64MultiArray) as signal:
         wait_until(lambda: frame.positions, "it is broadcast")

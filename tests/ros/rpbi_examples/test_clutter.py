@@ -24,7 +24,7 @@ def example(ros_master, tmp_path):
         system.close()
 
 
-def test_things_fall_on_the_table_and_are_in_image_and_cloud(example):
+def test_objects_fall_on_the_table_and_appear_in_the_cloud(example):
     moving = example.listen("/tf", TFMessage)
 
     def heights() -> dict[str, list[float]]:

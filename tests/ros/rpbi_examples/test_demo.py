@@ -68,7 +68,7 @@ def test_its_recording_runs_again(demo):
     assert re.fullmatch(r"\d+ states agree over \d{4,} ticks\n", done.stdout)
 
 
-def test_the_table_has_all_joints_by_name_and_all_move_from_rest(demo):
+def test_table_has_all_joints_by_name_moving_from_rest(demo):
     out, _ = demo
     table = pd.read_parquet(out / "joint_states.parquet", engine="fastparquet")
     for joint in JOINTS:
@@ -109,7 +109,7 @@ def test_bad_arguments_are_named(command, capsys):
     assert "--seconds: expected 2 to 3600, got 0" in capsys.readouterr().err
 
 
-def test_a_place_that_cannot_be_written_is_told_in_one_line(command, capsys):
+def test_unwritable_folder_is_reported_in_one_line(command, capsys):
     assert command.run(["--out", "/proc/x"]) == 1
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith("demo: ") and "'/proc/x'" in line

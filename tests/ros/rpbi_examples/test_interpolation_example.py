@@ -82,7 +82,7 @@ def test_the_tip_is_at_the_balls_at_their_times(example):
     assert min(away) > 3.0 * NEAR_M, "it is not there all the time"
 
 
-def test_samples_are_100_a_second_of_the_world_whatever_its_speed(example):
+def test_samples_are_100_per_simulated_second_at_any_speed(example):
     stamps, _ = example[1].of(TARGET)
     steps = np.diff(stamps[stamps < stamps[0] + 14.0]) / 0.01
     assert steps == pytest.approx(np.round(steps), abs=1e-4), (
@@ -98,7 +98,7 @@ def test_the_picture_shows_three_plots(example: tuple[RosSystem, Paths, Rosout, 
     assert thirds.min() > 50
 
 
-def test_it_goes_on_with_new_waypoints_and_changes_its_mind_on_the_way(example):
+def test_new_waypoints_continue_and_replace_the_current_motion(example):
     """A second motion, wrong waypoints in the middle of it, and a third motion that replaces the rest of it."""
     _, paths, rosout, _ = example
     here = np.array(VISITS[-1].position)

@@ -95,7 +95,7 @@ def test_robot_state_publisher_supplies_the_links_once(example):
 
 
 @pytest.mark.thorough
-def test_the_box_in_its_way_is_pushed_along(example, states):
+def test_base_pushes_the_box_along(example, states):
     transforms = example.listen("/tf", TFMessage)
 
     def box_x():

@@ -12,7 +12,7 @@ from tries import tries
 from workplace import Port
 
 
-def test_a_person_stands_in_a_t_pose_and_then_walks(ros):
+def test_person_begins_in_a_t_pose_and_then_walks(ros):
     port = Port()
     poses = ros.listen("/mvn/segments", PoseArray)
     options = ["headless:=true", "people:=2", "speed:=0.6", f"port:={port.number}"]

@@ -81,7 +81,7 @@ def places(ros):
 
 
 @pytest.mark.thorough
-def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder):
+def test_two_worlds_of_one_file_share_a_master_without_conflict(ros, folder):
     left = launch(ros, folder, f"{RPBI} --ns left")
     more = {"use_sim_time": "false", "real_time_factor": 0.5}
     right = launch(ros, folder, ROSLAUNCH, ns="right", tf_prefix="right", **more)
@@ -108,7 +108,7 @@ def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder)
     assert "/rpbi/status" not in [name for name, _ in rospy.get_published_topics()]
 
 
-def test_a_world_that_cannot_be_built_ends_the_launch_with_all_that_is_wrong(ros, folder):
+def test_world_that_cannot_be_built_ends_the_launch_with_reasons(ros, folder):
     (folder / "cup.yaml").write_text("name: cup\n")
     process = launch(ros, folder, RPBI)
     process.wait(120.0)

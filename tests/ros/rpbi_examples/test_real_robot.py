@@ -37,7 +37,7 @@ def test_an_example_leads_a_real_robot(ros: RosSystem, example: str, tmp_path: P
     real.wait_until_moved()
 
 
-def test_the_real_robot_follows_the_simulated_one_and_a_jump_stops_it_until_it_is_recovered(ros: RosSystem) -> None:
+def test_real_robot_follows_and_a_jump_stops_it_until_recovery(ros: RosSystem) -> None:
     """The guard smooths what trembles, and refuses what jumps; behind it a jump is a reflex.
 
     Its driver counts in degrees, names joints A1 to A7, and takes joint states or bare numbers."""

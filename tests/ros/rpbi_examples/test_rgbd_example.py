@@ -42,7 +42,7 @@ def _pose(transform):
     return Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))
 
 
-def test_ball_flies_boxes_come_and_go_and_the_camera_sees_the_ball_where_tf_has_it(example):
+def test_camera_sees_the_flying_ball_where_tf_has_it(example):
     name, system = example
     moving = system.listen("/tf", TFMessage)
     box_heights = lambda: [pose.position[2] for pose in poses(moving, "rpbi/box").values()]  # noqa: E731

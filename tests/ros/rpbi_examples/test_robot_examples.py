@@ -63,7 +63,7 @@ def position(ros) -> Callable[[str], tuple[float, float, float] | None]:
 
 
 @pytest.mark.thorough
-def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ros, position):
+def test_two_guarded_hands_draw_mirrored_circles(ros, position):
     statuses = ros.listen("/robot_safety/status", Status)
     launch(ros, "basic_example_dual_iiwa", real_time_factor=2)
     hands = {1.0: "rpbi/left/lbr_iiwa_link_7", -1.0: "rpbi/right/lbr_iiwa_link_7"}
@@ -107,7 +107,7 @@ def test_two_hands_draw_mirrored_circles_behind_a_guard_that_keeps_them_apart(ro
 
 
 @pytest.mark.thorough
-def test_panda_works_the_ros_way_and_leads_a_real_one(ros, position):
+def test_panda_works_with_ros_tools_and_leads_a_real_one(ros, position):
     real = RealRobot(ros)
     launch(ros, "basic_example_panda", move="false", real_robot="true")
     wait_until(lambda: position("rpbi/panda/panda_hand"), "robot_state_publisher tells where the hand is")
@@ -151,7 +151,7 @@ def test_joints_of_a_robot_swing_in_turn(ros, robot):
 
 
 @pytest.mark.quick
-def test_kuka_holds_still_until_it_is_told_to_move(ros):
+def test_kuka_is_at_rest_until_commanded(ros):
     launch(ros, "run_kuka")
     states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
     home = states.wait_for(200)[0].position
@@ -161,7 +161,7 @@ def test_kuka_holds_still_until_it_is_told_to_move(ros):
     assert answer.success, answer.message
 
 
-def test_still_scene_stands_still_with_the_tool_at_the_whiteboard(ros, position):
+def test_still_scene_keeps_the_tool_at_the_whiteboard(ros, position):
     launch(ros, "run_pose_kuka_lwr")
     states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
     start = states.wait_for(1)[0].position
@@ -174,7 +174,7 @@ def test_still_scene_stands_still_with_the_tool_at_the_whiteboard(ros, position)
     assert position(cup) == pytest.approx((0.05, 0.70, 0.501), abs=2e-3)
 
 
-def test_twin_shows_a_metre_beside_what_the_arm_does(ros, position):
+def test_twin_shows_the_arms_motion_a_metre_to_the_side(ros, position):
     launch(ros, "visual_robot")
     arm, twin = "rpbi/kuka_lwr/lwr_arm_7_link", "rpbi/twin/lwr_arm_7_link"
     start = wait_until(lambda: position(arm) and position(twin), "their frames are on TF")

@@ -31,7 +31,7 @@ BAD = (
 )
 
 
-def test_bad_messages_are_refused_by_name_and_the_node_goes_on(ros):
+def test_bad_messages_are_refused_by_name_and_the_node_continues(ros):
     rosout = Rosout(ros)
     process = ros.start(["rosrun", "rpbi_examples", "telepresence_node.py"])
     rosout.wait_to_hear("/telepresence")
@@ -54,7 +54,7 @@ def test_bad_messages_are_refused_by_name_and_the_node_goes_on(ros):
 
 
 @pytest.mark.thorough
-def test_a_person_is_dressed_from_datagrams_of_a_suit_to_the_outcome(ros, tmp_path):
+def test_person_is_dressed_from_suit_datagrams_to_the_outcome(ros, tmp_path):
     """Faster than people would like, so that the test is short; a slow simulator is a slow robot."""
     out = tmp_path / "outcome.json"
     arguments = ["headless:=true", "speed:=0.35", f"out:={out}", f"port:={Port().number}"]

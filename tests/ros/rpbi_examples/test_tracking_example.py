@@ -28,7 +28,7 @@ def frames(tf, parent, child, since_s=0.0):
 
 
 @pytest.mark.quick
-def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not(ros):
+def test_twin_follows_a_box_seen_by_vicon_else_drops_it(ros):
     ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true"])
     tf = ros.listen("/tf", TFMessage)
     vicon = ros.listen("/lab/vicon/box/box", TransformStamped)
@@ -56,7 +56,7 @@ def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not
 
 
 @pytest.mark.thorough
-def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
+def test_twin_follows_the_tag_detected_by_a_camera(ros):
     ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true", "tracker:=april_tags"])
     tf = ros.listen("/tf", TFMessage)
     seen = ros.listen("/lab/tag_detections", AprilTagDetectionArray)
@@ -71,7 +71,7 @@ def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
 
 
 @pytest.mark.thorough
-def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
+def test_twin_follows_the_tag_found_in_images(ros):
     """Beside the camera there is Vicon, whose poses are the simulator's but for 0.5 mm and 3 mrad."""
     arguments = ("headless:=true", "tracker:=april_tags", "images:=true")
     tf = ros.listen("/tf", TFMessage)

@@ -59,7 +59,7 @@ def test_the_page_has_all_that_it_takes():
 
 
 @pytest.mark.thorough
-def test_the_world_is_found_fine_and_has_what_the_page_says(followed):
+def test_world_passes_the_check_and_has_the_pages_objects(followed):
     _, printed = followed
     assert "world.yaml: fine; 1000 ticks a second" in printed["check world.yaml"]
     names = {"floor", "table", "box", "blue_box", "ball", "panda", "camera"}
@@ -82,7 +82,7 @@ def test_the_camera_sees_the_boxes_and_the_ball(followed):
 
 
 @pytest.mark.thorough
-def test_the_box_is_lifted_and_its_path_is_a_table_and_a_plot(followed):
+def test_path_of_the_lifted_box_is_a_table_and_plot(followed):
     folder, _ = followed
     path = pd.read_csv(folder / "path.csv", index_col="time")
     assert list(path.columns) == ["x", "y", "z"]

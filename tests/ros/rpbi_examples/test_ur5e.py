@@ -60,7 +60,7 @@ def launch(ros: RosSystem, *arguments: str) -> None:
 
 
 @pytest.mark.thorough
-def test_tool_of_the_arm_and_of_the_real_one_reach_the_target(ros: RosSystem, position) -> None:
+def test_simulated_and_real_tool_reach_the_target(ros: RosSystem, position) -> None:
     real = RealRobot(ros)
     launch(ros, "real_robot:=true")
 

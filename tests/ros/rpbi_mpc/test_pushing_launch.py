@@ -62,7 +62,7 @@ def check_display(path, prediction, markers) -> None:
 
 
 @pytest.mark.thorough
-def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros: RosSystem, tmp_path) -> None:
+def test_hand_pushes_by_single_steps_and_to_the_paths_end(ros: RosSystem, tmp_path) -> None:
     status = ros.listen("mpc/status", MpcStatus)
     shown = (ros.listen("mpc/path", Path), ros.listen("mpc/prediction", Path), ros.listen("mpc/markers", MarkerArray))
     arguments = (*LINE, "start_on_init:=false", f"out:={tmp_path}")
@@ -85,7 +85,7 @@ def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros
 
 
 @pytest.mark.thorough
-def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
+def test_guarded_real_robot_pushes_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
     driver = ros.listen("/stand_in/driver_state", DriverState)
     arguments = (*LINE, "real_robot:=true", f"out:={tmp_path}")
     process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])

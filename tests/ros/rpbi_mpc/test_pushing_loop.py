@@ -57,7 +57,7 @@ class PushingLoop:
         return self.plant._listener.joints()
 
 
-def test_late_messages_change_no_decision_and_a_failing_solver_stops_the_hand(ros: RosSystem, monkeypatch) -> None:
+def test_late_messages_change_no_decision_and_solver_failure_stops_motion(ros: RosSystem, monkeypatch) -> None:
     monkeypatch.setattr(rospy, "Service", lambda *_: None)  # those of the node would outlive the test
     ros.simulator({**example("config"), "start_pybullet_after_initialization": False}, use_sim_time=True)
     status = ros.listen("mpc/status", MpcStatus)

@@ -96,7 +96,7 @@ def bomb(write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch) -> Path:
     return write_bag([("/a", String("x" * 1_000_000))] * 5, compression="bz2")
 
 
-def test_a_bag_that_unfolds_to_far_more_than_its_size_is_refused_unless_it_is_asked_for(
+def test_bag_of_excessive_compression_is_refused_unless_explicitly_allowed(
     bomb: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert bomb.stat().st_size * bag_reader.MAX_COMPRESSION < 5_000_000
@@ -114,7 +114,7 @@ def test_lz4_never_unfolds_too_far(write_bag: WriteBag, monkeypatch: pytest.Monk
     assert len(bag_to_dataframes(path)["/a"]) == 5
 
 
-def test_a_chunk_that_unfolds_to_more_than_it_says_is_damaged(write_bag: WriteBag) -> None:
+def test_chunk_larger_than_its_declared_size_is_damaged(write_bag: WriteBag) -> None:
     path = write_bag([("/a", String("x" * 100_000))], compression="bz2")
     data = path.read_bytes()
     at = data.index(b"size=") + len(b"size=")

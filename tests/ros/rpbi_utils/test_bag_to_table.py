@@ -32,7 +32,7 @@ def bag(write_bag: WriteBag) -> Path:
 
 
 @pytest.mark.quick
-def test_each_topic_becomes_a_parquet_file_beside_the_bag_and_is_listed(bag: Path) -> None:
+def test_each_topic_becomes_a_listed_parquet_file_near_the_bag(bag: Path) -> None:
     done = _run(bag)
     assert done.returncode == 0, done.stderr
     folder = bag.parent / "run_tables"

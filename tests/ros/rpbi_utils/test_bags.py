@@ -115,7 +115,7 @@ def _is_same(cell: Any, expected: Any) -> bool:
 
 @pytest.mark.quick
 @pytest.mark.parametrize("type_name", TYPES)
-def test_tables_say_what_the_messages_say(type_name: str, write_bag: Callable[..., Path]) -> None:
+def test_tables_contain_the_values_of_the_messages(type_name: str, write_bag: Callable[..., Path]) -> None:
     message_class = roslib.message.get_message_class(type_name)
     chance = random.Random(type_name)
     path = write_bag(("/topic", _fill(message_class(), chance)) for _ in range(60))
@@ -143,9 +143,7 @@ def _joint_state(stamp_s: float, **positions: float) -> JointState:
 
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
-def test_joint_states_are_columns_by_name_in_bags_of_any_compression(
-    compression: str, write_bag: Callable[..., Path]
-) -> None:
+def test_joint_states_are_columns_by_name_for_any_compression(compression: str, write_bag: Callable[..., Path]) -> None:
     states = [_joint_state(1 + index / 1000, b=index, a=-index) for index in range(500)]
     table = bag_to_dataframes(write_bag((("/states", state) for state in states), compression=compression))["/states"]
     assert list(table.columns[1:]) == [
@@ -277,7 +275,7 @@ def test_long_arrays_become_bytes_when_asked_for(
     np.testing.assert_array_equal(np.frombuffer(cell, np.float32), [0.5] * 2000)
 
 
-def test_only_the_topics_named_are_read_in_any_order_and_once(write_bag: Callable[..., Path]) -> None:
+def test_only_the_named_topics_are_read_once_in_any_order(write_bag: Callable[..., Path]) -> None:
     path = write_bag([("/a", Float64(1.0)), ("/b", Float64(2.0)), ("/c", String("x"))])
     assert list(bag_to_dataframes(path, ["/c", "/a", "/c"])) == ["/a", "/c"]
     assert list(bag_to_dataframes(path, "/b")) == ["/b"]

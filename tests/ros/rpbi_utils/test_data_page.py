@@ -99,7 +99,7 @@ def test_the_command_has_the_options_of_the_page(recording: Path) -> None:
     assert documented == set(re.findall(r"(--\w+)", text)) - {"--help"}
 
 
-def test_plots_are_written_beside_the_bag(recording: Path) -> None:
+def test_plots_are_written_near_the_bag(recording: Path) -> None:
     ended = subprocess.run([str(ROOT / "rpbi"), "plot", str(recording)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     written = [Path(line) for line in ended.stdout.splitlines()]
@@ -108,7 +108,7 @@ def test_plots_are_written_beside_the_bag(recording: Path) -> None:
     assert all(path.stat().st_size > 1000 for path in written)
 
 
-def test_a_plot_names_messages_of_several_types_and_no_picture_is_half_written(
+def test_plot_names_mixed_message_types_and_leaves_no_partial_picture(
     write_bag: Callable[..., Path],
     file_limit: Callable[[int], None],
     caplog: pytest.LogCaptureFixture,

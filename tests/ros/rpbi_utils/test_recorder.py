@@ -88,7 +88,7 @@ class Counter:
 
 
 @pytest.mark.quick
-def test_all_that_is_published_inside_is_in_the_bag_on_every_topic(ros: Any, tmp_path: Path) -> None:
+def test_bag_contains_all_messages_published_inside_on_every_topic(ros: Any, tmp_path: Path) -> None:
     topics = [f"/counted_{index}" for index in range(5)]
     with Counter(topics) as counter:
         wait_until(lambda: counter.last > 0, "something is published")
@@ -104,7 +104,7 @@ def test_all_that_is_published_inside_is_in_the_bag_on_every_topic(ros: Any, tmp
                 assert (table["data"].diff().dropna() == 1).all()
 
 
-def test_what_is_published_at_the_very_end_is_in_the_bag(ros: Any, tmp_path: Path) -> None:
+def test_messages_published_at_the_very_end_are_recorded(ros: Any, tmp_path: Path) -> None:
     publisher = rospy.Publisher("/burst", Float64, queue_size=100)
     for _ in range(3):
         with Recorder(tmp_path / "a.bag", ["/burst"]):
@@ -114,7 +114,7 @@ def test_what_is_published_at_the_very_end_is_in_the_bag(ros: Any, tmp_path: Pat
     publisher.unregister()
 
 
-def test_a_recorder_that_gets_no_processor_for_a_while_misses_nothing(ros: Any, tmp_path: Path) -> None:
+def test_recorder_paused_for_a_while_misses_nothing(ros: Any, tmp_path: Path) -> None:
     """As many messages come meanwhile as of 3 s at 1 kHz; it still stands still when the recording is to end."""
     numbers = range(3000)
     publisher = rospy.Publisher("/burst", Float64, queue_size=len(numbers))
@@ -129,9 +129,7 @@ def test_a_recorder_that_gets_no_processor_for_a_while_misses_nothing(ros: Any, 
     assert list(bag_to_dataframes(tmp_path / "a.bag")["/burst"]["data"]) == list(numbers)
 
 
-def test_messages_are_not_lost_when_the_recorder_stands_still_for_long(
-    ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recorder_paused_for_long_loses_no_messages(ros: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a slow disk: at the end its process answers nothing for longer than the usual grace."""
     monkeypatch.setattr(recorder_module, "_MOST_GRACE_S", 0.2)
     publisher = rospy.Publisher("/burst", Float64, queue_size=2000)
@@ -171,7 +169,7 @@ def test_a_topic_that_changes_its_type_is_recorded_with_both(ros: Any, tmp_path:
         ]
 
 
-def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(ros: Any, tmp_path: Path) -> None:
+def test_topic_published_later_is_recorded_from_its_first_message(ros: Any, tmp_path: Path) -> None:
     with Recorder(tmp_path / "a.bag", ["/late"]):
         publisher = rospy.Publisher("/late", Float64, queue_size=10, latch=True)
         publisher.publish(7.0)
@@ -225,7 +223,7 @@ def test_relative_topics_are_those_of_the_namespace(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize(("name", "topics"), [("a", ["/tf"]), ("a.bag", []), ("a.bag", "/tf")])
-def test_what_cannot_be_recorded_is_refused_at_once(tmp_path: Path, name: str, topics: Any) -> None:
+def test_impossible_recordings_are_refused_at_once(tmp_path: Path, name: str, topics: Any) -> None:
     with pytest.raises(ValueError):
         Recorder(tmp_path / name, topics)
 
@@ -268,7 +266,7 @@ def test_a_master_that_dies_while_it_waits_is_an_error(
         Recorder(tmp_path / "a.bag", ["/a"]).start()
 
 
-def test_a_recorder_that_died_is_an_error_that_tells_how_to_save_the_rest(ros: Any, tmp_path: Path) -> None:
+def test_killed_recorder_is_an_error_with_the_repair_command(ros: Any, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"ended early.*rosbag reindex .*a\.bag\.active"):
         with Counter(["/a"]), Recorder(tmp_path / "a.bag", ["/a"]) as recorder:
             wait_until((tmp_path / "a.bag.active").exists, "the bag is begun")
@@ -276,7 +274,7 @@ def test_a_recorder_that_died_is_an_error_that_tells_how_to_save_the_rest(ros: A
             wait_until(lambda: not recorder.is_running, "it is dead")
 
 
-def test_what_went_wrong_inside_is_what_is_raised_and_the_bag_is_closed(ros: Any, tmp_path: Path) -> None:
+def test_error_inside_is_raised_and_the_bag_is_closed(ros: Any, tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError):
         with Counter(["/a"]) as counter, Recorder(tmp_path / "a.bag", ["/a"]):
             first = counter.last
@@ -299,7 +297,7 @@ def test_ctrl_c_closes_the_bag_and_leaves_no_process(ros: Any, tmp_path: Path) -
         os.killpg(process.pid, 0)
 
 
-def test_the_recorder_of_a_script_that_is_killed_closes_the_bag_and_ends(ros: Any, tmp_path: Path) -> None:
+def test_recorder_of_a_killed_script_closes_the_bag_and_ends(ros: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.bag"
     with Counter(["/a"]) as counter:
         process = ros.start([sys.executable, "-c", SCRIPT, str(path)])
@@ -349,7 +347,7 @@ def test_a_frozen_clock_stops_neither_start_nor_end(ros: Any, tmp_path: Path) ->
     assert list(tables["/clock"]["clock"]) == [5.0]
 
 
-def test_no_message_of_a_fast_clock_is_missed_while_the_recorder_comes_up(ros: Any, tmp_path: Path) -> None:
+def test_no_message_of_a_fast_clock_is_missed_at_start(ros: Any, tmp_path: Path) -> None:
     """Its connection is there before those of fifty topics; all that is sent to it is counted by the publisher."""
     rospy.set_param("/use_sim_time", True)
     clock = rospy.Publisher("/clock", Clock, queue_size=1000)
@@ -371,7 +369,7 @@ def test_no_message_of_a_fast_clock_is_missed_while_the_recorder_comes_up(ros: A
     assert sent > 0 and len(bag_to_dataframes(recorder.path)["/clock"]) == sent
 
 
-def test_a_publisher_that_hangs_is_named_and_the_others_are_recorded(
+def test_hanging_publisher_is_named_and_the_others_are_recorded(
     ros: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, stopped: Callable[[str], str]
 ) -> None:
     node = stopped("/hung")

@@ -170,7 +170,7 @@ def test_the_first_differing_tick_is_named(bag, tmp_path):
     assert "first difference at tick 300 after reset 1, after tick 250" in done.stdout
 
 
-def test_a_bag_that_begins_too_late_says_what_is_missing_and_what_helps(bag, tmp_path):
+def test_bag_that_begins_too_late_is_reported_with_a_remedy(bag, tmp_path):
     seen = []
 
     def cut(topic, message):
@@ -265,7 +265,7 @@ def test_a_hostile_description_is_refused_in_one_line(bag, tmp_path, case):
     assert line.startswith("replay: ") and told in line
 
 
-def test_a_tick_without_end_and_files_of_the_kernel_do_not_hold_it_up(bag, tmp_path):
+def test_endless_ticks_and_kernel_files_are_refused(bag, tmp_path):
     def spoil(topic, message):
         if topic == "/rpbi/state" and message.resets == 0:
             message.tick = 900_000_000

@@ -19,7 +19,7 @@ WriteBag = Callable[..., Path]
 
 
 @pytest.mark.quick
-def test_rates_and_gaps_are_measured_by_stamps_and_sizes_are_those_of_the_messages(
+def test_rates_and_gaps_follow_stamps_and_sizes_follow_messages(
     write_bag: WriteBag,
 ) -> None:
     stamps_s = [1.0, 1.1, 1.2, 1.5, 1.4]  # one comes late
@@ -63,7 +63,7 @@ def test_topics_are_sorted_and_an_empty_bag_has_none(write_bag: WriteBag) -> Non
     assert len(topic_report(write_bag([], name="empty.bag"))) == 0
 
 
-def test_it_is_printed_with_all_columns_however_narrow_the_terminal_is(write_bag: WriteBag) -> None:
+def test_report_is_printed_with_all_columns_at_any_width(write_bag: WriteBag) -> None:
     topic = "/a/very/long/name/of/a/topic/that/leaves/no/space/in/a/terminal/of/eighty/columns"
     report = topic_report(write_bag([(topic, Float64())] * 3))
     with pd.option_context("display.width", 80, "display.max_columns", 4, "display.max_colwidth", 20):

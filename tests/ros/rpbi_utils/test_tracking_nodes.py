@@ -44,7 +44,7 @@ def start_tracking(ros: Any, objects: list[dict[str, Any]]) -> None:
     ros.start(["rosrun", "rpbi_utils", "tracked_object_node.py"])
 
 
-def test_what_drivers_send_becomes_frames_and_what_is_wrong_is_named(ros) -> None:
+def test_driver_messages_become_frames_and_invalid_ones_are_named(ros) -> None:
     """Millimetres, a frame with a leading slash, a tag in an optical frame, an offset; NaN, zeros and an outlier."""
     turn = {"orientation": [0.0, 0.0, 1.0, 0.0], "position": [0.1, 0.0, 0.0]}
     topics = [f"{side}/tag_detections" for side in ("left", "right")]

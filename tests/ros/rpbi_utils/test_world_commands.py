@@ -65,7 +65,7 @@ def in_process(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300.0)
 
 
-def test_an_object_comes_under_another_name_at_another_place_and_goes(ros, say):
+def test_object_can_be_spawned_under_another_name_and_pose(ros, say):
     file = ros.write_yaml("box.yaml", box("box", base_state_hz=50))
     assert say("spawn", file, "--name", "second", "--at", "0.5", "-1e0", "0.1", "--rpy", "0", "0", "-90deg") == (
         0,
@@ -88,7 +88,7 @@ def test_a_urdf_needs_no_yaml(ros, say):
     assert say("remove other r2d2") == (0, "removed 'other'\nremoved 'r2d2'")
 
 
-def test_files_beside_the_yaml_are_found_though_keys_differ(ros, say):
+def test_files_near_the_yaml_are_found_although_keys_differ(ros, say):
     (ros.folder / "part.urdf").write_text('<robot name="p"><link name="l"/></robot>')
     file = ros.write_yaml("part.yaml", {"name": "part", "loadURDF": {"fileName": "part.urdf", "useFixedBase": True}})
     assert say("spawn", file, "--name", "part_2", "--at", "3", "3", "1") == (0, "added 'part_2'")
@@ -116,7 +116,7 @@ def test_joints_and_links_move_in_a_given_time(ros, say):
     assert say("move arm --stop") == (1, "move: no motion is running")
 
 
-def test_positions_beyond_a_limit_and_targets_of_another_mode_are_refused(ros, say):
+def test_positions_beyond_limits_and_targets_of_other_modes_are_refused(ros, say):
     within = "joint 'lbr_iiwa_joint_2' must be within -2.0944 to 2.0944 rad, got"
     for command in ("move", "send"):
         assert say(f"{command} arm lbr_iiwa_joint_2:=30") == (1, f"{command}: {within} 30; 30deg?")
@@ -142,7 +142,7 @@ def test_targets_and_velocities_are_sent(ros):
     wait_until(lambda: position(ros, "mobile")[0] > x + 0.1, "it has driven")
 
 
-def test_a_box_hangs_on_the_arm_until_it_is_detached_and_rises_where_gravity_points_up(ros, say):
+def test_attached_box_stays_until_detached_and_rises_under_inverted_gravity(ros, say):
     file = ros.write_yaml("hung.yaml", box("hung", base_state_hz=50))
     assert say("spawn", file, "--at", "1", "1", "0.5")[0] == 0
     assert say("attach hung arm/lbr_iiwa_link_7 --max-force 500") == (
@@ -185,7 +185,7 @@ def test_a_box_hangs_on_the_arm_until_it_is_detached_and_rises_where_gravity_poi
         ("send floor --push 1 0 0", "send: 'floor/link0' is static, no force moves it"),
     ],
 )
-def test_what_cannot_be_is_told(say, line, told):
+def test_impossible_commands_are_reported(say, line, told):
     code, text = say(line)
     assert code == 1
     assert text.startswith(told), text

@@ -61,7 +61,7 @@ def vector(message: WrenchStamped) -> np.ndarray:
     return np.array([getattr(part, axis) for part in (message.wrench.force, message.wrench.torque) for axis in "xyz"])
 
 
-def test_a_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
+def test_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
     read, payload = node.listen("calibrated", WrenchStamped), node.listen("wrench/payload", InertiaStamped)
     rosout = Rosout(node)
 
@@ -114,7 +114,7 @@ def test_a_payload_is_identified_and_its_weight_subtracted_in_every_pose(node):
     assert node.call("wrench/payload/clear", Trigger).message == "4 poses removed"
 
 
-def test_without_tf_it_is_the_releases_node_and_a_push_or_silence_is_refused(ros):
+def test_node_without_tf_works_as_in_the_release(ros):
     """Means of `max_samples` messages, all others published; frames are needed for a payload only."""
     rospy.set_param("/calibrate/max_samples", 20)
     ros.start(["rosrun", "rpbi_utils", "calibrate_wrench_node.py", "__name:=calibrate"])

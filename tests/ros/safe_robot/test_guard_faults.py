@@ -56,13 +56,13 @@ def does_not_brake(followed_s: float, moved_s: float) -> bool:
     return followed_s > SOON_S or not moved_s > followed_s
 
 
-def test_nothing_moves_after_a_fault_but_a_braking_and_without_a_guard_much_would(ros_master):
+def test_only_braking_follows_a_fault_and_more_without_a_guard(ros_master):
     assert not still(("NaN", "burst, SIGSTOP", "stamps jump ahead"), goes_on)
     assert not still(("late input", "kill -9", "master killed"), does_not_brake, "--on-halt", "brake")
     assert not still(("NaN", "late input"), lambda *outcome: not goes_on(*outcome), "--unguarded")
 
 
-def test_what_runs_instead_of_targets_does_so_a_period_apart():
+def test_replacement_commands_are_sent_one_period_apart():
     """However late it is: what is late is not caught up with, and what waited is dropped."""
     period_s, taken = 0.02, []
     times_s: list[float] = []
@@ -90,7 +90,7 @@ def test_what_runs_instead_of_targets_does_so_a_period_apart():
 
 
 @pytest.mark.parametrize("silence_s, is_dropped", [(0.12, True), (60.0, False)])
-def test_what_a_dead_source_left_behind_is_not_sent(silence_s, is_dropped):
+def test_targets_left_by_a_dead_source_are_not_sent(silence_s, is_dropped):
     taken: list[int] = []
     given_up = threading.Event()
     done = threading.Event()

@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from safe_robot.ros.guard_markers import TOO_NEAR, GuardMarkers
 
 
-def test_lines_are_about_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp_path):
+def test_lines_have_the_stated_length_and_are_red_when_short(ros, tmp_path):
     checks = {"self_collision": {"margin_m": 0.02}, "link_box": {"boxes": {"lower": {"x": [-0.5, 0.5]}}}}
     guard = guard_of(folding(tmp_path), checks=checks)
     decide(guard, (0.0, 2.6))  # the elbow is folded: the lower arm is beside the base

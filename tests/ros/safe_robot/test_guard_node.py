@@ -51,7 +51,7 @@ def same(command: JointState, sent: JointState) -> bool:
 
 
 @pytest.mark.quick
-def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(left):
+def test_targets_pass_until_one_is_unsafe_and_after_a_restart(left):
     sent = []
     for k in range(5):
         sent.append(left.send(0.001 * k, -0.002 * k))
@@ -87,7 +87,7 @@ def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(left
         ),
     ],
 )
-def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):
+def test_invalid_target_is_refused_and_named(left, fields, words):
     left.send(*fields.pop("position", (0.0, 0.0)), **fields)
     status = left.statuses.wait_for()[0]
     assert not status.is_safe and words in status.message
@@ -105,7 +105,7 @@ def test_targets_of_one_stamp_are_commanded_once(left):
     assert [each.position for each in left.commands.wait_for(2)] == [(0.0, 0.0), (0.001, 0.0)]
 
 
-def test_a_target_without_a_stamp_after_others_that_had_one_is_refused(left):
+def test_target_without_a_stamp_after_stamped_ones_is_refused(left):
     """ROS time that begins anew at 0 looks like that."""
     left.send(0.0, 0.0)
     left.commands.wait_for()
@@ -126,7 +126,7 @@ def test_measured_states_of_other_joints_are_refused_with_their_names(module_ros
     assert "start: no measured positions of all guarded joints on " in right.statuses.wait_for()[0].message
 
 
-def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robot_was_measured(left, right):
+def test_commands_are_ordered_a_period_apart_from_the_measured_position(left, right):
     """Late targets that come together make the robot no faster; and what one guard is told another does not hear."""
     right.send(0.3, -0.2)
     assert "start: no measured positions of all guarded joints on " in right.statuses.wait_for()[0].message
@@ -153,7 +153,7 @@ def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robo
     assert left.statuses.messages == []
 
 
-def test_a_robot_that_stands_too_near_to_itself_is_told_which_way_leads_away(module_ros):
+def test_robot_too_near_to_itself_receives_the_direction_away(module_ros):
     checks = {"self_collision": {"margin_m": 0.1}, "staleness": {"timeout_s": 60.0}}
     near = GuardStation(
         module_ros, "/near", robot_description=FOLDING, start_from="target", period_s=0.01, checks=checks
@@ -217,7 +217,7 @@ def test_a_parameter_that_is_wrong_is_named(parameters, values, words):
         guard_of_parameters()
 
 
-def test_launch_files_of_the_release_are_answered_with_what_they_lack(parameters, ros):
+def test_launch_files_of_the_release_get_missing_parameters_named(parameters, ros):
     """They have the robot's description from EXOTica, and no measured positions."""
     heard = Rosout(ros, own=True)
     heard.wait_to_hear(rospy.get_name())
@@ -254,7 +254,7 @@ def test_stamps_that_go_back_are_warned_of_once_a_minute(parameters, ros):
     ]
 
 
-def test_status_may_be_a_diagnostic_as_the_readme_of_the_release_has_it(ros):
+def test_status_can_be_a_diagnostic_as_in_the_release(ros):
     station = GuardStation(ros, "/diagnosed", start_from="target", status_as_diagnostic=True)
     station.wait()
     station.send(0.0, 0.0)
@@ -290,7 +290,7 @@ def at(guard: GuardStation) -> float:
     return guard.commands.messages[-1].position[0]
 
 
-def test_with_limit_targets_held_back_too_long_are_dropped_and_it_goes_on(ros):
+def test_limit_policy_drops_targets_held_too_long_and_continues(ros):
     guard = GuardStation(ros, "/held", start_from="target", period_s=0.5, policy="limit", silence_s=0.1)
     guard.wait()
     for x in (0.0, 0.0, 1e-3):

@@ -62,7 +62,7 @@ def test_bodies_are_where_tf_has_them_until_they_go(around):
 
 
 @pytest.mark.parametrize(("y", "is_in_the_way"), [(0.9, True), (5.0, False)])
-def test_an_arm_keeps_away_from_them_and_stands_while_nobody_knows_where_they_are(around, tmp_path, y, is_in_the_way):
+def test_arm_avoids_obstacles_and_waits_while_they_are_unknown(around, tmp_path, y, is_in_the_way):
     around, publish = around
     guard = guard_of(folding(tmp_path), policy="reject", checks={"environment": {"margin_m": 0.05}})
     assert guard.decide((0.0, 0.0), CheckContext(obstacles=None)).command is None

@@ -28,7 +28,7 @@ def topics_of_cameras():
 
 
 @pytest.mark.quick
-def test_cloud_is_organised_and_agrees_with_the_images_of_its_frame(ros):
+def test_organised_cloud_agrees_with_the_images_of_its_frame(ros):
     listeners = [ros.listen(CLOUD, PointCloud2), ros.listen(DEPTH, Image), ros.listen(COLOUR, Image)]
     ros.simulator(box_world(ros, rgbd_sensor={**CAMERA, "pointcloud": True}), use_sim_time=True)
 
@@ -102,7 +102,7 @@ def test_cameras_come_and_go_by_service(ros):
     assert ros.listen(DEPTH, Image).wait_for(2)
 
 
-def test_camera_by_service_goes_with_a_reset_and_a_removed_one_comes_back(ros):
+def test_reset_removes_cameras_added_by_service_and_restores_removed_ones(ros):
     ros.simulator(box_world(ros, rgbd_sensor=CAMERA), use_sim_time=True)
     late = {**CAMERA, "name": "late"}
     assert ros.call("/rpbi/add_rgbd_sensor", SetString, yaml.safe_dump(late)).success

@@ -55,7 +55,7 @@ def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, node):
     assert floor_m == pytest.approx(HEIGHT_M - 0.005, abs=1e-3)
 
 
-def test_jpegs_are_the_colour_images_of_their_stamps_with_a_fraction_of_the_bytes(ros, node):
+def test_jpegs_equal_colour_images_of_their_stamps_in_fewer_bytes(ros, node):
     colour, jpeg = ros.listen(COLOUR, Image), ros.listen(f"{COLOUR}/compressed", CompressedImage)
     wait_until(lambda: len(set(colour.stamps_ns) & set(jpeg.stamps_ns)) >= 5, "five images have come as both")
     raw = {image.header.stamp: pixels(image, np.uint8, 3) for image in list(colour.messages)}

@@ -165,7 +165,7 @@ def seen_points(frame, generator):
         yield link, u[free], v[free], depth_m[free]
 
 
-def test_images_of_a_frame_share_the_stamp_of_a_tick_at_which_the_camera_was_due(frames, listeners):
+def test_images_of_a_frame_share_a_due_ticks_stamp(frames, listeners):
     stamps = [set(listeners[topic].stamps_ns) for topic in TOPICS]
     # A slow listener misses images, the queues being short
     assert len(set.intersection(*stamps)) >= FRAMES
@@ -176,7 +176,7 @@ def test_images_of_a_frame_share_the_stamp_of_a_tick_at_which_the_camera_was_due
     assert {frame.messages[topic].header.frame_id for frame in frames for topic in TOPICS} == {"rpbi/camera"}
 
 
-def test_links_of_the_moving_arm_are_seen_where_tf_and_K_project_them(frames, arm_id):
+def test_links_of_the_moving_arm_appear_where_k_projects_tf(frames, arm_id):
     generator = np.random.default_rng(1)
     on_body: dict[str, list] = {link: [] for link in ARM}
     right_depth: dict[str, list] = {link: [] for link in ARM}

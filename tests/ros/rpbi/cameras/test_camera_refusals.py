@@ -40,7 +40,7 @@ def test_there_is_no_cloud_unless_it_is_asked_for(ros, plain):
         ("", "name: missing"),
     ],
 )
-def test_camera_that_makes_no_sense_is_refused_and_the_others_go_on(ros, plain, text, complaint):
+def test_invalid_camera_is_refused_and_the_others_continue(ros, plain, text, complaint):
     answer = ros.call("/rpbi/add_rgbd_sensor", SetString, text)
     assert not answer.success and complaint in answer.message, answer.message
     ros.listen(DEPTH, Image).wait_for(2)

@@ -18,7 +18,7 @@ DT_NS = 10_000_000
 SYNCHRONOUS = {**CAMERA, "synchronous": True}
 
 
-def test_every_due_tick_has_its_image_though_the_world_runs_free(ros, placed):
+def test_free_running_world_has_an_image_of_every_due_tick(ros, placed):
     depth = ros.listen(DEPTH, Image)
     ros.simulator(box_world(ros, rgbd_sensor=SYNCHRONOUS, real_time_factor=0), use_sim_time=True)
     depth.wait_for(60)
@@ -42,14 +42,14 @@ def test_image_of_a_step_comes_before_its_answer(ros, placed):
     assert image[60, 80] == pytest.approx(HEIGHT_M - 0.2, abs=2e-3)
 
 
-def test_nobody_waits_for_a_camera_that_nobody_looks_at(ros, placed):
+def test_world_does_not_wait_for_a_camera_without_viewers(ros, placed):
     config = box_world(ros, rgbd_sensor=SYNCHRONOUS, start_pybullet_after_initialization=False)
     ros.simulator(config, use_sim_time=True)
     for _ in range(5):
         assert ros.call("/rpbi/step", Trigger).success
 
 
-def test_renderer_that_dies_stops_the_world_with_an_error_and_a_start_goes_on(ros, placed):
+def test_renderer_crash_stops_the_world_and_a_start_continues(ros, placed):
     depth = ros.listen(DEPTH, Image)
     status = ros.listen("/rpbi/status", Int64)
     simulator = ros.simulator(box_world(ros, rgbd_sensor={**SYNCHRONOUS, "hz": 100}), use_sim_time=True)
@@ -67,7 +67,7 @@ def test_renderer_that_dies_stops_the_world_with_an_error_and_a_start_goes_on(ro
     assert set(np.diff(after)) == {DT_NS}
 
 
-def test_world_that_cannot_place_its_synchronous_camera_stops_and_says_which_frame_is_missing(ros):
+def test_world_stops_and_names_the_missing_frame_of_its_camera(ros):
     ros.listen(DEPTH, Image)
     simulator = ros.simulator(box_world(ros, rgbd_sensor=SYNCHRONOUS), use_sim_time=True)
     complaint = "simulation stopped: camera 'eye' is synchronous: there is no TF to 'rpbi/eye' after 20 s"

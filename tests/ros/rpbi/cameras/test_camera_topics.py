@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 from rpbi_utils import Recorder
 
 
-def test_segmentation_of_what_is_not_there_is_65535(ros, placed):
+def test_segmentation_of_empty_pixels_is_65535(ros, placed):
     segmentation = ros.listen(SEGMENTATION, Image)
     ros.simulator(arm_world(ros, collision_objects=[], robots=[], setGravity={"gravZ": 0.0}), use_sim_time=True)
     image = pixels(segmentation.wait_for(3)[-1], np.uint16)
@@ -36,7 +36,7 @@ def test_no_image_comes_before_the_camera_has_a_pose(ros):
         colour.wait_for(1)
 
 
-def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_nobody_sees_a_stamp_twice(ros, placed):
+def test_late_viewer_of_a_paused_world_receives_its_image_once(ros, placed):
     first = ros.listen(DEPTH, Image)
     ros.simulator(arm_world(ros, start_pybullet_after_initialization=False), use_sim_time=True)
     first.wait_for(1)
@@ -77,7 +77,7 @@ def test_camera_follows_the_namespace_and_the_remappings_of_its_simulator(ros, p
     assert publishers["/seen"] == ["/left/simulator_camera"]
 
 
-def test_renderer_ends_with_its_simulator_and_takes_leave_of_the_master(ros, placed):
+def test_renderer_ends_with_its_simulator_and_unregisters(ros, placed):
     simulator = ros.simulator(arm_world(ros), use_sim_time=True)
     ros.listen(COLOUR, Image).wait_for(2)
     (renderer,) = renderers(simulator)
@@ -106,7 +106,7 @@ def _node_process(simulator):
 
 
 @pytest.mark.thorough
-def test_a_recorder_that_stands_still_misses_no_image(ros, tmp_path, placed):
+def test_paused_recorder_misses_no_image(ros, tmp_path, placed):
     """As many bytes come meanwhile as no socket takes; a viewer would be sent the newest two."""
     camera = {**CAMERA, "hz": 20, "intrinsics": {**CAMERA["intrinsics"], "width": 640, "height": 480}}
     ros.simulator(arm_world(ros, rgbd_sensor=camera))

@@ -153,7 +153,7 @@ def test_garbage_in_services_is_answered(ros, node):
     _is_well(ros, node)
 
 
-def test_long_texts_are_not_repeated_and_work_without_end_is_refused(ros, node):
+def test_long_texts_are_not_repeated_and_endless_requests_are_refused(ros, node):
     long = "a" * 20_000
     for name in _of_node(2):
         request = rosservice.get_service_class_by_name(name)._request_class()
@@ -194,7 +194,7 @@ class _Raw(rospy.AnyMsg):
         self._buff = data
 
 
-def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node):
+def test_tf_beyond_the_largest_time_does_not_end_the_node(ros, node):
     transform = TransformStamped(child_frame_id="marker")
     transform.header.frame_id = "rpbi/world"
     transform.transform.rotation.w = 1.0
@@ -237,7 +237,7 @@ def _add(ros, config, verdict, problems):
         assert answer.message.replace("config: ", "") == "\n".join(problems).replace("it.yaml: ", "")
 
 
-def test_who_connects_and_says_nothing_or_something_else_holds_up_nobody(ros, node):
+def test_silent_or_invalid_connections_block_no_other_client(ros, node):
     address = urlsplit(rosgraph.Master("/tests").lookupService("/rpbi/list_objects"))
     with ThreadPoolExecutor(1) as callers, ExitStack() as stack:
         for said in (b"", b"\x10", b"POST /RPC2 HTTP/1.1\r\n\r\n"):

@@ -101,9 +101,7 @@ def _connected(master, topic):
 
 
 @pytest.mark.thorough
-def test_a_world_that_stands_still_is_found_again_and_again_while_somebody_waits_for_a_service(
-    ros, tmp_path, second_master
-):
+def test_paused_world_registers_again_after_each_return_of_the_master(ros, tmp_path, second_master):
     master = second_master
     simulator = _start(ros, master, tmp_path, start_pybullet_after_initialization=False)
     before = master.registrations(NODE)

@@ -76,7 +76,7 @@ def test_the_simulator_sends_by_ordinary_publishers(ros, tmp_path, part):
     assert "Traceback" not in ros.output(process), ros.output(process)
 
 
-def test_a_master_that_comes_back_is_noticed_though_nothing_is_registered_again(ros, tmp_path, second_master):
+def test_returning_master_is_noticed_although_nothing_registers_again(ros, tmp_path, second_master):
     environment = _other_rospy(tmp_path, *MASTER_PARTS.items())
     second_master.api.setParam(f"{NODE}/config", _config(tmp_path))
     process = ros.simulator({}, wait=False, **environment, **second_master.environment)
@@ -121,7 +121,7 @@ print("sends:", DirectSending.of(publisher, 1))
 """
 
 
-def test_a_node_that_is_interrupted_as_it_starts_says_nothing_of_rospy(ros):
+def test_node_interrupted_at_its_start_does_not_mention_rospy(ros):
     process = ros.start([sys.executable, "-c", ENDS_AS_IT_STARTS])
     assert process.wait(120.0) == 0
     assert ros.output(process) == "sends: None\n"

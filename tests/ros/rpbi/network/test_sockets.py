@@ -56,7 +56,7 @@ def test_the_kernel_s_table_is_read_right():
     ],
     ids=["IP", "name", "name before IP", "another address"],
 )
-def test_the_simulator_and_its_camera_listen_where_ros_is_told_to(ros, told, stays_local):
+def test_simulator_and_camera_listen_at_the_configured_address(ros, told, stays_local):
     """With an address of another kind rospy listens everywhere, which shows that the others tell something."""
     with place("rpbi/eye"):
         simulator = ros.simulator(box_world(ros, rgbd_sensor=CAMERA), wait=stays_local, **told)

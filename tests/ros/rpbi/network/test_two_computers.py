@@ -82,7 +82,7 @@ def test_topics_services_and_simulated_time_come_to_the_other_computer(both: Two
     assert 0 < int(clock.split("secs:")[1].split()[0]) < 1e6
 
 
-def test_after_a_cable_was_out_all_goes_on_by_itself(both: TwoComputers, reports: Reports) -> None:
+def test_connections_recover_by_themselves_after_a_network_failure(both: TwoComputers, reports: Reports) -> None:
     both.plug(False)
     time.sleep(OUT_S)
     out = reports()[-1]
@@ -167,9 +167,7 @@ def said(ros_of_module: RosSystem, both: TwoComputers) -> dict[str, Callable[[],
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("case", FAULTS)
-def test_an_address_by_which_others_cannot_reach_a_node_is_one_line(
-    said: dict[str, Callable[[], str]], case: str
-) -> None:
+def test_unreachable_address_is_reported_in_one_line(said: dict[str, Callable[[], str]], case: str) -> None:
     wait_until(lambda: "it is up" in said[case](), "the node is up")
     warnings = [line for line in said[case]().splitlines() if "ROS_IP" in line]
     expected = FAULTS[case][1]

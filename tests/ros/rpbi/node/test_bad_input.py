@@ -72,7 +72,7 @@ def _is_finite(message):
     return all(map(math.isfinite, values))
 
 
-def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ros, node):
+def test_bad_targets_are_refused_whole_and_named_occasionally(ros, node):
     rosout = Rosout(ros)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     tf = ros.listen("/tf", TFMessage)
@@ -133,7 +133,7 @@ def test_a_refusal_names_topic_and_reason(ros, node, case):
     assert remove(ros, name).success
 
 
-def test_no_names_and_values_beside_the_positions_do_no_harm(ros, target):
+def test_message_without_names_or_with_extra_values_does_no_harm(ros, target):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     target.publish(JointState())
     target.publish(JointState(name=[JOINT], position=[0.2], velocity=[0.0], effort=[1.0]))
@@ -192,13 +192,13 @@ NO_POSES = {
 
 
 @pytest.mark.parametrize("case", NO_POSES)
-def test_what_tf2_would_complain_about_is_found_before(case):
+def test_faults_that_tf2_would_report_are_found_before(case):
     [transform] = NO_POSES[case].transforms
     assert fault_in(transform).startswith("expected ")
     assert fault_in(_transform("marker").transforms[0]) is None
 
 
-def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, tf_publisher):
+def test_invalid_tf_changes_nothing_and_does_not_flood_the_log(ros, node, tf_publisher):
     rosout = Rosout(ros)
     tf = ros.listen("/tf", TFMessage)
     printed = ros.output(node).count("\n")
@@ -220,7 +220,7 @@ def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, tf_pub
     assert set(objects(ros)) == {"lost", "follower", "ball", "iiwa"}
 
 
-def test_an_object_that_comes_back_follows_a_frame_that_stands_still(ros, node):
+def test_object_added_again_follows_its_static_frame(ros, node):
     shelf_height_m = 2.0
     shelf = {**FLOOR, "name": "shelf", "object_tf": {"tf_id": "shelf_frame", "hz": 100}}
     probe = ball("probe", basePosition=[3.0, 0.0, 4.0], resetBaseVelocity={"linearVelocity": [0.0, 0.0, -4.0]})

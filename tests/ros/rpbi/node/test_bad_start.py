@@ -49,7 +49,7 @@ def _broken(tmp_path, text, name="broken.yaml"):
 
 
 @pytest.mark.quick
-def test_every_fault_of_every_file_is_told_with_file_key_expected_and_got(fails, tmp_path):
+def test_every_fault_of_every_file_is_reported_with_its_key(fails, tmp_path):
     config = main_config(
         tmp_path,
         dynamic=(
@@ -97,7 +97,7 @@ def test_every_fault_of_every_file_is_told_with_file_key_expected_and_got(fails,
         assert len(matching) == 1, f"{expected} not among:\n" + "\n".join(lines)
 
 
-def test_what_only_shows_when_pybullet_builds_the_world_is_told_of_all_objects(fails, tmp_path):
+def test_faults_found_only_by_pybullet_are_reported_for_all_objects(fails, tmp_path):
     (tmp_path / "half.stl").write_bytes(b"solid")
     (tmp_path / "broken.urdf").write_text("<robot name='r'><link name='a'>")
     mesh = "<visual><geometry><mesh filename='none.stl'/></geometry></visual>"
@@ -157,7 +157,7 @@ def test_without_a_configuration_it_says_how_to_load_one(ros):
     assert "~config: missing" in ros.output(process) and "rosparam" in ros.output(process)
 
 
-def test_files_that_are_named_relatively_in_a_parameter_are_not_looked_for_in_a_chance_folder(fails, tmp_path):
+def test_relative_files_in_a_parameter_ignore_the_current_folder(fails, tmp_path):
     write_world(tmp_path, dynamic=(ball(),))
     [line] = fails({"connect": {"connection_mode": "DIRECT"}, "dynamic_objects": ["ball.yaml"]})
     assert line.startswith("~config: dynamic_objects[0]: no such file: ball.yaml (looked in ")
@@ -172,7 +172,7 @@ def test_files_that_are_named_relatively_in_a_parameter_are_not_looked_for_in_a_
         ({"config_file": "world.yaml", "config": {"timeStep": -1.0}}, "world.yaml: timeStep: must be > 0"),
     ],
 )
-def test_a_file_that_is_named_wrongly_or_changed_to_nonsense_is_refused(ros, tmp_path, parameters, expected):
+def test_invalid_or_misspelt_file_in_a_parameter_is_refused(ros, tmp_path, parameters, expected):
     write_world(tmp_path, dynamic=(ball(),))
     for name, value in {"working_directory": f"{tmp_path}\n", **parameters}.items():
         rospy.set_param(f"{NODE}/{name}", value)

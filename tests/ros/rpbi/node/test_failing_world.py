@@ -18,7 +18,7 @@ from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import RobotInfo
 
 
-def test_a_body_that_cannot_tell_its_state_stops_the_simulation_and_not_the_node(ros, tmp_path):
+def test_body_that_cannot_report_its_state_stops_only_the_simulation(ros, tmp_path):
     rosout = Rosout(ros)
     config = main_config(tmp_path, state_hash_hz=10)
     config["objects"] = [ros.write_yaml("thing.yaml", {"name": "thing", "type": "faulty_lab:Thing"})]
@@ -35,7 +35,7 @@ def test_a_body_that_cannot_tell_its_state_stops_the_simulation_and_not_the_node
     assert len(rosout.logs("simulation stopped: lost")) == 1, "told once, not at every pass"
 
 
-def test_a_name_that_is_used_again_in_a_world_that_stands_still_is_seen_as_what_it_is_now(ros, placed):
+def test_reused_name_in_a_paused_world_shows_the_new_object(ros, placed):
     rosout = Rosout(ros)
     config = box_world(ros, rgbd_sensor=CAMERA, setAdditionalSearchPath="pybullet_data_path")
     ros.simulator(config, use_sim_time=True)
@@ -51,7 +51,7 @@ def test_a_name_that_is_used_again_in_a_world_that_stands_still_is_seen_as_what_
     assert not rosout.logs("the renderer ended")
 
 
-def test_services_of_a_robot_never_answer_that_it_is_unknown_because_of_a_reset(ros, tmp_path):
+def test_robot_services_never_report_it_unknown_because_of_a_reset(ros, tmp_path):
     ros.simulator(main_config(tmp_path, robots=(iiwa(),)), use_sim_time=True)
     over = threading.Event()
     answers = []
@@ -73,7 +73,7 @@ def test_services_of_a_robot_never_answer_that_it_is_unknown_because_of_a_reset(
 
 
 @pytest.mark.quick
-def test_what_a_reset_could_not_load_is_gone_and_can_be_added_again(ros, tmp_path):
+def test_object_that_a_reset_cannot_load_can_be_added_again(ros, tmp_path):
     config = mobile_base(tmp_path)
     name, urdf = config["name"], tmp_path / "mobile_base.urdf"
     ros.simulator(main_config(tmp_path, robots=(config, iiwa())), use_sim_time=True)

@@ -126,7 +126,7 @@ def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up again")
 
 
-def test_ctrl_c_with_a_subscriber_that_does_not_take_its_messages(ros, tmp_path):
+def test_ctrl_c_ends_the_node_despite_a_blocked_subscriber(ros, tmp_path):
     process = ros.simulator(_config(tmp_path), use_sim_time=True)
     holder = _holder(ros, "/clock", "/tf", "/rpbi/iiwa/joint_states")
     os.kill(holder.pid, signal.SIGSTOP)
@@ -143,7 +143,7 @@ def _holder(ros, *topics):
     return holder
 
 
-def test_services_that_wait_when_it_ends_get_an_answer_or_an_error(ros, tmp_path):
+def test_services_waiting_at_shutdown_get_an_answer_or_an_error(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
     outcomes = []
 
@@ -174,7 +174,7 @@ def test_services_that_wait_when_it_ends_get_an_answer_or_an_error(ros, tmp_path
     assert len(outcomes) == len(threads), "somebody still waits"
 
 
-def test_a_world_that_breaks_stands_still_and_says_so_once(ros, tmp_path):
+def test_unstable_world_stops_and_is_reported_once(ros, tmp_path):
     rosout = Rosout(ros)
     config = _config(tmp_path, start_pybullet_after_initialization=False, trusted_packages=["faulty_lab"])
     process = ros.simulator(config, **support_on_path())

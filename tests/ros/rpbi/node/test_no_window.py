@@ -27,7 +27,7 @@ def node(ros, tmp_path):
 
 
 @pytest.mark.quick
-def test_keys_of_the_window_are_warned_of_once_and_open_nothing(ros, node):
+def test_window_keys_give_one_warning_and_open_no_topic(ros, node):
     output = ros.output(node)
     keys = "enable_keyboard_publisher, enable_mouse_publisher, publish_visualizer_image_hz, connect.options --mp4="
     assert output.count(f"{keys}: no effect without a window") == 1
@@ -38,7 +38,7 @@ def test_keys_of_the_window_are_warned_of_once_and_open_nothing(ros, node):
     }
 
 
-def test_camera_of_the_window_is_where_it_would_be_and_stays_there(ros, node):
+def test_window_camera_has_its_configured_pose_and_refuses_changes(ros, node):
     camera = ros.call("/rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera).debug_visualizer_config
     assert camera == ResetDebugVisualizerCamera(2.5, 30.0, -20.0, (0.0, 0.0, 0.5))
     rosout = Rosout(ros)

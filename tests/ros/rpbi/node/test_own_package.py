@@ -88,7 +88,7 @@ def _heights(transforms, frame="rpbi/parcel"):
 
 
 @pytest.mark.thorough
-def test_its_launch_file_carries_a_parcel_past_the_sensor_and_pushes_it_off(ros, lab):
+def test_launch_file_carries_a_parcel_past_the_sensor_and_off(ros, lab):
     rospy.wait_for_service("/next_parcel", 60.0)  # the pusher is up
     _stand_at_the_start(ros)
     ranges = ros.listen("/rpbi/belt/end/range", Range)
@@ -117,7 +117,7 @@ def test_its_launch_file_carries_a_parcel_past_the_sensor_and_pushes_it_off(ros,
 
 
 @pytest.mark.thorough
-def test_its_objects_come_and_go_and_a_reset_brings_back_the_first_ones(ros, lab, workspace):
+def test_own_objects_can_be_added_and_reset_restores_the_first(ros, lab, workspace):
     assert objects(ros) == {"floor": "collision", "parcel": "dynamic", "pusher": "robot", "belt": CONVEYOR}
     text = {"name": "second", "type": CONVEYOR, "size": [1.0, 1.0, 0.1], "position": [0.0, 2.0, 1.0]}
     eye = {"name": "eye", "type": RANGE_FINDER, "hz": 100.0, "position": [0, 0, -0.06], "direction": [0, 0, -1]}
@@ -205,7 +205,7 @@ def test_it_is_checked_and_tested_without_a_master(workspace):
 
 
 @pytest.mark.thorough
-def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
+def test_missing_package_is_named_by_the_node(ros, workspace):
     belt = workspace / "src" / NAME / "configs" / "belt.yaml"
     process = ros.simulator({"objects": [str(belt)]}, wait=False)
     assert process.wait(60.0) == 1
@@ -237,14 +237,14 @@ def _faulty(ros, tmp_path, **keys):
         ({"fails": "init"}, "thing.yaml: faulty_lab:Thing failed in making 'thing': KeyError: 'no such key' ("),
     ],
 )  # fmt: skip
-def test_a_package_without_what_it_needs_ends_the_node_with_one_line(ros, tmp_path, keys, line):
+def test_package_without_its_dependencies_ends_the_node_with_one_line(ros, tmp_path, keys, line):
     process = _faulty(ros, tmp_path, **keys)
     assert process.wait(60.0) == 1
     printed = ros.output(process)
     assert line in printed and "Traceback" not in printed
 
 
-def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tmp_path):
+def test_class_failing_in_a_tick_stops_simulation_with_one_line(ros, tmp_path):
     rosout = Rosout(ros)
     process = _faulty(ros, tmp_path, fails="before_step")
     failure = "faulty_lab:Thing failed in before_step of 'thing' at tick 5: ZeroDivisionError: division by zero"
@@ -264,7 +264,7 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
         ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({SUPPORT}/plugins/"),
     ],
 )
-def test_a_message_that_its_class_fails_with_is_refused_and_says_where(ros, tmp_path, keys, cause):
+def test_message_that_raises_in_its_class_is_refused_with_location(ros, tmp_path, keys, cause):
     process = _faulty(ros, tmp_path, takes="push", **keys)
     refused = f"/rpbi/thing/push: message refused: faulty_lab:Thing._push failed in applying 'thing/push': {cause}"
     with publishing("/rpbi/thing/push", Float64) as push:

@@ -18,7 +18,7 @@ print('results:', json.dumps({one.figure: one.value for one in soak.run(True, 6.
 """
 
 
-def test_memory_and_handles_stay_flat_while_it_runs_with_a_camera():
+def test_memory_and_handles_stay_constant_with_a_camera():
     # A session of its own, since the program interrupts what it started
     done = subprocess.run(
         [sys.executable, "-c", RUN],

@@ -77,7 +77,7 @@ def _along(ros, states, publisher, seconds):
     return x
 
 
-def test_a_hand_that_tf_moves_carries_a_box_and_when_tf_ceases_that_is_said_once(ros, load_states):
+def test_hand_moved_by_tf_carries_boxes_and_silence_warns_once(ros, load_states):
     rosout = Rosout(ros)
     wait_until(lambda: sends_to_us("/rosout", "/ros_pybullet_interface"), "the log is listened to")
     with publishing("/tf", TFMessage) as publisher:
@@ -105,7 +105,7 @@ def test_a_hand_that_tf_moves_carries_a_box_and_when_tf_ceases_that_is_said_once
         (range(3, 500, 100), [100]),
     ],
 )
-def test_a_stream_is_looked_at_when_it_comes_and_at_even_intervals(sent_ms, seen_ms):
+def test_stream_is_read_on_arrival_at_regular_intervals(sent_ms, seen_ms):
     followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=30), print))
     sent_ms = list(sent_ms)
     seen = []
@@ -120,7 +120,7 @@ def test_a_stream_is_looked_at_when_it_comes_and_at_even_intervals(sent_ms, seen
     assert sorted(gaps) == seen_ms
 
 
-def test_a_frame_that_comes_by_others_is_looked_at_after_each_period():
+def test_frame_sent_by_others_is_read_every_period():
     followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=50), print))
     looks = []
     for now_ms in range(1000):

@@ -50,7 +50,7 @@ def _speed(state):
     return math.hypot(state.twist.twist.linear.x, state.twist.twist.linear.y)
 
 
-def test_the_state_of_a_base_is_an_odometry_at_its_rate(ros):
+def test_base_state_is_an_odometry_at_its_rate(ros):
     states = _start(ros, loadURDF={"basePosition": [1.0, 2.0, 0.0], "baseOrientation": [0.0, 0.0, 0.6, 0.8]})
     states.wait_for(200)
     state = states.messages[0]
@@ -75,7 +75,7 @@ def test_commands_drive_it_and_without_them_it_brakes(ros):
     wait_until(lambda: _speed(states.messages[-1]) < 1e-3, "it has braked")
 
 
-def test_bad_commands_are_refused_and_named_and_the_last_good_one_holds(ros):
+def test_bad_velocities_are_refused_and_the_last_valid_one_holds(ros):
     rosout = Rosout(ros)
     states = _start(ros, planar_base={"cmd_vel_timeout_s": 1.0e6})
     with publishing("/rpbi/mobile/cmd_vel", Twist) as commands:
@@ -92,7 +92,7 @@ def test_bad_commands_are_refused_and_named_and_the_last_good_one_holds(ros):
     assert states.messages[-1].pose.pose.position.z == 0.0
 
 
-def test_the_joints_that_move_the_base_are_told_to_nobody(ros):
+def test_joints_that_move_the_base_are_not_published(ros):
     _start(ros)
     joint_states = ros.listen("/rpbi/mobile/joint_states", JointState)
     assert joint_states.wait_for(1)[0].name == ["shoulder"]
@@ -109,7 +109,7 @@ def test_the_joints_that_move_the_base_are_told_to_nobody(ros):
         )
 
 
-def test_the_root_frame_alone_is_on_tf_where_the_state_says(ros):
+def test_only_the_root_frame_is_on_tf_at_its_state(ros):
     states = _start(ros, broadcast_root_tf_hz=HZ)
     transforms = ros.listen("/tf", TFMessage)
     with publishing("/rpbi/mobile/cmd_vel", Twist) as commands:
@@ -144,7 +144,7 @@ def test_it_can_be_put_elsewhere_by_service(ros):
     assert abs(state.pose.pose.orientation.z) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_fixed_base_follows_the_tf_frame_that_it_is_told_to(ros):
+def test_fixed_base_follows_its_tf_frame(ros):
     more = {"loadURDF": {"useFixedBase": True}, "object_tf": {"tf_id": "carrier", "hz": 50}, "planar_base": None}
     states = _start(ros, **more)
     assert states.messages[0].pose.pose.position.x == pytest.approx(0.0, abs=1e-6)

@@ -48,7 +48,7 @@ def test_arrows_replace_those_before(ros, node):
     assert sum(lengths) == pytest.approx(0.01 * WEIGHT_N, rel=0.01)
 
 
-def test_a_stopped_world_tells_its_last_contacts_to_who_comes_late(ros, node):
+def test_late_subscriber_of_a_stopped_world_receives_its_last_contacts(ros, node):
     assert ros.call("/rpbi/stop", Trigger).success
     try:
         (message,) = ros.listen("/rpbi/box/contacts", Contacts).wait_for(1)
@@ -57,7 +57,7 @@ def test_a_stopped_world_tells_its_last_contacts_to_who_comes_late(ros, node):
         assert ros.call("/rpbi/start", Trigger).success
 
 
-def test_a_urdf_object_comes_by_service_with_its_contacts_and_goes(ros, node):
+def test_urdf_object_added_by_service_publishes_contacts_until_removed(ros, node):
     (ros.folder / "crate.urdf").write_text(DOOR)
     load = {"fileName": str(ros.folder / "crate.urdf"), "basePosition": [1.0, 0.0, 0.1]}
     answer = add(ros, PybulletObject.URDF, {"name": "crate", "loadURDF": load, "contacts": {"hz": 100}})

@@ -103,7 +103,7 @@ def _fails_in_the_middle(topic, meanwhile, listener, reason):
     return reason in str(error)
 
 
-def test_stop_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, slowly):
+def test_stop_during_zeroing_ends_it_with_a_reason(ros, slowly):
     topic = "/rpbi/iiwa/lbr_iiwa_joint_4/ft_sensor"
     listener = ros.listen(topic, WrenchStamped)
 
@@ -120,7 +120,7 @@ def test_stop_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, slowly):
     wait_until(lambda: abs(listener.messages[-1].wrench.force.y) < 1e-3, "it works the next time")
 
 
-def test_robot_that_goes_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, slowly):
+def test_removing_the_robot_during_zeroing_ends_it_with_a_reason(ros, slowly):
     sensors = [{"joint": JOINT, "hz": 100}]
     topic = f"/rpbi/other/{JOINT}/ft_sensor"
     listener = ros.listen(topic, WrenchStamped)
@@ -141,7 +141,7 @@ def test_unknown_joint_is_refused_with_the_joints_there_are(ros, simulator):
     assert "enabled_joint_force_torque_sensors[0]" in answer.message and "lbr_iiwa_joint_1" in answer.message
 
 
-def test_simulator_with_an_unknown_joint_does_not_start_and_says_why(ros, simulator):
+def test_unknown_joint_prevents_the_start_and_is_named(ros, simulator):
     robot = iiwa(enabled_joint_force_torque_sensors=["joint_7"])
     config = main_config(ros.folder, robots=(robot,), setAdditionalSearchPath="pybullet_data_path")
     rosout = Rosout(ros)

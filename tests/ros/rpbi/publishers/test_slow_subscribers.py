@@ -42,7 +42,7 @@ def frozen(ros, tmp_path):
     os.kill(holder.pid, signal.SIGCONT)
 
 
-def test_ticks_go_on_while_a_subscriber_is_frozen(ros, frozen):
+def test_ticks_continue_while_a_subscriber_is_frozen(ros, frozen):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     joint_states.wait_for(FROZEN_MESSAGES)
@@ -59,7 +59,7 @@ def test_ticks_go_on_while_a_subscriber_is_frozen(ros, frozen):
     assert min(factors()) > 0.0
 
 
-def test_who_was_slow_gets_the_rest_though_nothing_more_is_published(ros, tmp_path):
+def test_slow_subscriber_receives_the_rest_without_further_messages(ros, tmp_path):
     """A world in wall time that stands still publishes at its rates, which here is never."""
     fine = write_block(tmp_path, "fine.vtk", across=12)
     soft = block(tmp_path, surface_hz=0.001, load={"fileName": fine})

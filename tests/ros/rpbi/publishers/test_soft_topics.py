@@ -40,7 +40,7 @@ def test_its_surface_is_a_list_of_triangles_in_the_world(ros, node):
     assert {new - old for old, new in zip(stamps, stamps[1:])} == {40_000_000}
 
 
-def test_it_can_be_put_somewhere_and_tells_when_it_cannot(ros, node):
+def test_soft_body_can_be_moved_and_refuses_other_services(ros, node):
     surface = ros.listen("/rpbi/jelly/surface", Marker)
     surface.wait_for(1)
     up = Transform(Vector3(0.0, 0.0, 3.0), Quaternion(0.0, 0.0, 0.0, 1.0))

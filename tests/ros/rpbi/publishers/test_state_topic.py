@@ -24,7 +24,7 @@ def start(ros, tmp_path):
 
 
 @pytest.mark.quick
-def test_it_tells_where_the_world_is_and_how_fast(ros, start):
+def test_state_reports_tick_and_speed(ros, start):
     states = start(real_time_factor=0.5)
     state = wait_until(lambda: _at_half_pace(states), "it goes at the pace that is asked for")
     assert state.running and not state.stepping
@@ -36,7 +36,7 @@ def test_it_tells_where_the_world_is_and_how_fast(ros, start):
     assert state.real_time_factor == 0.0
 
 
-def test_hashes_come_at_their_ticks_and_are_those_of_the_service(ros, start):
+def test_hashes_come_at_their_ticks_and_equal_those_of_services(ros, start):
     states = start(start_pybullet_after_initialization=False, state_hash_hz=100.0)
     states.wait_for(1)
     service = [ros.call("/rpbi/step_n", StepN, 10) and ros.call("/rpbi/get_state_hash", GetStateHash) for _ in range(5)]
@@ -46,7 +46,7 @@ def test_hashes_come_at_their_ticks_and_are_those_of_the_service(ros, start):
     assert len(set(hashed.values())) == 5
 
 
-def test_a_world_that_is_told_to_hash_nothing_does_not(ros, start):
+def test_world_with_hash_rate_zero_publishes_no_hash(ros, start):
     states = start(start_pybullet_after_initialization=False, state_hash_hz=0, state_hz=50.0)
     ros.call("/rpbi/step_n", StepN, 1500)
     states.wait_for(20)

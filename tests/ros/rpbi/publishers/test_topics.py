@@ -88,7 +88,7 @@ def test_rates_are_those_asked_for_in_simulated_time(ros, simulator):
 
 
 @pytest.mark.quick
-def test_joint_states_tell_all_joints_with_values_of_one_length(ros, simulator):
+def test_joint_states_contain_all_joints_with_values_of_equal_length(ros, simulator):
     message = ros.listen("/rpbi/iiwa/joint_states", JointState).wait_for(1)[0]
     assert message.header.frame_id == ""
     assert message.name == [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
@@ -111,7 +111,7 @@ def test_tf_has_all_links_and_objects_in_the_world_frame(ros, simulator):
     assert max(together) == 9, "all frames of a tick are in one message"
 
 
-def test_diagnostics_tell_how_well_the_loop_keeps_up(ros, simulator):
+def test_diagnostics_report_the_real_time_factor(ros, simulator):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     wait_until(lambda: float(diagnosed(diagnostics.messages[-1])["real_time_factor"]) > 0.0, "it keeps up with some")
     message = diagnostics.messages[-1]
@@ -122,11 +122,11 @@ def test_diagnostics_tell_how_well_the_loop_keeps_up(ros, simulator):
     assert float(values["time_s"]) == pytest.approx(int(values["tick"]) * 0.001)
 
 
-def test_the_status_is_told_again_and_again(ros, simulator):
+def test_status_is_published_repeatedly(ros, simulator):
     assert {message.data for message in ros.listen("/rpbi/status", Int64).wait_for(20)} == {1}
 
 
-def test_robot_info_is_what_pybullet_knows(ros, simulator):
+def test_robot_info_equals_the_values_of_pybullet(ros, simulator):
     info = ros.call("/rpbi/iiwa/robot_info", RobotInfo)
     assert (info.robot_name, info.root_link_name) == ("iiwa", "lbr_iiwa_link_0")
     assert (info.numJoints, info.numDof) == (7, 7)
@@ -182,7 +182,7 @@ def test_targets_that_wait_for_the_same_tick_are_merged(ros, simulator):
     )
 
 
-def test_an_object_added_to_a_world_that_stands_still_is_seen(ros, simulator):
+def test_object_added_to_a_paused_world_is_published(ros, simulator):
     ros.call("/rpbi/stop", Trigger)
     tf = ros.listen("/tf", TFMessage)
     assert add(ros, PybulletObject.ROBOT, iiwa("second", broadcast_link_states=True)).success

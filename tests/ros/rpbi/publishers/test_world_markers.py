@@ -64,7 +64,7 @@ def place(pose):
 
 
 @pytest.mark.quick
-def test_every_body_has_markers_that_are_locked_to_the_frame_of_its_link(start):
+def test_every_body_has_markers_locked_to_its_link_frames(start):
     following = {**MARK, "name": "follower", "object_tf": {"tf_id": "somewhere"}}
     told = iiwa("told", broadcast_link_states=True)
     for_publisher = iiwa("for_publisher", broadcast_root_tf_hz=50)
@@ -122,7 +122,7 @@ def test_late_listener_gets_the_whole_world_in_one_message(ros, start):
     assert message._connection_header["latching"] == "1"
 
 
-def test_what_is_removed_is_deleted_and_the_rest_keeps_its_ids(ros, start):
+def test_marker_of_a_removed_body_is_deleted_and_others_stay(ros, start):
     listener = start(collision=(FLOOR,), robots=(iiwa(),))
     before = set(shown(listener))
     assert add(ros, PybulletObject.VISUAL, MARK).success
@@ -132,7 +132,7 @@ def test_what_is_removed_is_deleted_and_the_rest_keeps_its_ids(ros, start):
     assert {marker.ns for marker in listener.messages[-1].markers if marker.action == Marker.ADD} == {"floor", "mark"}
 
 
-def test_object_that_is_not_on_tf_is_followed_until_it_lies_still(ros, start):
+def test_marker_of_an_object_without_tf_follows_until_rest(ros, start):
     falling = box(basePosition=[0.0, 0.0, 0.4])
     listener = start(collision=(FLOOR,), dynamic=(falling,), start_pybullet_after_initialization=False)
 
@@ -155,13 +155,13 @@ def test_object_that_is_not_on_tf_is_followed_until_it_lies_still(ros, start):
     assert len(listener.messages) == count + 1
 
 
-def test_robot_that_is_not_on_tf_is_shown_where_its_joints_are(start):
+def test_robot_without_tf_is_shown_at_its_joint_positions(start):
     listener = start(robots=(iiwa(initial_joint_position={"lbr_iiwa_joint_2": 90.0}),))
     flange = shown(listener)["iiwa", 7].pose.position
     assert (flange.x, flange.y, flange.z) == pytest.approx((0.901, 0.0, 0.36), abs=0.01)
 
 
-def test_object_that_is_put_elsewhere_while_the_world_stands_still_is_shown_there(ros, start):
+def test_object_moved_in_a_paused_world_is_shown_there(ros, start):
     listener = start(visual=(MARK,))
     ros.call("/rpbi/stop", Trigger)
     target = Transform()

@@ -97,7 +97,7 @@ def _moved(positions, by=0.3):
 
 @pytest.mark.quick
 @pytest.mark.parametrize("robot", ["arm", "shown"])
-def test_the_target_is_in_the_world_and_the_answer_names_all_joints_in_order(ros, node, kinematics, robot):
+def test_target_is_in_the_world_and_solution_names_all_joints(ros, node, kinematics, robot):
     goal = BASE @ kinematics.forward(_moved(ELBOW), LINK)
     answer = _solve(ros, robot, _problem(goal))
     assert answer.success, answer.message
@@ -116,7 +116,7 @@ def test_a_floating_robot_solves_for_where_its_base_is_now(ros, node, kinematics
     assert answer.solution.position == pytest.approx(ELBOW, abs=0.05)
 
 
-def test_the_search_starts_where_the_robot_is_unless_told_otherwise(ros, node, kinematics):
+def test_search_starts_at_the_robots_position_by_default(ros, node, kinematics):
     other = [1.0, -0.6, 0.7, 1.1, -0.5, -0.9, 0.4]
     near_robot = _solve(ros, "shown", _problem(BASE @ kinematics.forward(_moved(ELBOW, 0.02), LINK)))
     assert np.abs(np.subtract(near_robot.solution.position, ELBOW)).max() < 0.2
@@ -125,7 +125,7 @@ def test_the_search_starts_where_the_robot_is_unless_told_otherwise(ros, node, k
     assert np.abs(np.subtract(told.solution.position, other)).max() < 0.2
 
 
-def test_velocity_is_the_way_from_the_current_position_by_time(ros, node, kinematics):
+def test_velocity_is_displacement_from_the_current_position_divided_by_time(ros, node, kinematics):
     goal = BASE @ kinematics.forward(_moved(ELBOW, 0.1), LINK)
     answer = _solve(ros, "arm", _problem(goal, currentPosition=ELBOW, dt=0.5))
     expected = np.subtract(answer.solution.position, ELBOW) / 0.5
@@ -133,7 +133,7 @@ def test_velocity_is_the_way_from_the_current_position_by_time(ros, node, kinema
     assert len(_solve(ros, "arm", _problem(goal, dt=0.5)).solution.velocity) == 0
 
 
-def test_a_strict_robot_refuses_a_target_out_of_reach_and_others_go_as_near_as_they_come(ros, node, kinematics):
+def test_strict_robot_refuses_unreachable_targets_and_others_approach_them(ros, node, kinematics):
     refused, near = (_solve(ros, robot, _problem(Pose((4.0, 0.0, 0.5)))) for robot in ("arm", "shown"))
     assert (refused.success, near.success) == (False, True)
     assert near.message == f"as near as it comes: {refused.message}"
@@ -162,7 +162,7 @@ def test_a_strict_robot_refuses_a_target_out_of_reach_and_others_go_as_near_as_t
         ({"dt": 1e-320, "currentPosition": [0.1] * 7}, "dt: too short"),
     ],
 )
-def test_a_problem_that_makes_no_sense_is_refused_with_the_field(ros, node, kinematics, fields, message):
+def test_invalid_problem_is_refused_naming_the_field(ros, node, kinematics, fields, message):
     problem = _problem(BASE @ kinematics.forward(ELBOW, LINK))
     for field, value in fields.items():
         setattr(problem, field, value)
@@ -184,7 +184,7 @@ def test_both_solvers_and_the_null_space_answer(ros, node, kinematics):
         assert np.abs(answer.solution.position).max() <= 2.0
 
 
-def test_the_topic_moves_the_joints_of_the_link_and_no_others(ros, node):
+def test_topic_moves_only_the_joints_of_the_links_chain(ros, node):
     """The finger hangs on the hand: where it is does not bring the hand to its target, and it keeps its own."""
     states = ros.listen("/rpbi/gripper/joint_states", JointState)
     targets = publishing("/rpbi/gripper/joint_states/target", JointState)
@@ -209,7 +209,7 @@ def _hand(states):
     return [0.4 * f(shoulder) + 0.3 * f(shoulder + elbow) for f in (math.cos, math.sin)]
 
 
-def test_the_topic_moves_the_link_as_near_as_it_comes_with_a_warning(ros, node):
+def test_topic_moves_the_link_as_near_as_possible_and_warns(ros, node):
     rosout = Rosout(ros)
     states = ros.listen("/rpbi/gripper/joint_states", JointState)
     away = np.add(GRIPPER_AT, (0.0, 2.0, 0.0))
@@ -219,7 +219,7 @@ def test_the_topic_moves_the_link_as_near_as_it_comes_with_a_warning(ros, node):
     rosout.wait_for(["/rpbi/gripper/ik: as near as it comes: 'hand' misses its target by 1300 mm; 1 mm would do"])
 
 
-def test_the_topic_of_a_strict_robot_moves_nothing_and_names_the_residual(ros, node):
+def test_topic_of_a_strict_robot_moves_nothing_and_reports_residual(ros, node):
     rosout = Rosout(ros)
     states = ros.listen("/rpbi/arm/joint_states", JointState)
     before = states.wait_for(1)[-1].position

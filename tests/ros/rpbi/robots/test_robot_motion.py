@@ -80,7 +80,7 @@ def wait_until_under_way(states):
 
 
 @pytest.mark.quick
-def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states):
+def test_robot_moves_to_a_joint_state_before_the_answer(ros, states):
     answer = move(ros, 0.5, j1=0.4, j4=-1.2)
     assert answer.success, answer.message
     assert (now(states)[FIRST], now(states)[FOURTH]) == pytest.approx((0.4, -1.2), abs=0.01)
@@ -88,7 +88,7 @@ def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states
 
 
 @pytest.mark.parametrize("service", ["move_to_initial_joint_state", "move_to_init_joint_state"])
-def test_it_moves_back_to_where_it_started_whatever_the_request_says(ros, states, service):
+def test_robot_returns_to_its_start_whatever_the_request_contains(ros, states, service):
     move(ros, 0.3, j1=0.4)
     answer = ros.call(f"/rpbi/iiwa/{service}", ResetJointState, JointState(name=["no joint"]), 0.3)
     assert answer.success, answer.message
@@ -121,7 +121,7 @@ def test_a_pose_out_of_reach_moves_nothing(ros, states):
     assert now(states) == pytest.approx(before, abs=1e-3)
 
 
-def test_beyond_its_limits_it_goes_to_the_limit_and_says_so(ros, states):
+def test_robot_stops_at_an_exceeded_limit_and_reports_it(ros, states):
     answer = move(ros, 0.3, j1=0.2, j4=-3.0)
     assert not answer.success
     assert f"went to the limits only: joint '{FOURTH}' must be within -2.0944 to 2.0944 rad, got -3;" in answer.message
@@ -146,7 +146,7 @@ def test_a_goal_that_cannot_be_is_refused_before_anything_moves(ros, states, cas
     assert now(states) == pytest.approx(before, abs=1e-3)
 
 
-def test_of_two_moves_at_once_the_later_wins_and_the_earlier_says_where_it_got(ros, states):
+def test_newer_of_two_moves_wins_and_the_older_reports_position(ros, states):
     first = in_background(lambda: move(ros, LONG_S, j1=FAR))
     wait_until_under_way(states)
     assert move(ros, 0.5, j1=-0.2).success
@@ -156,7 +156,7 @@ def test_of_two_moves_at_once_the_later_wins_and_the_earlier_says_where_it_got(r
     assert UNDER_WAY < float(re.search(rf"{FIRST}=(\S+)", answer.message)[1]) < FAR
 
 
-def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ros, states):
+def test_stop_ends_a_move_and_stopped_robots_refuse_moves(ros, states):
     moving = in_background(lambda: move(ros, LONG_S, j1=FAR))
     wait_until_under_way(states)
     assert ros.call("/rpbi/stop", Trigger).success
@@ -202,7 +202,7 @@ def test_modes_are_switched_and_targets_for_another_mode_named_once(ros, states)
     assert len(rosout.logs("expected velocity")) == 1
 
 
-def test_torque_control_lets_an_arm_fall_and_moves_are_refused_in_it(ros, states):
+def test_torque_control_lets_an_arm_fall_and_refuses_moves(ros, states):
     before = now(states)[JOINTS[1]]
     assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
     assert "TORQUE_CONTROL" in move(ros, 1.0, j1=0.5).message
@@ -240,7 +240,7 @@ def test_bodies_are_put_somewhere_at_once_and_nonsense_is_refused(ros, node):
     assert "must be finite" in answer.message
 
 
-def test_a_motion_is_stopped_by_service_and_stopping_nothing_says_so(ros, states):
+def test_motion_is_stopped_by_service_which_otherwise_reports_no_motion(ros, states):
     moving = in_background(lambda: move(ros, LONG_S, j1=FAR))
     wait_until_under_way(states)
     assert ros.call("/rpbi/iiwa/stop_motion", Trigger).success

@@ -21,7 +21,7 @@ FIRST = "lbr_iiwa_joint_1"
 START_AT_REAL = {"initial_joint_state_topic": "/real/joint_states", "initial_joint_state_timeout_s": 60.0}
 
 
-def test_each_robot_has_a_description_that_rviz_can_read_as_long_as_it_is_there(ros, tmp_path):
+def test_robot_description_is_readable_by_rviz_until_robots_are_removed(ros, tmp_path):
     ros.simulator(main_config(tmp_path, robots=(iiwa(),)))
     text = rospy.get_param("/rpbi/iiwa/robot_description")
     meshes = [mesh.get("filename") for mesh in ElementTree.fromstring(text).iter("mesh")]

@@ -55,7 +55,7 @@ def test_goal_is_reached_with_joints_in_any_order(robot):
     wait_until(reached, "joint states tell that it is there")
 
 
-def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(robot):
+def test_new_goal_preempts_the_old_one_and_continues_smoothly(robot):
     first = Goal(robot, far_away())
     wait_until(lambda: robot.states.messages[-1].velocity[0] > 0.08, "a jerk would be seen")
     second = Goal(robot, trajectory((2.0, moved(-0.3))))
@@ -78,7 +78,7 @@ def test_cancelled_goal_makes_the_arm_hold(robot):
     assert 0.0 < robot.states.messages[-1].position[0] < 2.0
 
 
-def test_arm_stops_when_it_is_off_its_path_and_says_so(robot):
+def test_arm_off_its_path_stops_and_reports_it(robot):
     goal = Goal(robot, trajectory((4.0, moved(1.2))), path_tolerance=[tolerance("lbr_iiwa_joint_1", position=1e-9)])
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.ABORTED, -4)
@@ -126,7 +126,7 @@ def test_bad_goal_is_refused_before_anything_moves(robot, message, code, text):
     assert stands(robot.states.messages[begin:])
 
 
-def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(robot):
+def test_command_replaces_a_goal_and_an_empty_one_holds_position(robot):
     goal = Goal(robot, far_away())
     goal.wait_until_it_moves()
     with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
@@ -157,7 +157,7 @@ def test_bad_command_is_named_and_changes_nothing(robot):
     assert goal.wait()[0] == GoalStatus.SUCCEEDED
 
 
-def test_targets_of_joints_that_a_trajectory_drives_are_refused_until_it_has_ended(robot):
+def test_targets_of_joints_in_trajectories_are_refused_until_the_end(robot):
     log = Rosout(robot.ros)
     goal = _goal_that_waits(robot, trajectory((1.5, moved(0.5))))
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
@@ -202,7 +202,7 @@ def test_status_and_results_have_the_stamps_of_the_world(robot):
         assert message.header.stamp.to_sec() < 1e6, "a wall stamp"
 
 
-def test_query_tells_where_the_joints_will_be(robot):
+def test_query_returns_the_future_joint_state(robot):
     stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(60.0)
     Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp)).wait_until_accepted()
     answer = robot.ros.call(f"{CONTROLLER}/query_state", QueryTrajectoryState, stamp + rospy.Duration.from_sec(1.0))

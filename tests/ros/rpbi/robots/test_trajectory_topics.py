@@ -34,7 +34,7 @@ def _feedback_of(robot):
     return robot.ros.listen(f"{CONTROLLER}/follow_joint_trajectory/feedback", FollowJointTrajectoryActionFeedback)
 
 
-def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints_are_to_be(start):
+def test_feedback_comes_at_its_simulated_rate_with_desired_positions(start):
     robot = start(controller={"action_monitor_rate": 10})
     fed = _feedback_of(robot)
     assert Goal(robot, trajectory((1.5, moved(0.6)))).wait()[0] == GoalStatus.SUCCEEDED
@@ -109,7 +109,7 @@ def test_robots_that_come_and_go_leave_no_threads_behind(start):
     wait_until(lambda: count(robot.process.pid, "task") <= first + 2, f"of {last} threads about {first} stay")
 
 
-def test_node_that_ends_in_the_middle_of_a_goal_ends_cleanly(start):
+def test_node_ending_during_a_goal_ends_cleanly(start):
     rospy.set_param("actionlib_status_frequency", 500.0)  # its topic closes between two messages
     robot = start()
     goal = Goal(robot, trajectory((20.0, moved(1.2))))
@@ -147,7 +147,7 @@ def test_goal_begins_at_its_stamp(start, use_sim_time):
 
 
 @pytest.mark.parametrize("factor", [0, 0.3, 2])
-def test_trajectory_takes_its_time_in_the_world_whatever_the_wall_clock_says(start, factor):
+def test_trajectory_takes_its_simulated_time_at_any_speed(start, factor):
     robot = start(real_time_factor=factor)
     fed = _feedback_of(robot)
     status, code, text = Goal(robot, trajectory((1.0, moved(0.5)))).wait()

@@ -138,12 +138,12 @@ def test_a_file_may_be_named_by_package(ros, world):
     assert not answer.success and "'floor' is taken" in answer.message, answer.message
 
 
-def test_files_of_a_text_are_looked_for_in_the_search_paths(ros, world):
+def test_files_named_in_a_text_are_found_in_search_paths(ros, world):
     assert add(ros, DYNAMIC, _mesh(fileName="cube.obj")).success
     assert remove(ros, "meshed").success
 
 
-def test_files_of_a_file_are_looked_for_beside_it(ros, world):
+def test_files_named_in_a_file_are_found_next_to_it(ros, world):
     (ros.folder / "tetrahedron.obj").write_text(CUBE)
     path = ros.write_yaml("meshed.yaml", _mesh(fileName="tetrahedron.obj"))
     assert add(ros, DYNAMIC, filename=path).success
@@ -287,7 +287,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_bad_object_is_refused_with_all_reasons_and_changes_nothing(ros, world, case):
+def test_bad_object_is_refused_with_all_reasons_without_any_change(ros, world, case):
     kind, config, filename, expected = REFUSED[case]
     answer = add(ros, kind, config, filename)
     assert not answer.success
@@ -309,20 +309,20 @@ WITH_MESH = "<robot name='r'><link name='a'><visual><geometry><mesh filename='{}
     ],
     ids=["not XML", "not a URDF", "mesh missing", "package missing"],
 )
-def test_a_robot_whose_urdf_is_broken_is_refused_with_the_reason(ros, world, urdf, expected):
+def test_robot_with_a_broken_urdf_is_refused_with_the_reason(ros, world, urdf, expected):
     answer = add(ros, ROBOT, iiwa("r", **_urdf(ros, urdf)))
     assert not answer.success
     assert answer.message.startswith("config: loadURDF.fileName: ") and expected in answer.message, answer.message
 
 
 @pytest.mark.parametrize("name", ["none", "bal", ""])
-def test_what_is_not_there_cannot_be_removed(ros, world, name):
+def test_unknown_object_cannot_be_removed(ros, world, name):
     answer = remove(ros, name)
     assert not answer.success
     assert answer.message.startswith(f"unknown object '{name}': known are floor, follower, ball, iiwa")
 
 
-def test_targets_for_a_robot_that_has_gone_do_not_reach_its_successor(ros, world):
+def test_targets_for_a_removed_robot_do_not_reach_its_successor(ros, world):
     inertia = "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
     link = f"<link name='{{}}'><inertial><mass value='1'/>{inertia}</inertial></link>"
     joint = (
@@ -375,7 +375,7 @@ def test_two_hundred_objects_leave_nothing_behind(ros, world):
     assert resident_mb(world.pid) < memory_mb + 100.0
 
 
-def test_of_many_who_add_the_same_name_at_once_one_succeeds(ros, world):
+def test_one_of_many_simultaneous_adds_of_a_name_succeeds(ros, world):
     answers = []
     threads = [threading.Thread(target=lambda: answers.append(add(ros, ROBOT, iiwa("same")).success)) for _ in range(6)]
     for thread in threads:
@@ -386,7 +386,7 @@ def test_of_many_who_add_the_same_name_at_once_one_succeeds(ros, world):
     assert remove(ros, "same").success
 
 
-def test_asking_about_a_robot_that_comes_and_goes_gets_answers_or_plain_errors(ros, world):
+def test_requests_about_a_changing_robot_get_answers_or_plain_errors(ros, world):
     over = threading.Event()
     outcomes = []
 

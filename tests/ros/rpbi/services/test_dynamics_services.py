@@ -47,7 +47,7 @@ def change(ros, name, dynamics):
 
 
 @pytest.mark.quick
-def test_what_is_got_edited_and_sent_back_is_what_changes(ros, simulator):
+def test_edited_dynamics_sent_back_change_only_the_edited_values(ros, simulator):
     for name in ("crate", "iiwa/lbr_iiwa_link_7"):
         dynamics = get(ros, name)
         same = change(ros, name, dynamics)
@@ -124,7 +124,7 @@ def test_bad_requests_are_refused_by_key_and_change_nothing(ros, simulator, name
     assert get(ros, "crate") == before
 
 
-def test_unknown_names_are_told_with_the_known_ones(ros, simulator):
+def test_unknown_names_are_reported_with_known_ones(ros, simulator):
     answer = ros.call("/rpbi/get_pybullet_object_dynamics", GetObjectDynamics, "crete")
     assert not answer.success
     assert answer.message == "unknown object 'crete': known are floor, box, crate, iiwa; did you mean 'crate'?"

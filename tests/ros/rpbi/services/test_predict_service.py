@@ -47,7 +47,7 @@ def predict(ros, *candidates: Candidate, ticks: int = 300, **fields):
 
 
 @pytest.mark.quick
-def test_the_prediction_of_the_chosen_candidate_is_what_happens(standing):
+def test_prediction_of_the_chosen_candidate_equals_the_later_outcome(standing):
     answer = predict(standing, turn(0.2), turn(0.7), Candidate(), watch=["iiwa", "box"], every=100)
     assert answer.success and answer.message == f"3 of 3 predicted from tick {answer.tick} on"
     arm, thing = answer.predictions[1].bodies
@@ -64,7 +64,7 @@ def test_the_prediction_of_the_chosen_candidate_is_what_happens(standing):
     assert standing.call("/rpbi/get_state_hash", GetStateHash).state_hash == hashes[1] and len(set(hashes)) == 3
 
 
-def test_the_world_goes_on_while_it_predicts(standing):
+def test_world_continues_while_it_predicts(standing):
     states = standing.listen("/rpbi/iiwa/joint_states", JointState)
     assert standing.call("/rpbi/start", Trigger).success
     try:

@@ -65,7 +65,7 @@ def _increasing(stamps):
 
 @pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
 @pytest.mark.parametrize("simulated", [True, False], ids=["sim time", "wall time"])
-def test_time_goes_on_and_the_world_stays_running_or_stopped(ros, start, running, simulated):
+def test_time_continues_and_the_world_stays_running_or_stopped(ros, start, running, simulated):
     start(simulated, start_pybullet_after_initialization=running)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     tf = ros.listen("/tf", TFMessage)
@@ -111,7 +111,7 @@ def test_the_same_state_follows_every_reset(ros, start):
     assert [answer.resets for answer in hashes] == [0, 1, 2]
 
 
-def test_objects_come_and_go_with_their_topics_and_the_rest_is_not_touched(ros, start):
+def test_topics_follow_added_and_removed_objects_and_others_stay_connected(ros, start):
     start()
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     joint_states.wait_for(1)
@@ -130,7 +130,7 @@ def test_objects_come_and_go_with_their_topics_and_the_rest_is_not_touched(ros, 
     joint_states.wait_for(seen + 20)
 
 
-def test_the_first_target_after_it_is_obeyed_and_one_from_before_is_not(ros, start):
+def test_first_target_after_reset_is_obeyed_and_earlier_ones_dropped(ros, start):
     start(start_pybullet_after_initialization=False)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     state = ros.listen("/rpbi/state", SimulationState)

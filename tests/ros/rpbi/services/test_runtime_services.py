@@ -56,7 +56,7 @@ def commands(listened):
 
 
 @pytest.mark.quick
-def test_world_goes_at_another_pace_and_tells_it_and_once_why_it_cannot(ros, simulator):
+def test_real_time_factor_can_be_changed_and_shortfall_warns_once(ros, simulator):
     states, diagnostics = ros.listen("/rpbi/state", SimulationState), ros.listen("/diagnostics", DiagnosticArray)
     answer = ros.call("/rpbi/set_real_time_factor", SetRealTimeFactor, 0.1)
     assert (answer.success, answer.message) == (True, "0.1, was 1")
@@ -120,7 +120,7 @@ def test_gains_are_changed_by_joint(ros, simulator):
     wait_until(lambda: "set_gains" in commands(entered), "the command is told")
 
 
-def test_a_sensor_is_read_at_another_rate_or_not_at_all(ros, simulator):
+def test_sensor_rate_can_be_changed_or_set_to_zero(ros, simulator):
     states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     states.wait_for(2)
     ros.call("/rpbi/stop", Trigger)
@@ -192,7 +192,7 @@ def test_bad_requests_are_refused_by_key_and_change_nothing(ros, simulator, serv
     assert set(commands(entered)) <= {"sensor_rate"}, "no other has entered the world"
 
 
-def test_an_object_that_comes_back_elsewhere_in_a_stopped_world_has_another_stamp(ros, simulator):
+def test_object_moved_in_a_stopped_world_gets_a_new_stamp(ros, simulator):
     def ball_at(x):
         found = [each for message in list(tf.messages) for each in message.transforms if "ball" in each.child_frame_id]
         return [each.header.stamp.to_nsec() for each in found], found and found[-1].transform.translation.x == x

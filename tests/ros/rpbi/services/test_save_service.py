@@ -50,7 +50,7 @@ def step(ros, ticks):
 
 
 @pytest.mark.quick
-def test_a_world_is_what_it_was_and_goes_on_the_same(standing, tmp_path):
+def test_restored_world_continues_identically(standing, tmp_path):
     states = standing.listen("/rpbi/iiwa/joint_states", JointState)
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
         target.publish(JointState(name=[JOINT], position=[0.7]))
@@ -110,7 +110,7 @@ def test_files_that_cannot_be_are_named_and_the_world_stays(standing, tmp_path):
     assert standing.call("/rpbi/get_state_hash", GetStateHash).state_hash == before
 
 
-def test_the_node_answers_while_it_restores_and_a_stop_ends_that(standing, tmp_path):
+def test_node_answers_during_a_restore_and_a_stop_ends_it(standing, tmp_path):
     step(standing, 10)
     save(tmp_path / "here.world")
     state = WorldState.read(tmp_path / "here.world")

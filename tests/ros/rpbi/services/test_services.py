@@ -49,7 +49,7 @@ def test_start_and_stop_say_whether_they_changed_anything(ros, simulator):
     wait_until(lambda: status.messages[-1].data == 1, "the status says running")
 
 
-def test_nothing_moves_while_stopped_and_time_goes_on_from_there(ros, simulator):
+def test_nothing_moves_while_stopped_and_time_continues_afterwards(ros, simulator):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     clock = ros.listen("/clock", Clock)
     ros.call("/rpbi/stop", Trigger)
@@ -69,7 +69,7 @@ def test_a_step_is_refused_while_running(ros, simulator):
 
 
 @pytest.mark.quick
-def test_a_step_goes_one_tick_on_and_everything_of_that_tick_arrives(ros, simulator):
+def test_step_advances_one_tick_and_all_its_messages_arrive(ros, simulator):
     ros.call("/rpbi/stop", Trigger)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     clock = ros.listen("/clock", Clock)
@@ -95,7 +95,7 @@ def test_a_step_goes_one_tick_on_and_everything_of_that_tick_arrives(ros, simula
     wait_until(lambda: status.messages[-1].data == 0, "the status says stopped")
 
 
-def test_an_answer_to_a_stop_comes_after_the_last_tick_was_told(ros, simulator):
+def test_answer_to_a_stop_comes_after_the_last_tick(ros, simulator):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     clock = ros.listen("/clock", Clock)
     joint_states.wait_for(5)

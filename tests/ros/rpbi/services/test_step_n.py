@@ -52,7 +52,7 @@ def _is_stepping(ros):
 
 
 @pytest.mark.quick
-def test_every_tick_is_told_and_counted(ros, stopped):
+def test_every_tick_is_published_and_counted(ros, stopped):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     joint_states.wait_for(1)
     before = ros.call("/rpbi/step_n", StepN, 0)
@@ -126,7 +126,7 @@ def test_it_is_refused_while_the_world_runs(ros, stopped):
     ros.call("/rpbi/stop", Trigger)
 
 
-def test_a_huge_number_holds_up_nothing_and_a_stop_ends_it(ros, stopped):
+def test_huge_number_of_steps_blocks_nothing_and_can_be_stopped(ros, stopped):
     clock, status = ros.listen("/clock", Clock), ros.listen("/rpbi/status", Int64)
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     answers, thread = _later(ros, HUGE)
@@ -184,7 +184,7 @@ def test_a_tick_listener_waits_for_all_of_a_tick(ros, stopped):
     listener.close()
 
 
-def test_the_predictive_controller_of_the_page_brings_the_joint_to_its_goal(ros, tmp_path):
+def test_predictive_controller_of_the_page_reaches_its_goal(ros, tmp_path):
     code = re.search(r"```python\n(.*?)```", DOCS.read_text(), re.DOTALL)[1]
     arm = iiwa(target_interpolation="hold")
     config = main_config(tmp_path, robots=(arm,), start_pybullet_after_initialization=False)

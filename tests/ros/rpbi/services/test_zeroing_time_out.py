@@ -22,7 +22,7 @@ node.main()
 """
 
 
-def test_zeroing_that_takes_too_long_is_given_up_and_can_be_asked_for_again(ros, tmp_path):
+def test_zeroing_that_times_out_can_be_requested_again(ros, tmp_path):
     sensor = {"joint": JOINT, "hz": 0.01}  # a sample every 100 s
     config = main_config(tmp_path, robots=(iiwa(enabled_joint_force_torque_sensors=[sensor]),))
     rospy.set_param("/ros_pybullet_interface/config", config)

@@ -36,7 +36,7 @@ def _ends(ros, *arguments):
 
 
 @pytest.mark.thorough
-def test_an_episode_ends_as_in_the_score_and_an_interrupt_ends_all(ros):
+def test_episode_ends_as_scored_and_an_interrupt_ends_all_nodes(ros):
     process = ros.start(["roslaunch", "rpbi_examples", "dual_arm.launch", "seed:=4", "noise:=true", *OPTIONS])
     wait_until(lambda: process.poll() is not None or "seed 5" in ros.output(process), "an episode has ended", 240.0)
     stop_group(process)
@@ -54,7 +54,7 @@ def test_an_episode_ends_as_in_the_score_and_an_interrupt_ends_all(ros):
     env.close()
 
 
-def test_without_the_extra_all_ends_with_a_line_that_names_it(ros, tmp_path):
+def test_missing_extra_ends_all_nodes_with_one_line(ros, tmp_path):
     (tmp_path / "pinocchio.py").write_text("raise ImportError('none here', name='pinocchio')\n")
     modules = os.pathsep.join((str(tmp_path), os.environ["PYTHONPATH"]))
     process = ros.start(["roslaunch", "rpbi_examples", "talos.launch", *OPTIONS], PYTHONPATH=modules)
@@ -69,7 +69,7 @@ def test_without_the_extra_all_ends_with_a_line_that_names_it(ros, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("scene", BOUNDS)
-def test_a_scene_does_what_it_is_about(ros, scene):
+def test_scene_reaches_its_documented_figures(ros, scene):
     ((seed, verdict, _, figures, _),) = _ends(ros, f"{scene}.launch", "seed:=2", "episodes:=1")
     assert (seed, verdict) == ("2", "succeeded")
     found = dict(each.rsplit(": ", 1) for each in figures.split(", "))

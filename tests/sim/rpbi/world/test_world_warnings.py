@@ -219,7 +219,7 @@ def test_gravity_upwards_and_positions_in_millimetres(warnings_of):
 
 
 @pytest.mark.parametrize("shape", [{"shapeType": "GEOM_SPHERE", "radius": 0.1}, {"shapeType": "GEOM_CAPSULE"}])
-def test_round_bodies_without_rolling_friction_on_level_floors_are_reported(warnings_of, shape):
+def test_round_bodies_without_rolling_friction_on_level_ground_are_reported(warnings_of, shape):
     def round_body(**dynamics):
         return ball(basePosition=[0.0, 0.0, 2.0], createCollisionShape=shape, changeDynamics=dynamics)
 
