@@ -1,4 +1,4 @@
-"""Tells catkin which Python packages live in src/; run by catkin, not by hand."""
+"""Declares the Python packages in src/ to catkin, which runs it; do not run it by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup

@@ -122,9 +122,9 @@ def test_nothing_is_farther_than_the_reach(rig):
     ("base", "tip", "error", "message"),
     [
         ("wall", "tol", UnknownNameError, "unknown link 'tol': known are wall, rail, .*did you mean 'tool'"),
-        ("tool", "wall", ValueError, "'wall' does not hang on 'tool'; above it are no links"),
-        ("disc", "cover", ValueError, "'cover' hangs on 'lid', a planar joint; only revolute, continuous, prismatic"),
-        ("cover", "tool", ValueError, "'tool' does not hang on 'cover'; above it are hand, arm, disc, carriage"),
+        ("tool", "wall", ValueError, "'wall' is not below 'tool'; above it are no links"),
+        ("disc", "cover", ValueError, "'cover' is below 'lid', a planar joint; only revolute, continuous, prismatic"),
+        ("cover", "tool", ValueError, "'tool' is not below 'cover'; above it are hand, arm, disc, carriage"),
         ("wall", "rail", ValueError, "no joint moves 'rail' in 'wall'"),
     ],
 )

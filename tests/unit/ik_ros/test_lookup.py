@@ -45,7 +45,7 @@ def test_missing_class_or_class_that_is_no_solver_is_named(name, message):
         ({"tip_link": "end_effector"}, None),
         ({"tip_link": "end_efector"}, r"arm.yaml: tip_link: unknown link 'end_efector'.*did you mean 'end_effector'"),
         ({"base_link": "lwr_base"}, "arm.yaml: base_link: unknown link 'lwr_base': known are base, lwr_arm_0_link"),
-        ({"base_link": "end_effector_ball", "tip_link": "base"}, "tip_link: .*'base' does not hang on 'end_effector_b"),
+        ({"base_link": "end_effector_ball", "tip_link": "base"}, "tip_link: .*'base' is not below 'end_effector_b"),
         ({"tip_link": "lwr_arm_0_link"}, "tip_link: .*no joint moves 'lwr_arm_0_link' in 'lwr_arm_0_link'"),
         ({"urdf_filename": "nowhere.urdf"}, "arm.yaml: urdf_filename: no such file: nowhere.urdf"),
         ({"urdf_filename": "{no_such_package}/a.urdf"}, "urdf_filename: unknown ROS package 'no_such_package'"),

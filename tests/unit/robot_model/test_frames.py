@@ -76,5 +76,5 @@ def test_invalid_names_and_values_are_reported(tmp_path):
         robot.pose((0.0, 0.0), "tip")
     with pytest.raises(ConfigError, match="joint 'hip': axis: must not be zero"):
         robot_of(tmp_path, SKEW.replace("1 2 -2", "0 0 0"))
-    with pytest.raises(ConfigError, match="mimics 'hop', which there is not"):
+    with pytest.raises(ConfigError, match="mimics 'hop', which does not exist"):
         robot_of(tmp_path, MIMIC.replace('mimic joint="hip"', 'mimic joint="hop"'))

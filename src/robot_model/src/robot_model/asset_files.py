@@ -1,4 +1,4 @@
-"""Files that a configuration names: where they are looked for, and field types that insist on them."""
+"""Files named in a configuration: search for them, and field types that require an existing file."""
 
 import os
 import sys
@@ -15,21 +15,22 @@ from custom_ros_tools.errors import ConfigError, MissingDependency, shortened
 from custom_ros_tools.schema import Expects, Text
 
 ROBOT_DESCRIPTION = "robot_description"
-"""The word that stands for the robot description on the parameter server in place of a file name."""
+"""Value of a file name that selects the robot description on the parameter server."""
 PYBULLET_DATA_PATH = "pybullet_data_path"
-"""The word that stands for the folder of PyBullet's data in search paths."""
+"""Value in search paths that selects the folder of PyBullet's data."""
 LONGEST_PATH = 1000
-"""Characters of a path; PyBullet copies them into 1024 bytes."""
+"""Largest length of a path; PyBullet copies it into 1024 bytes."""
 OF_KERNEL = ("/proc/", "/sys/", "/dev/")
-"""Folders whose files may be without end, or never begin."""
+"""Folders with special files: reading one may never end."""
 ASSETS = "example-robot-data"
-"""Robots of the extra `assets`: they are named as if this were a ROS package, `{example-robot-data}/robots/...`."""
+"""Python package of the robots of the extra `assets`; paths name it like a ROS package,
+`{example-robot-data}/robots/...`."""
 
 
 def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     """Returns the absolute path of a file that a YAML file names.
 
-    Looked for beside the YAML file, in the search paths and in PyBullet's data, in this order.
+    Searches the folder of the YAML file, the search paths and PyBullet's data, in this order.
 
     Args:
         name: Path in the YAML file; `{package}/path` and `package://package/path` are resolved.
@@ -60,7 +61,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
         raise ValueError(f"expected a file, got the folder {name}")
     where = "" if path.is_absolute() else f" (looked in {', '.join(map(str, folders))})"
     if where and file.startswith("~"):
-        where += "; what is on the parameter server has no folder: write {package}/PATH or the full path"
+        where += "; a configuration on the parameter server has no folder: write {package}/PATH or the full path"
     raise ValueError(f"no such file: {path if path.is_absolute() else name}{where}")
 
 
@@ -98,7 +99,7 @@ def find_folder(name: str, file: str) -> str:
 
 @lru_cache(maxsize=1)
 def pybullet_data() -> tuple[str, ...]:
-    """Returns the folder of PyBullet's data, which need not be installed."""
+    """Returns the folder of PyBullet's data, also where PyBullet is not installed."""
     spec = find_spec("pybullet_data")
     return tuple(spec.submodule_search_locations or ()) if spec else ()
 

@@ -28,12 +28,12 @@ class Chain:
 
     Attributes:
         joints: All joints in between, fixed ones too, from the base to the tip.
-        moving: Those of them that are not fixed.
-        joint_names: The n joints that are solved for: those that move, and in the place of joints that mimic another
-            that other one.
-        to_moving: The map from them to those that move.
-        limits: Their limits, within which joints that mimic them are within theirs too.
-        velocity_limits: Their largest speeds [rad/s or m/s], inf where there is none.
+        moving: The joints in between that are not fixed.
+        joint_names: The n joints that are solved for: the moving ones, with each mimic joint replaced by the joint that
+            it follows.
+        to_moving: The map from the n joints to the moving ones.
+        limits: Limits of the n joints, narrowed such that mimic joints stay within their own limits.
+        velocity_limits: Largest speeds of the n joints [rad/s or m/s], inf where there is none.
         robot_joints: All joints of the robot.
         mimics: Names of the chain's joints that mimic others.
 
@@ -61,14 +61,14 @@ class Chain:
 
     @cached_property
     def reach(self) -> Reach:
-        """The ball around the first joint that moves, in the base, that the tip never leaves."""
+        """Bounding ball of the tip's positions, around the first moving joint, in the base frame."""
         first = self.joints.index(self.moving[0])
         x, y, z = reduce(np.matmul, map(origin_of, self.joints[: first + 1]))[:3, 3].tolist()
         return Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in self.joints[first + 1 :]], self.moving)
 
     @property
     def urdf(self) -> str:
-        """A URDF of the chain alone, of bare links and joints."""
+        """A URDF of the chain alone, with empty links."""
         return chain_urdf(self.joints)
 
 
@@ -79,18 +79,18 @@ def _between(document: UrdfDocument, base: str, tip: str) -> tuple[UrdfJoint, ..
         name, kind, _ = next(above, ("", "", ""))
         if not name:
             passed = ", ".join(joint.parent for joint in joints) or "no links"
-            raise ValueError(f"'{tip}' does not hang on '{base}'; above it are {passed}")
+            raise ValueError(f"'{tip}' is not below '{base}'; above it are {passed}")
         joints.append(document.joints[name])
         if not joints[-1].is_moving and kind != "fixed":
             kinds = "only revolute, continuous, prismatic and fixed ones are solved for"
-            raise ValueError(f"'{tip}' hangs on '{name}', a {kind} joint; {kinds}")
+            raise ValueError(f"'{tip}' is below '{name}', a {kind} joint; {kinds}")
     if not any(joint.is_moving for joint in joints):
         raise ValueError(f"no joint moves '{tip}' in '{base}'")
     return tuple(joints[::-1])
 
 
 def _leader(document: UrdfDocument, joint: UrdfJoint) -> str:
-    """Returns the joint that is solved for in the place of a joint."""
+    """Returns the joint that is solved for instead of a joint: the one it mimics, or itself."""
     if joint.mimic is None:
         return joint.name
     leader = followed(joint.name, document.mimics).joint

@@ -1,4 +1,4 @@
-"""Tests for pytest that every library that moves robots passes; derive from `BackendConformance` to try one."""
+"""Tests for pytest that every kinematics library passes; derive from `BackendConformance` to test one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SKEW = """<robot name="skew">
   <joint name="roll" type="continuous">
     <parent link="rod"/><child link="tip"/><origin xyz="0 0.05 0.1"/><axis xyz="0 -1 0"/></joint>
 </robot>"""
-"""A robot with axes that are askew, a joint that slides, one without limits, and links that are fixed to others."""
+"""A robot with skew axes, a prismatic joint, a joint without limits, and fixed links."""
 MIMIC = SKEW.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="hip" multiplier="-0.5" offset="0.2"/>')
 """The same; its last joint follows its first one."""
 
@@ -58,7 +58,7 @@ class Backend(ABC):
 
 
 class BackendConformance(ABC):
-    """Tests that any library passes; robots are those of `robot_model`.
+    """Tests that any library passes; the reference is `robot_model`.
 
     Attributes:
         robots: URDFs of robots, beside those of this module.
@@ -78,7 +78,8 @@ class BackendConformance(ABC):
 
     @pytest.fixture
     def pairs(self, tmp_path: Path) -> list[tuple[RobotModel, Backend, list[int]]]:
-        """Returns each robot, the same in the library, and where joints of the latter are among those of the former."""
+        """Returns for each robot: the model, the robot in the library, and the indices of the library's joints in the
+        model."""
         paths = list(self.robots)
         for name, text in (("skew", SKEW), *((("mimic", MIMIC),) if self.follows_mimics else ())):
             path = tmp_path / f"{name}.urdf"
@@ -98,7 +99,7 @@ class BackendConformance(ABC):
     def test_joints_and_their_limits_are_those_of_the_urdf(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """Joints that mimic others are none of them; continuous ones have no limits."""
+        """Mimic joints are left out; continuous joints have no limits."""
         for robot, backend, order in pairs:
             assert sorted(backend.joint_names) == sorted(robot.joint_names)
             expected = robot.limits.of(order)
@@ -119,7 +120,7 @@ class BackendConformance(ABC):
     def test_jacobians_are_the_finite_differences_of_poses(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """Joints that mimic others count for those that they follow."""
+        """Motion of mimic joints is part of the derivative by the joint that they follow."""
         for robot, backend, order in pairs:
             q = np.array(self.configurations(robot)[0])[order]
             for link in _moved_links(robot):

@@ -15,7 +15,8 @@ from .joints import AffineMap, Array
 from .urdf.elements import UrdfJoint
 
 FEW = 24
-"""Number of configurations up to which products of 4 x 4 matrices are faster than rows with a number of each."""
+"""Number of configurations up to which products of 4 x 4 matrices are faster than arrays with one row for each
+entry."""
 _ROOT = np.eye(4)
 _QUARTER = np.pi / 2.0
 _YZX, _ZXY = np.array((1, 2, 0)), np.array((2, 0, 1))
@@ -24,9 +25,9 @@ _YZX, _ZXY = np.array((1, 2, 0)), np.array((2, 0, 1))
 class LinkFrames:
     """Frames of the links of a tree of joints with at most one axis.
 
-    Links that are fixed to each other move in one piece, with one frame. Frame 0 is the root; each other one moves with
-    a joint, in whose origin it is, with the axis of the joint along z. Configurations are those of n driven joints,
-    k x n [rad or m]. Any thread may ask.
+    Links that are fixed to each other share one frame. Frame 0 is the root. Each other frame moves with a joint; its
+    origin is that of the joint, and its z axis is the joint's axis. Configurations are those of n driven joints, k x n
+    [rad or m]. Thread-safe.
 
     Args:
         joints: All joints.
@@ -81,7 +82,7 @@ class LinkFrames:
         last, frames = self._last
         if key != last:
             frames = (self._of_few if len(q) <= FEW else self._of_many)(q)
-            self._last = key, frames  # several callers ask for the same
+            self._last = key, frames  # several callers request the same configurations
         return frames
 
     def of_links(self, q: Array) -> Array:
@@ -117,7 +118,7 @@ class LinkFrames:
         return self._jacobian(q, frame, self.at(q)[:, frame, :3] @ (pose @ (*point, 1.0)))
 
     def jacobian_at(self, q: Array, link: str, point: Sequence[float]) -> Array:
-        """Returns the Jacobians of the point of a link that is at a place in the root [m], see `jacobian`."""
+        """Returns the Jacobians of the point of a link that is at a given position in the root [m], see `jacobian`."""
         return self._jacobian(q, self.place(link)[0], np.broadcast_to(point, (len(q), 3)))
 
     def _jacobian(self, q: Array, frame: int, tip: Array) -> Array:
@@ -135,7 +136,8 @@ class LinkFrames:
         return jacobian
 
     def _of_parts(self) -> tuple[Array, Array]:
-        """Returns the map from n positions to the angles whose sines are the factors of all parts, n x 3 f and 3 f."""
+        """Returns the affine map from n positions to the angles whose sines multiply the parts of f frames, n x 3 f and
+        3 f."""
         m, n = self._to_moving.factors.shape
         factors, offsets = np.zeros((m + 1, 3, n)), np.tile((_QUARTER, 0.0, _QUARTER), (m + 1, 1))
         factors[1:, 1:] = self._to_moving.factors[:, None]
@@ -143,7 +145,7 @@ class LinkFrames:
         return factors.reshape(-1, n).T.copy(), offsets.ravel()
 
     def _of_few(self, q: Array) -> Array:
-        """Multiplies each frame by that above it, then by that above these two, and so on."""
+        """Multiplies each frame by its parent's, the product by that of the frame above both, and so on."""
         angles = q.dot(self._factors)
         angles += self._offsets
         factors = np.sin(angles)
@@ -155,7 +157,7 @@ class LinkFrames:
         return frames
 
     def _of_many(self, q: Array) -> Array:
-        """Does the same with a row of k numbers for each entry of a matrix, columns of a matrix before its rows."""
+        """Does the same with a row of k numbers for each entry of a matrix, in column-major order."""
         positions = self._to_moving.factors @ q.T + self._to_moving.offsets[:, None]
         sines, cosines = np.sin(positions), np.cos(positions)
         frames, upper = _rows(len(self._moving) + 1, len(q))

@@ -1,4 +1,4 @@
-"""Poses, twists, rotations and vectors as tuples of floats, a tenth as slow as arrays of three.
+"""Poses, twists, rotations and vectors as tuples of floats, ten times as fast as arrays of three.
 
 Quaternions are x, y, z, w. Conversions to and from matrices and roll, pitch, yaw are in `custom_ros_tools.transforms`.
 """
@@ -141,7 +141,7 @@ def angle_between(start: Quaternion, end: Quaternion) -> float:
 
 
 def rotation_between(start: Quaternion, end: Quaternion) -> Vector:
-    """Returns the rotation vector [rad] that leads from one orientation to another, the shorter way."""
+    """Returns the rotation vector [rad] of the shorter rotation from one orientation to another."""
     w0, w1 = start[3], end[3]
     v0, v1 = start[:3], end[:3]
     x, y, z = minus(minus(scaled(w0, v1), scaled(w1, v0)), cross(v1, v0))

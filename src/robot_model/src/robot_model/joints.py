@@ -1,4 +1,4 @@
-"""The affine map from the joints that are driven to all joints, which those that mimic others follow by."""
+"""The affine map from the driven joints to all joints, mimic joints included."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class AffineMap(NamedTuple):
-    """Positions of m joints by those of n driven ones: `factors @ q + offsets`.
+    """Positions of m joints as a function of n driven ones: `factors @ q + offsets`.
 
     Attributes:
         factors: m x n; velocities of the m joints are this times those of the n.
@@ -42,7 +42,7 @@ class AffineMap(NamedTuple):
         Args:
             names: The m joints.
             driven: The n joints.
-            mimics: By name, the joint that each mimic joint follows; it may follow another one in turn.
+            mimics: For each mimic joint by name, the joint that it follows, which may itself mimic another.
             still: Positions of the joints that are neither driven nor follow a driven one [rad or m], 0 by default.
         """
         columns = {name: column for column, name in enumerate(driven)}
@@ -58,7 +58,7 @@ class AffineMap(NamedTuple):
 
 
 def followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
-    """Returns the joint that a mimic joint follows in the end, which follows no other.
+    """Returns the joint that a mimic joint finally follows, which follows no other.
 
     Raises:
         ValueError: If it follows itself; the message names the joint.

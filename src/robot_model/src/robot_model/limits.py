@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 MAX_MAGNITUDE = 1e9
-"""Largest position, velocity or effort that is accepted, in any unit; squares of larger ones overflow soon."""
+"""Largest accepted position, velocity or effort, in any unit; squares of larger ones may overflow."""
 LIMIT_ROUNDING = 1e-6
 """Distance beyond a limit [rad or m] up to which a position counts as within."""
 TURN = 2.0 * math.pi
@@ -18,7 +18,7 @@ Generator = random.Random | np.random.Generator
 
 
 class Axis(Protocol):
-    """A joint that turns about one axis or slides along it, within limits [rad or m]."""
+    """A revolute or prismatic joint with limits [rad or m]."""
 
     @property
     def lower(self) -> float: ...
@@ -31,7 +31,7 @@ class Axis(Protocol):
 
 
 class Limits:
-    """Limits of n joints; plain numbers, since arrays of seven take longer.
+    """Limits of n joints, as plain numbers, which are faster than small arrays.
 
     Args:
         lower: n lower limits [rad or m], -inf where there is none.
@@ -39,7 +39,7 @@ class Limits:
         is_revolute: Which joints turn.
 
     Attributes:
-        middle: n positions half-way between the limits, 0 or the limit next to it where there are not both.
+        middle: n positions half-way between the limits; if one limit is missing, the allowed position nearest to 0.
     """
 
     def __init__(self, lower: Sequence[float], upper: Sequence[float], is_revolute: Sequence[bool]) -> None:
@@ -64,12 +64,13 @@ class Limits:
     def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], list[bool]]:
         """Returns positions within the limits, and which of them stopped at one.
 
-        Joints that turn are turned by whole turns to get there. A position that is beyond a limit by no more than
-        rounding is put on it, and does not count as stopped.
+        Revolute joints are moved by whole turns to get there. A position that exceeds a limit only by rounding is set
+        to the limit, and does not count as stopped.
 
         Args:
             q: n positions [rad or m].
-            near: n positions; of several turns that fit, joints that turn take the one nearest to these.
+            near: n positions; of several equivalent angles within limits, revolute joints take the one nearest to
+                these.
         """
         inside, stopped = [], []
         for position, close, (lower, upper, is_revolute) in zip(q, near, self._joints):
@@ -85,11 +86,11 @@ class Limits:
         return inside, stopped
 
     def clip(self, q: Sequence[float]) -> list[float]:
-        """Returns positions, each moved to the limit that it is beyond [rad or m]."""
+        """Returns positions clipped to the limits [rad or m]."""
         return [min(max(position, lower), upper) for position, lower, upper in zip(q, self.lower, self.upper)]
 
     def random(self, generator: Generator, near: Sequence[float]) -> list[float]:
-        """Returns random positions within the limits; half a turn or 1 m around `near` where there are none."""
+        """Returns random positions within the limits; joints without limits get half a turn or 1 m around `near`."""
         positions = []
         for close, (lower, upper, is_revolute) in zip(near, self._joints):
             half = math.pi if is_revolute else 1.0
@@ -102,9 +103,9 @@ class Limits:
         """Yields n positions to start a search at [rad or m].
 
         Args:
-            first: The first ones.
+            first: The first n positions.
             restarts: Number of random ones after it.
-            seed: Returns what they are drawn from; only called if they are asked for, since that takes a while.
+            seed: Returns the random generator; only called when random positions are needed, since making it is slow.
         """
         yield first
         generator = seed()
@@ -113,7 +114,7 @@ class Limits:
 
 
 def _turned(position: float, lower: float, upper: float) -> float:
-    """Returns an angle outside limits, turned towards them until it is not beyond the one that it was beyond."""
+    """Returns an angle outside limits, moved by whole turns until it no longer exceeds the limit that it exceeded."""
     if position > upper:
         return position - TURN * math.ceil((position - upper - LIMIT_ROUNDING) / TURN)
     return position + TURN * math.ceil((lower - position - LIMIT_ROUNDING) / TURN)

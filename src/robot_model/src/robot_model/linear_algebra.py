@@ -1,10 +1,10 @@
 """Equations with symmetric positive definite matrices, such as mass matrices.
 
-The results are the same to the last bit with any number of LAPACK's threads, for matrices of up to some 60 rows, unlike
-those of `numpy.linalg.solve` and `inv`. Threads for several right sides at once also wait for each other, on a busy
-machine much longer than the computation lasts.
+For matrices of up to about 60 rows, the results are the same to the last bit with any number of LAPACK's threads,
+unlike those of `numpy.linalg.solve` and `inv`. With several right-hand sides, LAPACK's threads would also wait for each
+other, on a busy machine much longer than the computation takes.
 
-That a matrix is symmetric and positive definite is not checked: for others, the results mean nothing.
+The functions do not check that a matrix is symmetric and positive definite; for others, the results are undefined.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 def solve(matrix: Array, right: Array) -> Array:
     """Returns x of matrix x = right, for a matrix of shape (n, n); `right` and x have shape (n,)."""
-    from scipy.linalg import lapack  # slow to load, and most worlds solve nothing
+    from scipy.linalg import lapack  # slow to import, and most worlds do not need it
 
     solution: Array = lapack.dposv(matrix, right)[1]
     return solution

@@ -42,12 +42,12 @@ def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
 class RobotModel:
     """Joints, limits and kinematics of a robot, a tree of links.
 
-    Configurations have one number for each of n driven joints, in a fixed order. Joints that mimic others follow them;
-    all others stand at 0, or at the limit that is nearest to it.
+    Configurations have one number for each of n driven joints, in a fixed order. Mimic joints follow theirs; all other
+    joints are at 0, or at the limit nearest to 0.
 
     Args:
         urdf_path: The URDF; the meshes that it names need not be there.
-        joint_names: The n driven joints; without any, all that have one axis and mimic no other.
+        joint_names: The n driven joints; by default all joints with one axis that do not mimic another.
 
     Attributes:
         urdf_path: The URDF.
@@ -57,7 +57,7 @@ class RobotModel:
         joints: Their descriptions.
         limits: Their limits.
         links: Names of all links.
-        root: Name of the link that hangs on no joint.
+        root: Name of the link that is no joint's child.
 
     Raises:
         ConfigError: If the description cannot be read, or a joint makes no sense.
@@ -70,7 +70,7 @@ class RobotModel:
         self.all_joints = document.joints
         for name, mimic in document.mimics.items():
             if mimic.joint not in self.all_joints:
-                message = f"joint '{name}' mimics '{mimic.joint}', which there is not"
+                message = f"joint '{name}' mimics '{mimic.joint}', which does not exist"
                 raise ConfigError([Problem(urdf_path, "", message)])
         movable = [name for name, joint in self.all_joints.items() if joint.is_moving and joint.mimic is None]
         for name in joint_names:

@@ -12,10 +12,10 @@ from .residual import POSITION_TOLERANCE_M
 
 
 class Reach(NamedTuple):
-    """The ball that the tip of a chain of joints never leaves.
+    """Ball that contains all positions of the tip of a chain of joints.
 
     Attributes:
-        anchor: Its centre, where the first joint that moves is in the base [m].
+        anchor: Its centre, the position of the first moving joint in the base [m].
         radius_m: Its radius [m], inf for endless rails.
     """
 
@@ -24,7 +24,7 @@ class Reach(NamedTuple):
 
     @classmethod
     def of(cls, anchor: Vector, lengths: Iterable[float], joints: Iterable[Axis]) -> Reach:
-        """Returns the reach of a chain of joints that move.
+        """Returns the reach of a chain of moving joints.
 
         Args:
             anchor: See above.
@@ -34,7 +34,7 @@ class Reach(NamedTuple):
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Returns whether the tip may come as near to a position in the base [m] as counts as reached.
+        """Returns whether the tip may reach a position in the base [m] within the tolerance of success.
 
         Args:
             tolerance_m: Further distance from the position that is accepted [m].

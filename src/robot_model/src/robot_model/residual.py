@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 POSITION_TOLERANCE_M = 1e-3
-"""A target counts as reached within this distance [m]..."""
+"""Largest position error of a target that counts as reached [m]."""
 ORIENTATION_TOLERANCE_RAD = 0.01
-"""... and this angle [rad]."""
+"""Largest orientation error of a target that counts as reached [rad]."""
 
 
 class Residual(NamedTuple):
@@ -13,7 +13,7 @@ class Residual(NamedTuple):
 
     Attributes:
         position_m: Distance [m].
-        orientation_rad: Angle [rad]; 0 if no orientation is asked for.
+        orientation_rad: Angle [rad]; 0 if the target has no orientation.
     """
 
     position_m: float
@@ -21,11 +21,12 @@ class Residual(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The larger of both in tolerances: up to 1, the target counts as reached."""
+        """Larger of both as a multiple of its tolerance: up to 1, the target counts as reached."""
         return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
 
     def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
-        """Returns whether a link has reached a target, maybe of its orientation too, and how far off it is."""
+        """Returns a sentence that says whether a link has reached a target, and the errors; `has_orientation` includes
+        the angle."""
         angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
         if self.size <= 1.0:
             return f"'{link}' is within {self.position_m * 1e3:.3g} mm{angle} of {target}"

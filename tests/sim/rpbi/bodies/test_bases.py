@@ -461,7 +461,7 @@ def test_configurations_that_make_no_sense_are_named(build, tmp_path, more, key)
         ("<robot name='r'/>", "the robot has no <link>"),
         (
             "<robot name='r'><link name='a'/><link name='b'/></robot>",
-            "expected one link that hangs on no joint, got a, b",
+            "expected one link that is no joint's child, got a, b",
         ),
     ],
 )

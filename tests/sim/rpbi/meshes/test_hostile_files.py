@@ -77,21 +77,21 @@ def _chain(joints, kind):
 
 
 FAULTS = {
-    "two roots": (_urdf(_links("a", "b")), "expected one link that hangs on no joint, got a, b: is a joint missing?"),
+    "two roots": (_urdf(_links("a", "b")), "expected one link that is no joint's child, got a, b: is a joint missing?"),
     "two parents": (
         _urdf(_links("a", "b", "c"), JOINT.format("j", "fixed", "a", "b"), JOINT.format("k", "fixed", "c", "b")),
-        "link 'b' hangs on two joints; the second is 'k'",
+        "link 'b' is the child of two joints; the second is 'k'",
     ),
     "joints of one name": (
         _urdf(_links("a", "b", "c"), JOINT.format("j", "fixed", "a", "b"), JOINT.format("j", "fixed", "b", "c")),
         "2 joints are called 'j'; names are unique",
     ),
-    "its own parent": (_urdf(_links("a", "b"), JOINT.format("j", "fixed", "b", "b")), "ties link 'b' to itself"),
+    "its own parent": (_urdf(_links("a", "b"), JOINT.format("j", "fixed", "b", "b")), "connects link 'b' to itself"),
     "a circle": (
         _urdf(_links("a", "b", "c"), JOINT.format("j", "fixed", "b", "c"), JOINT.format("k", "fixed", "c", "b")),
-        "link 'b' hangs on itself in the end",
+        "link 'b' is its own ancestor",
     ),
-    "no such link": (_urdf(_links("a"), JOINT.format("j", "fixed", "a", "x")), "ties link 'x', which there is not"),
+    "no such link": (_urdf(_links("a"), JOINT.format("j", "fixed", "a", "x")), "connects link 'x', which does not exist"),
     "a long name": (_urdf(_links("a" * 5000)), "link.name: expected at most 250 bytes, got 5000: 'aaa"),
     "a robot's long name": (
         _urdf(_links("a")).replace('"r"', f'"{"r" * 1100}"'),
@@ -125,7 +125,7 @@ FAULTS = {
     "too many joints": (_chain(128, "revolute"), "expected at most 127 joints that are not fixed, got 128"),
     "too many links": (_chain(2000, "fixed"), "expected at most 2000 links and as many joints, got 2001 links"),
     "no name": (_urdf(_links("")), "a link has no name"),
-    "xacro": (_urdf(MASSES.format("a", "${mass}")), "'${mass}' is left of xacro"),
+    "xacro": (_urdf(MASSES.format("a", "${mass}")), "'${mass}' is unexpanded xacro"),
     "mass nan": (_urdf(MASSES.format("a", "nan")), "link 'a': mass.value: expected finite numbers, got 'nan'"),
     "a huge mass": (_urdf(MASSES.format("a", "1e300")), "mass.value: must be within +-1e+09, got '1e300'"),
     "less than no mass": (_urdf(MASSES.format("a", "-1")), "mass.value: must be >= 0 [kg], got '-1'"),
@@ -138,7 +138,7 @@ FAULTS = {
     ),
     "no mesh": (
         _urdf('<link name="a"><collision><geometry><mesh filename="no.obj"/></geometry></collision></link>'),
-        "no such mesh: no.obj (looked for beside it and in all folders above)",
+        "no such mesh: no.obj (searched the folder of the URDF and all folders above)",
     ),
     "deep": ("<robot>" + "<a>" * 100_000, "is not XML: "),
     "deep, and closed": ("<robot>" + "<a>" * 20_000 + "</a>" * 20_000 + "</robot>", "in at most 100 others"),
@@ -191,7 +191,7 @@ def test_urdf_of_every_kind_of_body_is_checked_before_loading(tmp_path, kind):
     path.write_text(FAULTS["two parents"][0])
     with (
         contextlib.closing(World(load_world(write_world(tmp_path)))) as world,
-        pytest.raises(ConfigError, match="hangs on two joints"),
+        pytest.raises(ConfigError, match="is the child of two joints"),
     ):
         world.add(kind, {"name": "it", "loadURDF": {"fileName": str(path)}})
 

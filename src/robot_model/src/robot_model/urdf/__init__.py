@@ -1,1 +1,1 @@
-"""URDFs: reading them, faults in their structure, the files that they name, and changed copies."""
+"""URDFs: reading, structural checks, referenced files, and modified copies."""

@@ -23,8 +23,8 @@ from .elements import (
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
     """Returns a URDF without shapes, of all or some links and the joints between them.
 
-    It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
-    that PyBullet's frames of mass centres are the links' frames.
+    It loads in half a millisecond; with meshes it may take some hundred. Every link has unit mass at its own frame, so
+    that PyBullet's centre-of-mass frames are the links' frames.
     """
     root = document.root_link()
     kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
@@ -37,12 +37,12 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
 
 
 def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
-    """Returns a URDF with limits from 0 to 0, which mean none, for joints that turn without end.
+    """Returns a URDF in which continuous joints are revolute with limits 0 and 0, which mean none.
 
-    Each of them then has one number in Pinocchio, instead of sine and cosine.
+    Pinocchio then represents each of them by one number instead of sine and cosine.
 
     Args:
-        base: The link that all hangs on instead of the root.
+        base: The link that becomes the new root.
 
     Raises:
         ValueError: If a joint between it and the root makes no sense; it names the joint.
@@ -61,13 +61,14 @@ def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
-    """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
+    """Returns a URDF of a chain of joints with empty links, from its base to its tip."""
     links = [new_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]
     return text_of(new_element("robot", *links, *map(joint_element, joints), name="chain"))
 
 
 def _hang_on(robot: Element, base: str) -> None:
-    """Turns the joints between a link and the root around, with further links; their positions mean what they did."""
+    """Makes a link the root: reverses the joints above it, with extra links such that joint positions keep their
+    meaning."""
     above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
     link = base
     while (joint := above.pop(link, None)) is not None:
@@ -78,7 +79,7 @@ def _hang_on(robot: Element, base: str) -> None:
         for part in ("origin", "axis", "parent", "child"):
             for element in joint.findall(part):
                 joint.remove(element)
-        # A joint moves where its origin puts it, so the origin comes back afterwards, one turn after the other.
+        # The inverse transform is the inverse motion, then the inverse origin, with one fixed joint for each rotation.
         steps = (
             ("rpy", (-roll, 0.0, 0.0)),
             ("rpy", (0.0, -pitch, 0.0)),

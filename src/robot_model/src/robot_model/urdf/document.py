@@ -18,7 +18,7 @@ MAX_BYTES = 2_000_000
 
 
 class Edge(NamedTuple):
-    """A joint, as far as it ties links."""
+    """The links that a joint connects."""
 
     joint: str
     parent: str
@@ -29,7 +29,7 @@ class Attribute(NamedTuple):
     """A text in a URDF.
 
     Attributes:
-        owner: The link or joint that it is of, for messages.
+        owner: The link or joint that it belongs to, for messages.
         tag: The element that has it.
         key: Its name.
         text: The text.
@@ -58,7 +58,7 @@ class UrdfDocument:
         tag: The element at the top, `robot` in a URDF.
         links: Names of all links. Callers must not change this or any other attribute.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
-        edges: All joints, with the links that they tie, in the file's order.
+        edges: All joints with the links that they connect, in the file's order.
         meshes: The meshes of links, as the file names them.
         source: The file that was read.
         root: The element at the top, not to be changed.
@@ -105,12 +105,12 @@ class UrdfDocument:
         return {name: mimic for name, mimic in found.items() if mimic is not None}
 
     def meshes_of(self, part: str) -> list[str]:
-        """Returns the meshes of a part of links, `visual` or `collision`, as the file names them."""
+        """Returns the meshes of a part of the links, `visual` or `collision`, as the file names them."""
         found = self.root.iterfind(f"link/{part}//mesh")
         return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
 
     def attributes(self) -> Iterator[Attribute]:
-        """Yields all that stands in it."""
+        """Yields all attributes of its links and joints."""
         for key, text in self.root.attrib.items():
             yield Attribute(self.tag, "robot", key, text, True)
         for owner in self.root:
@@ -135,11 +135,11 @@ class UrdfDocument:
 
     @property
     def is_soft(self) -> bool:
-        """Whether it describes a soft body."""
+        """Whether the file describes a soft body."""
         return self.root.find("deformable") is not None
 
     def deformable_meshes(self) -> list[str]:
-        """Returns the files that its soft body is made of; none if it describes none.
+        """Returns the mesh files of its soft body; none if the file describes no soft body.
 
         Raises:
             ConfigError: If a mesh does not exist.
@@ -155,7 +155,7 @@ class UrdfDocument:
             yield joint.get("name", ""), joint.get("type", ""), link
 
     def root_link(self) -> str:
-        """Returns the name of the link that everything else hangs on.
+        """Returns the name of the root link.
 
         Raises:
             ConfigError: If there is not one link that is no joint's child.
@@ -170,7 +170,7 @@ class UrdfDocument:
 
 @lru_cache(maxsize=32)
 def _robot_in(data: bytes) -> Element:
-    """Returns the robot in a file's content; that of files that were read lately is there already."""
+    """Parses the robot in a file's content; results are cached."""
     return parse(data.decode(errors="replace"))
 
 
@@ -195,7 +195,7 @@ def _parts_of(root: Element) -> _Parts:
 
 
 def mimics_of(path: str) -> dict[str, Mimic]:
-    """Returns the joints of a URDF file that follow others, by name; none if it cannot be read as PyBullet may do.
+    """Returns the mimic joints of a URDF file by name; none if the file cannot be read.
 
     Raises:
         ValueError: If a value makes no sense; it names the joint.

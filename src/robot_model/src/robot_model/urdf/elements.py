@@ -4,7 +4,7 @@ import math
 import re
 from typing import NamedTuple
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element as Element  # other modules have it from here
+from xml.etree.ElementTree import Element as Element  # re-exported for other modules
 from xml.parsers import expat
 
 from robot_model.geometry import Vector
@@ -18,23 +18,24 @@ READ = frozenset(
     "reduced_deformable collision_margin friction repulsion_stiffness gravity_factor neohookean corotated spring "
     "num_modes stiffness_scale damping_coefficient cache_barycenter".split()
 )
-"""Elements that PyBullet reads, and gets."""
+"""Elements that PyBullet reads; only these are passed on."""
 MAX_TAGS = 50_000
-"""Largest number of tags in a file; a file with more counts as no XML."""
+"""Largest number of tags in a file; a file with more is rejected as not well-formed."""
 MAX_NESTED = 100
-"""Largest depth of elements; a deeper file counts as no XML."""
+"""Largest depth of elements; a deeper file is rejected as not well-formed."""
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
+"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet accepts them."""
 _ROBOT, _END_OF_ROBOT = re.compile(r"<robot\b"), re.compile(r"</robot\s*>")
 _DEFAULT = re.compile(r"\$\(optenv \w+ ([^()]*)\)")
-"""A variable of the environment in xacro, with what holds if it is not set."""
+"""Reference to an environment variable in xacro, with its default."""
 _CHUNK = 1 << 16
-"""Characters that are parsed at once: in between, other threads go on."""
+"""Number of characters that are parsed at once; other threads run in between."""
 _ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Mimic(NamedTuple):
-    """That a joint follows another: its position is `multiplier` times that of the other, plus `offset`."""
+    """Relation of a mimic joint to the joint that it follows: its position is `multiplier` times that of the other,
+    plus `offset`."""
 
     joint: str
     multiplier: float
@@ -47,7 +48,7 @@ class UrdfJoint(NamedTuple):
     Attributes:
         name: Its name.
         type: Its type, such as `revolute`.
-        parent: The link it is fixed to.
+        parent: The link that it is attached to.
         child: The link that it moves.
         xyz: Its position in the parent link [m].
         rpy: Its rotation there, about the parent's x, y and z one after the other [rad].
@@ -72,7 +73,7 @@ class UrdfJoint(NamedTuple):
 
     @property
     def is_moving(self) -> bool:
-        """Whether it has one axis to move about or along."""
+        """Whether it moves about or along one axis."""
         return self.type in MOVING
 
     @property
@@ -87,7 +88,7 @@ class UrdfJoint(NamedTuple):
 
 
 def parse(text: str) -> Element:
-    """Returns the robot that stands in a text, as PyBullet finds it, in a time that grows with its length alone.
+    """Returns the robot element in a text, found as PyBullet does, in time linear in its length.
 
     Raises:
         ExpatError: If it is not well-formed.
@@ -107,14 +108,14 @@ def parse(text: str) -> Element:
     parser.Parse("", True)
     robot = builder.close()
     _check_depth(robot)
-    if "$(optenv" in text:  # left of xacro in a robot of PyBullet's data
+    if "$(optenv" in text:  # xacro left unexpanded in a robot of PyBullet's data
         for element in robot.iter():
             element.attrib.update({key: _DEFAULT.sub(r"\1", value) for key, value in element.attrib.items()})
     return robot
 
 
 def _without_comments(text: str) -> str:
-    """Returns a text with spaces in the place of comments; XML allows no `--` in them, PyBullet does."""
+    """Returns a text with comments replaced by spaces; unlike XML, PyBullet allows `--` in comments."""
     parts, end = [], 0
     while (start := text.find("<!--", end)) >= 0 and (stop := text.find("-->", start + 4)) >= 0:
         parts += [text[end:start], _blank(text[start : stop + 3])]
@@ -123,7 +124,7 @@ def _without_comments(text: str) -> str:
 
 
 def _end_of_robot(text: str) -> int:
-    """Returns where the last robot ends, 0 if none does."""
+    """Returns the index of the end of the last robot element, 0 if there is none."""
     start = len(text)
     while (start := text.rfind("</robot", 0, start)) >= 0:
         if match := _END_OF_ROBOT.match(text, start):
@@ -132,7 +133,7 @@ def _end_of_robot(text: str) -> int:
 
 
 def _blank(text: str) -> str:
-    """Returns as many spaces, so that messages of the parser have the file's lines and columns."""
+    """Replaces a match by spaces, so that lines and columns in the parser's messages are those of the file."""
     return "\n".join(" " * len(line) for line in text.split("\n"))
 
 
@@ -145,14 +146,14 @@ def _check_depth(root: Element) -> None:
 
 
 def as_read(element: Element) -> Element:
-    """Returns a copy of an element with what PyBullet reads of it: known elements and their attributes, no text."""
+    """Returns a copy of an element with only the parts that PyBullet reads: known elements and attributes, no text."""
     result = Element(element.tag, element.attrib)
     result.extend([as_read(child) for child in element if child.tag in READ])
     return result
 
 
 def read_joint(element: Element) -> UrdfJoint:
-    """Reads a joint; as in PyBullet, lower limits that are not below the upper ones mean that there are none.
+    """Reads a joint; as in PyBullet, a lower limit that is not below the upper one means no limits.
 
     Raises:
         ValueError: If a value makes no sense; it names the joint.
@@ -181,7 +182,7 @@ def read_joint(element: Element) -> UrdfJoint:
 
 
 def read_mimic(element: Element) -> Mimic | None:
-    """Returns what a joint follows, if anything.
+    """Returns the mimic relation of a joint, None if it has none.
 
     Raises:
         ValueError: If a value makes no sense; it names the joint.
@@ -232,7 +233,7 @@ def _attribute(element: Element, part: str, key: str, default: str = "") -> str:
 
 
 def joint_element(joint: UrdfJoint) -> Element:
-    """Returns a joint with what counts for positions."""
+    """Returns the element of a joint with only the parts that kinematics need."""
     unlimited = joint.lower == -math.inf
     parts = [new_element("parent", link=joint.parent), new_element("child", link=joint.child)]
     parts.append(new_element("origin", xyz=words(joint.xyz), rpy=words(joint.rpy)))
@@ -245,20 +246,21 @@ def joint_element(joint: UrdfJoint) -> Element:
 
 
 def inertial(mass: str) -> Element:
-    """Returns a mass [kg], and as much inertia about each axis [kg m^2], at the link's frame."""
+    """Returns an inertial element at the link's frame, with a mass [kg] and the same number as inertia about each axis
+    [kg m^2]."""
     inertia = {"ixx": mass, "iyy": mass, "izz": mass, "ixy": "0", "ixz": "0", "iyz": "0"}
     return new_element("inertial", new_element("mass", value=mass), new_element("inertia", **inertia))
 
 
 def new_element(tag: str, /, *parts: Element, **attributes: str) -> Element:
-    """Returns an element with parts and attributes."""
+    """Returns an element with children and attributes."""
     element = Element(tag, attributes)
     element.extend(parts)
     return element
 
 
 def words(vector: Vector) -> str:
-    """Returns numbers as an attribute has them, to the last bit."""
+    """Returns numbers as the text of an attribute, exact to the last bit."""
     return " ".join(map(repr, vector))
 
 

@@ -1,4 +1,4 @@
-"""Files of URDFs: where those are that they name, and how descriptions without a file get one."""
+"""Files of URDFs: search for the files that a URDF names, and temporary files for descriptions without a file."""
 
 import hashlib
 from functools import lru_cache
@@ -14,12 +14,12 @@ PACKAGE = "package://"
 
 @lru_cache(maxsize=1)
 def _folder() -> Path:
-    """Returns a folder for this process's rewritten files; it goes when the process ends."""
+    """Returns a folder for this process's rewritten files, which is removed when the process ends."""
     return Path(temporary_folder("urdf").name)
 
 
 def write_description(text: str) -> str:
-    """Writes a robot description that has no file, such as that of the parameter server, into one of its own.
+    """Writes a robot description without a file, such as that of the parameter server, into a temporary file.
 
     Returns:
         The file, which lasts as long as the process.
@@ -30,12 +30,12 @@ def write_description(text: str) -> str:
 
 
 def is_temporary(path: str) -> bool:
-    """Returns whether a file is one of this module's, which go when the process ends."""
+    """Returns whether a file is one of this module's temporary files."""
     return Path(path).parent == _folder()
 
 
 def found_by_ros(mesh: str, source: Path) -> str | Path:
-    """Returns how ROS finds a mesh or texture that the URDF file `source` names `mesh`.
+    """Returns an address by which ROS finds the mesh or texture `mesh` of the URDF file `source`.
 
     Returns:
         A file for a relative path, or for a package that is unknown or lacks it; otherwise the address in the URDF.
@@ -54,17 +54,16 @@ def found_by_ros(mesh: str, source: Path) -> str | Path:
 
 
 def found_mesh(name: str, source: Path) -> Path:
-    """Returns the path of the mesh `name` in the URDF file `source`: in its package, or where PyBullet looks for it.
+    """Returns the path of the mesh `name` in the URDF file `source`: in its package, or where PyBullet searches.
 
     Raises:
-        ConfigError: If it is of an unknown package.
-        OSError: If there is none.
+        ConfigError: If its package is unknown. OSError: If the mesh does not exist.
     """
     if name.startswith(PACKAGE):
         return mesh_file(name, source)
     found = beside_or_above(name.removeprefix("model://"), source)
     if found is None:
-        looked = "looked for beside it and in all folders above"
+        looked = "searched the folder of the URDF and all folders above"
         raise FileNotFoundError(f"no such mesh: {shortened(name)} ({looked})")
     return found
 
@@ -90,7 +89,7 @@ def mesh_file(mesh: str, source: Path) -> Path:
 
 
 def beside_or_above(name: str, source: Path) -> Path | None:
-    """Returns where PyBullet finds a file that a URDF names: beside it or in a folder above."""
+    """Returns the path at which PyBullet finds a file that a URDF names: in its folder or a folder above."""
     files = (folder / name for folder in source.absolute().parents)
     return next((file for file in files if file.is_file()), None)
 
@@ -101,10 +100,10 @@ def _with_two_slashes(mesh: str) -> str:
 
 
 def _near(mesh: str, source: Path) -> Path | None:
-    """Returns the file of a `package://` mesh that no package has, but a folder beside the URDF or above it.
+    """Returns the file of a `package://` mesh that no package has, but the URDF's folder or one above it has.
 
-    PyBullet looks there, its own robots use that. And where the package of a URDF is hidden by another of its name, its
-    meshes are there still.
+    PyBullet searches these folders, and its own robots rely on that. It also finds the meshes of a package that is
+    hidden by another of the same name.
     """
     return beside_or_above(mesh.removeprefix(PACKAGE), source.resolve()) if mesh.startswith(PACKAGE) else None
 

@@ -20,7 +20,7 @@ class CollisionShape(NamedTuple):
     """A collision shape of a link.
 
     Attributes:
-        kind: Its kind; cylinders and capsules stand along z.
+        kind: Its kind; the axis of cylinders and capsules is z.
         size: Lengths x, y, z of a box; radius of a sphere; length and radius of a cylinder, or of a capsule without its
             round ends [m]; factors x, y, z of a mesh.
         pose: Its pose in the link, 4 x 4.
@@ -34,7 +34,8 @@ class CollisionShape(NamedTuple):
 
 
 def collision_shapes(document: UrdfDocument, link: str) -> list[CollisionShape]:
-    """Returns the collision shapes of a link in the order of the file; those of kinds that PyBullet lacks are left out.
+    """Returns the collision shapes of a link in the order of the file; kinds that PyBullet does not support are left
+    out.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.

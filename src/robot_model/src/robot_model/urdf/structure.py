@@ -1,4 +1,4 @@
-"""Faults in the structure of a URDF, which PyBullet may accept, or crash on."""
+"""Faults in the structure of a URDF that PyBullet would accept, or crash on."""
 
 import math
 import re
@@ -29,7 +29,7 @@ MAX_PROBLEMS = 20
 _NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
 _TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
 _UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
-"""Characters that PyBullet's log, which takes texts of a URDF for printf formats, must not get."""
+"""Characters that texts of a URDF must not have, since PyBullet's log uses them as printf formats."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 _NUMBERS = {
     **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), MAX_COORDINATE_M),
@@ -48,9 +48,9 @@ _NUMBERS = {
         )
     },
 }
-"""The largest number by element and attribute."""
+"""Largest allowed number by element and attribute."""
 _VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
-"""Attributes of three numbers."""
+"""Attributes that have three numbers."""
 _SHAPES = {
     "box": ("size",),
     "sphere": ("radius",),
@@ -69,10 +69,10 @@ _CONTACT = (
 
 
 def check_structure(document: UrdfDocument) -> None:
-    """Checks that a URDF describes a robot that PyBullet, and any other reader, survives.
+    """Checks that a URDF can be loaded safely by PyBullet and other readers.
 
     Raises:
-        ConfigError: If it does not; it has the first faults.
+        ConfigError: If it cannot; the error lists the first faults.
     """
     if problems := structure_problems(document):
         raise ConfigError([Problem(document.path, "", problem) for problem in problems])
@@ -80,7 +80,7 @@ def check_structure(document: UrdfDocument) -> None:
 
 @lru_cache(maxsize=32)
 def structure_problems(document: UrdfDocument) -> tuple[str, ...]:
-    """Returns a sentence for each of the first faults: in what hangs on what, in names, in numbers and other texts."""
+    """Returns a sentence for each of the first faults: in the tree of links, names, numbers and other texts."""
     return tuple(islice(_problems(document), MAX_PROBLEMS))
 
 
@@ -108,7 +108,7 @@ def _name_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _type_problems(document: UrdfDocument) -> Iterator[str]:
-    """Yields a sentence for each joint of no type: PyBullet's message of that is a format without arguments."""
+    """Yields a sentence for each joint without a valid type, for which PyBullet's own message is broken."""
     for joint in document.joint_elements:
         if (kind := joint.get("type", "")) not in _TYPES:
             name = shortened(joint.get("name", ""))
@@ -120,16 +120,16 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
     for joint, parent, child in document.edges:
         if parent not in links or child not in links:
             missing = parent if parent not in links else child
-            yield f"joint '{shortened(joint)}' ties link '{shortened(missing)}', which there is not"
+            yield f"joint '{shortened(joint)}' connects link '{shortened(missing)}', which does not exist"
         elif parent == child:
-            yield f"joint '{shortened(joint)}' ties link '{shortened(child)}' to itself"
+            yield f"joint '{shortened(joint)}' connects link '{shortened(child)}' to itself"
         elif child in parents:
-            yield f"link '{shortened(child)}' hangs on two joints; the second is '{shortened(joint)}'"
+            yield f"link '{shortened(child)}' is the child of two joints; the second is '{shortened(joint)}'"
         else:
             parents[child] = parent
     roots = [shortened(link) for link in document.links if link not in parents]
     if len(roots) > 1:
-        yield f"expected one link that hangs on no joint, got {', '.join(roots[:5])}: is a joint missing?"
+        yield f"expected one link that is no joint's child, got {', '.join(roots[:5])}: is a joint missing?"
     reaching: set[str] = {link for link in links if link not in parents}
     for link in document.links:
         way: dict[str, None] = {}
@@ -137,7 +137,7 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
             way[link] = None
             link = parents[link]
         if link in way:
-            yield f"link '{shortened(link)}' hangs on itself in the end"
+            yield f"link '{shortened(link)}' is its own ancestor"
         reaching.update(way)
 
 
@@ -165,7 +165,7 @@ def _text_problems(document: UrdfDocument) -> Iterator[str]:
             return
         if tag.startswith("xacro:") or "${" in text:
             left = f"<{shortened(tag)}>" if tag.startswith("xacro:") else f"'{shortened(text)}'"
-            yield f"{what}: {left} is left of xacro: expected a URDF, as the program xacro makes it"
+            yield f"{what}: {left} is unexpanded xacro: expected a URDF, as the program xacro writes it"
         elif is_read and (problem := _text_problem(attribute)):
             yield f"{what}: {problem}"
         elif (tag, key) in _NUMBERS and (problem := _number_problem(tag, key, text)):
@@ -173,7 +173,7 @@ def _text_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _text_problem(attribute: Attribute) -> str:
-    """Returns why PyBullet must not get a text, which may end up on its stack and in its log."""
+    """Returns why a text must not be passed to PyBullet, which copies it to its stack and its log; None if it may."""
     _, tag, key, text, _ = attribute
     longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
     if (size := len(text.encode())) > longest:
@@ -184,7 +184,7 @@ def _text_problem(attribute: Attribute) -> str:
 
 
 def numbers_in(text: str) -> list[float]:
-    """Returns the numbers with which words of a text begin, which is how PyBullet reads them."""
+    """Returns the numbers in a text as PyBullet reads them: from the beginning of each word."""
     return [float(match[0]) for word in text.split() if (match := _NUMBER.match(word))]
 
 
@@ -243,7 +243,8 @@ def _link_faults(link: Element) -> Iterator[str]:
 
 
 def _shape_faults(part: Element) -> Iterator[str]:
-    """Yields what PyBullet needs of the shape of a visual or a collision; it reads the first one."""
+    """Yields the parts that PyBullet needs and the shape of a visual or collision lacks; PyBullet reads the first
+    shape."""
     shapes = [shape for shape in part.iterfind("geometry/*") if shape.tag in READ]
     if not shapes:
         given = [f", got <{shortened(shape.tag)}>" for shape in part.iterfind("geometry/*")][:1]
@@ -255,7 +256,7 @@ def _shape_faults(part: Element) -> Iterator[str]:
 
 
 def _lacking(owner: Element, tag: str, keys: tuple[str, ...]) -> Iterator[str]:
-    """Yields what an element within another lacks."""
+    """Yields the attributes that an element within another lacks."""
     if (found := owner.find(tag)) is None:
         yield f"<{owner.tag}> has no <{tag}>"
         return

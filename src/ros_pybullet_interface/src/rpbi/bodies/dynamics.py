@@ -181,5 +181,5 @@ def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str
     if present.body_type != MAXIMAL_COORDINATES and not body.pb.getCollisionShapeData(body.body_id, index):
         problems += [f"{key}: '{what}' has no collision shape" for key in arguments if key in _OF_CONTACTS]
     if index < 0 or body.pb.getJointInfo(body.body_id, index)[2] == pybullet.JOINT_FIXED:
-        problems += [f"{key}: '{what}' hangs on no joint that moves" for key in arguments if key in _OF_JOINTS]
+        problems += [f"{key}: '{what}' is not below a moving joint" for key in arguments if key in _OF_JOINTS]
     return problems
