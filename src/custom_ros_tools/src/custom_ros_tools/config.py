@@ -17,11 +17,14 @@ import yaml
 from .errors import ConfigError, Problem, closest, shortened
 
 _SOURCES = Path(__file__).resolve().parents[3]
-"""Folder of the packages of this workspace, if it runs from its sources."""
+"""Folder of this workspace's packages, if the code runs from its sources."""
 MAX_BYTES = 16_000_000
 """Largest length of a YAML file or text; longer ones are rejected."""
 MAX_VALUES = 1_000_000
-"""Largest number of values in it, with those that aliases (`*NAME`) repeat counted each time; more are rejected."""
+"""Largest number of values in a YAML file; values that aliases (`*NAME`) repeat are counted each time.
+
+More are rejected.
+"""
 MAX_NUMBER_LENGTH = 1000
 """Largest number of characters of a number; longer scalars without a tag are texts."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
@@ -31,7 +34,7 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 def ros_package_path(package: str) -> str:
     """Returns the folder of a ROS package.
 
-    It is searched for in ROS_PACKAGE_PATH, and then beside this package.
+    Searches ROS_PACKAGE_PATH, and then the folder that contains this package.
 
     Raises:
         ConfigError: If there is no such package.
@@ -48,8 +51,8 @@ def ros_package_path(package: str) -> str:
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Returns the packages found under one value of ROS_PACKAGE_PATH, cached, since each search is a crawl."""
-    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # installed, it stands with other things
+    """Returns the packages found under one value of ROS_PACKAGE_PATH; cached, since each search walks all folders."""
+    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # an installed one has other files
     return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
 
 
@@ -134,14 +137,13 @@ def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Returns a mapping of plain data as YAML text, in its own order; `load_configs` returns the same mapping from "
-    "it."""
+    """Returns a mapping of plain data as YAML textwith its keys in order; `load_configs` reads it back."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
 @contextmanager
 def _without_collections() -> Iterator[None]:
-    """Excludes newly parsed objects from garbage collection, whose passes over them would stop all threads."""
+    """Excludes newly parsed objects from garbage collection, whose passes would stop all threads."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -163,8 +165,8 @@ def _dismantle(root: yaml.Node) -> None:
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """The safe loader; it also rejects a key that occurs twice in one mapping, and texts whose aliases expand too "
-    "far."""
+    """The safe loader; it also rejects a key that occurs twice in one mapping, and texts whose aliases expand to too
+    many values."""
 
     def get_single_data(self) -> Any:
         node = self.get_single_node()
@@ -188,7 +190,7 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
         try:
-            if is_number and len(node.value) > MAX_NUMBER_LENGTH:  # it would be computed digit by digit
+            if is_number and len(node.value) > MAX_NUMBER_LENGTH:  # base-60 numbers are slow to compute
                 raise ValueError("too long")
             return super().construct_object(node, deep)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
@@ -219,7 +221,7 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 def _size(node: yaml.Node, known: dict[int, int]) -> int:
-    """Returns how many values a node has, those of aliases counted each time.
+    """Returns the number of values in a node; values of aliases are counted each time.
 
     Args:
         known: Results by the id of a node; one that is not finished yet contains itself.

@@ -1,4 +1,4 @@
-"""Files that are whole whenever they have their name."""
+"""Files that are replaced as a whole: readers never see a partly written file."""
 
 import shutil
 from collections.abc import Iterator
@@ -8,10 +8,10 @@ from pathlib import Path
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Yields a path of the same name to write to, in a hidden folder beside the file; `*.csv` does not match it.
+    """Yields a path of the same name to write to, in a hidden folder next to the file; `*.csv` does not match it.
 
-    What is written there becomes the file at the end of the context, in place of the former one. If the context fails,
-    it is removed, and the former file stays as it was. Links that somebody has put in their places are removed first.
+    At the end of the context, the written file replaces the former one. If the context fails, the written file is
+    removed and the former one stays unchanged. Symbolic links at either path are removed first.
     """
     folder = path.with_name(f".{path.name}.part")
     if folder.is_symlink():

@@ -1,6 +1,7 @@
-"""Files and texts of other people: paths that stay below a folder, limits, and text that is safe on a terminal.
+"""Files and texts from untrusted sources: paths that stay inside a folder, size limits, and text that is safe on a
+terminal.
 
-Whoever reads an episode, a saved world, a data set or a message of another node reads it by these functions.
+All code that reads an episode, a saved world, a data set or a message of another node uses these functions.
 """
 
 import errno
@@ -16,9 +17,9 @@ from .errors import ConfigError, Problem, shortened
 MAX_PATH_BYTES = 1000
 """Longest path that a foreign file may name [bytes]; PyBullet copies paths into 1024 bytes."""
 MAX_DEPTH = 100
-"""Levels of lists and mappings within each other in a foreign JSON text."""
+"""Largest depth of nested lists and mappings in a foreign JSON text."""
 MAX_ENTRIES = 100_000
-"""Entries of a foreign folder that are looked at."""
+"""Largest number of entries of a foreign folder that are read."""
 
 
 def path_below(folder: str | Path, name: str) -> Path:
@@ -26,7 +27,7 @@ def path_below(folder: str | Path, name: str) -> Path:
 
     Args:
         folder: The folder; it is trusted, and may be a symbolic link itself.
-        name: The foreign path. A path from the root is laid out below the folder: `/a/b` becomes `FOLDER/a/b`.
+        name: The foreign path. An absolute path is taken relative to the folder: `/a/b` becomes `FOLDER/a/b`.
 
     Raises:
         ConfigError: If the path is empty, too long, has `..` or control characters, or passes a symbolic link.
@@ -56,7 +57,8 @@ def read_below(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> by
     """Returns the content of a file that a foreign file names, see `path_below`.
 
     Raises:
-        ConfigError: If the path leaves the folder, or the file is missing, too large, a link, a pipe or a device.
+        ConfigError: If the path leaves the folder, or if the file is missing, is too large, or is a link, pipe or
+            device.
     """
     path = path_below(folder, name)
     try:
@@ -115,7 +117,7 @@ def load_foreign_json(text: str | bytes, file: str, most_bytes: int = MAX_BYTES,
             _check_size(data, most_values)
     except RecursionError:
         raise ConfigError([Problem(file, "", f"has more than {MAX_DEPTH} levels")]) from None
-    except ValueError as error:  # wrong UTF-8 and wrong JSON are such, too
+    except ValueError as error:  # includes invalid UTF-8 and invalid JSON
         raise ConfigError([Problem(file, "", shortened(printable(str(error), 200)))]) from None
     return data
 

@@ -1,4 +1,4 @@
-"""Keys that are pressed."""
+"""Codes of keys."""
 
 from custom_ros_tools.ros.key_down_subscriber import KeyDownSubscriber
 

@@ -32,17 +32,17 @@ MARKER_TYPES = (
 MARKER_ACTIONS = ("ADD", "MODIFY", "DELETE", "DELETEALL")
 """Names of its constants for `action`."""
 SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
-"""Types that this configuration is sufficient for; the others need points or a text."""
+"""Marker types that this configuration can describe; the others need points or a text."""
 
 
 def _in_any_case(names: Sequence[str]) -> WithJsonSchema:
-    """Returns the JSON Schema of constants, with the usual spelling for editors to propose."""
+    """Returns the JSON Schema of constants; editors propose the usual spelling."""
     usual = {"type": "string", "enum": [name.lower() for name in names]}
     return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
 
 
 def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
-    """Returns a validator that finds the name of a constant in any case."""
+    """Returns a validator that matches the name of a constant regardless of case."""
 
     def upper(name: str) -> str:
         if name.upper() not in names:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Toggle:
-    """Stores whether something is on, and refuses to switch it to its present state.
+    """Stores whether a function is on; refuses to switch it to its present state.
 
     `start` switches it on and `stop` off; `name` is its name in messages.
     """

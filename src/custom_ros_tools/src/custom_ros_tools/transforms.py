@@ -155,7 +155,7 @@ class StaticTransform(ConfigModel):
             got = f"{len(arguments)} arguments" if arguments else "none"
             raise ConfigError([Problem(_ARGUMENTS, "", f"expected {wanted}, got {got}")])
         problems: list[Problem] = []
-        numbers = [1.0] * (len(keys) - 2)  # placeholders for invalid values while the rest is checked
+        numbers = [1.0] * (len(keys) - 2)  # placeholders for invalid values, so that the rest is checked too
         for index, text in enumerate(arguments[:-2]):
             try:
                 numbers[index] = float(text)

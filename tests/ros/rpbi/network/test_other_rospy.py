@@ -18,8 +18,8 @@ from worlds import iiwa
 
 NODE = "/ros_pybullet_interface"
 JOINT_STATES = "/rpbi/iiwa/joint_states"
-BUILT_OTHERWISE = "this rospy is built otherwise: expected "
-SENDING = "messages go by rospy's queues and threads, which is slower at high rates"
+BUILT_OTHERWISE = "this rospy has different internals: expected "
+SENDING = "messages are sent by rospy's queues and threads, which is slower at high rates"
 REGISTERING = "a ROS master that comes back will not know this node: start it again then"
 REMOVING = "a subscriber that connects while another one ends may receive nothing"
 LOGGING = "who logs something waits for a master that hangs"

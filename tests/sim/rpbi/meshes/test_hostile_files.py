@@ -91,7 +91,10 @@ FAULTS = {
         _urdf(_links("a", "b", "c"), JOINT.format("j", "fixed", "b", "c"), JOINT.format("k", "fixed", "c", "b")),
         "link 'b' is its own ancestor",
     ),
-    "no such link": (_urdf(_links("a"), JOINT.format("j", "fixed", "a", "x")), "connects link 'x', which does not exist"),
+    "no such link": (
+        _urdf(_links("a"), JOINT.format("j", "fixed", "a", "x")),
+        "connects link 'x', which does not exist",
+    ),
     "a long name": (_urdf(_links("a" * 5000)), "link.name: expected at most 250 bytes, got 5000: 'aaa"),
     "a robot's long name": (
         _urdf(_links("a")).replace('"r"', f'"{"r" * 1100}"'),

@@ -10,15 +10,15 @@ from custom_ros_tools.errors import InterfaceError
 class Argument(NamedTuple):
     """Metadata of a parameter, for `Annotated`.
 
-    A keyword-only parameter is an option, all others stand for words in their order.
+    A keyword-only parameter is an option; all others are positional arguments.
 
     Attributes:
         shown: Placeholders of its words on the page, such as `X Y Z`. `NAME ...` stands for one word or more,
             `[NAME ...]` for any number of words.
         flag: Name of an option, by default `--` and the name of the parameter.
-        parse: Returns the value of a word; it raises ValueError for a wrong one.
+        parse: Returns the value of a word, or raises ValueError if the word is invalid.
         choices: Returns the valid words.
-        offers: Name of a function in `dev/tools/completion.bash` that prints words to complete.
+        offers: Name of a function in `dev/tools/completion.bash` that prints the words for completion.
         files: Pattern of the files that completion offers; empty for none.
         excludes: Name of a group of options of which at most one may be given.
         is_raw: Whether the function parses all words itself, options included.
@@ -46,7 +46,7 @@ def number(text: str) -> float:
     """Returns the number in a word; `30deg` is a number in radians.
 
     Raises:
-        WrongNumberError: If it is none, or not finite.
+        WrongNumberError: If the word is not a number, or not finite.
     """
     is_angle = text.endswith("deg")
     try:

@@ -1,4 +1,4 @@
-"""A command of `./rpbi`, made of a function: its parser, its section of the page, its completion."""
+"""A command of `./rpbi`, derived from a function: its parser, its section of the page, its completion."""
 
 import argparse
 import inspect
@@ -38,7 +38,7 @@ class Parameter(NamedTuple):
 
     @property
     def is_option(self) -> bool:
-        """Whether it is an option, else it stands for words by their place."""
+        """Whether it is an option; otherwise it is a positional argument."""
         return self.kind is inspect.Parameter.KEYWORD_ONLY
 
     @property
@@ -65,7 +65,7 @@ class Parameter(NamedTuple):
 
     @property
     def words(self) -> int | str | None:
-        """Number of words, as argparse has it."""
+        """Number of words, as `nargs` of argparse."""
         shown = self.argument.shown
         if "..." in shown:
             return "*" if shown.startswith("[") else "+"
@@ -111,15 +111,16 @@ class Command:
 
     @property
     def section(self) -> str:
-        """Its section of the page, without the heading, which is its help too."""
+        """Its section of the page without the heading; also the help text."""
         usage = self._usage or " ".join((PROGRAM, self.name, *self._usage_words()))
         blocks = [_indented(usage), self.summary, _indented("\n".join(self._rows())), self._text]
         return "\n\n".join(filter(None, blocks)) + "\n"
 
     def completions(self) -> Iterator[str]:
-        """Yields a line for each argument that completion knows more of than its name: the command, where, and what.
+        """Yields a line for each argument with completable values: the command, the position, and the source of the
+        values.
 
-        Where is the number of the word, `*` for the last one that is no option, or the option before it.
+        The position is the number of the word, `*` for the last positional argument, or the name of an option.
         """
         places = [each for each in self.parameters if not each.is_option]
         for each in self.parameters:
@@ -163,7 +164,7 @@ class Command:
         return any(each.argument.is_raw for each in self.parameters)
 
     def _call(self, words: Sequence[str]) -> Any:
-        # Words of ROS such as __name:=x are not ours; to argparse, a word with a space before it is no option
+        # Arguments of ROS such as __name:=x are not ours; argparse takes no word with a leading space as an option
         ours = [f" {word}" if _NEGATIVE.match(word) else word for word in words if not word.startswith("__")]
         parsed = vars(self._parser().parse_args(ours))
         arguments: list[Any] = []

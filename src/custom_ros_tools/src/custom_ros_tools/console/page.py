@@ -1,4 +1,4 @@
-"""The page of the commands, and the file by which bash completes their arguments."""
+"""The page of the commands, and the file with which bash completes their arguments."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,7 +17,7 @@ _HEAD = f"""\
 # Commands
 
 `{PROGRAM} COMMAND --help` prints the section of that command, `{PROGRAM}` alone the list of all commands. Each command
-first [sets up](installation.md) what is missing. Ctrl-C ends any of them, at any moment.
+first [sets up](installation.md) what is missing. Ctrl-C ends every command at any time.
 
 [Completion](#completion) in bash knows commands, options, examples, their arguments, files, and what is in the running
 world.
@@ -46,7 +46,7 @@ def page(listed: Iterable[Command]) -> str:
 
 
 def console_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file that follows from the commands of a workspace."""
+    """Returns the text of each file that is generated from the commands of a workspace."""
     order = {name: place for place, name in enumerate(FIRST)}
     listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
     lines = [line for each in listed for line in each.completions()]

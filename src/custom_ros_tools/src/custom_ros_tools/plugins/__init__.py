@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from custom_ros_tools.errors import hint, shortened
 
 own_folders = [str(Path(__file__).parents[1])]
-"""Folders of the packages that look classes up and call them; `cause_of` reports a place outside of them."""
+"""Folders of the packages that look up and call plug-ins; `cause_of` reports the line outside of these folders."""
 _used: set[str] = set()
 """Top-level packages of the classes that `find_class` has found."""
 
@@ -27,7 +27,7 @@ class _Trust(NamedTuple):
 
 _trust: _Trust | None = None
 """Trust of the whole process; None allows any package."""
-_trust_here: ContextVar[_Trust | None] = ContextVar("trust of what is being read", default=None)
+_trust_here: ContextVar[_Trust | None] = ContextVar("trust of the recording that is being read", default=None)
 
 
 class UntrustedError(ValueError):
@@ -38,7 +38,7 @@ def trust_only(packages: Iterable[str], how: str) -> None:
     """Restricts `find_class` from now on to these top-level packages and to classes that are imported already.
 
     Importing a module runs its code. Names read at the start come from the user. Names that arrive later, by services
-    or from a bag, may come from anybody.
+    or from a bag, are not trusted.
 
     Args:
         how: Advice for the message on how to trust another package.
@@ -81,14 +81,14 @@ def find(name: str) -> Any:
     """Returns the object of another package under a name, such as `my_robot_lab.conveyor:Conveyor`.
 
     Raises:
-        ValueError: If there is no such thing, or its module cannot be imported.
+        ValueError: If the module has no such object, or cannot be imported.
     """
     module_name, _, attribute = name.partition(":")
     if not attribute or not all(part.isidentifier() for part in module_name.split(".")):
         raise ValueError(f"expected a name like 'my_package.my_module:MyClass', got '{name}'")
     try:
         module = importlib.import_module(module_name)
-    except (Exception, SystemExit) as error:  # SystemExit: a script that runs when it is imported
+    except (Exception, SystemExit) as error:  # SystemExit: raised by a script that runs on import
         missing = error.name if isinstance(error, ModuleNotFoundError) else None
         if missing is not None and f"{module_name}.".startswith(f"{missing}."):
             raise ValueError(_is_missing(missing)) from None
@@ -121,10 +121,10 @@ def full_name(thing: Any) -> str:
 
 
 def cause_of(error: BaseException) -> str:
-    """Returns type and message of an error, and its place in the package of the class, in one line."""
+    """Returns in one line the type and message of an error, and the line of the plug-in's package that raised it."""
     text = f"{type(error).__name__}: {error}"
     places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]
-    if not places or isinstance(error, SyntaxError):  # whose text has the place
+    if not places or isinstance(error, SyntaxError):  # its text has file and line
         return text
     return f"{text} ({places[-1].filename}, line {places[-1].lineno})"
 

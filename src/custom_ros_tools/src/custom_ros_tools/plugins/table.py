@@ -29,9 +29,9 @@ class PluginTable(Mapping[str, type[Plugin]]):
     Wherever a name of the table is valid, `module:Class` of another package is valid too.
 
     Args:
-        kind: Noun for one of them, in messages and on pages, such as `solver`.
+        kind: Noun for one class, used in messages and on pages, such as `solver`.
         base: `module:Class` that those of other packages derive from. Classes of the table that do not derive from it
-            are parts of others, and cannot be chosen by name.
+            are only used by other classes, and cannot be selected by name.
         paths: `module:Class` by name.
         suggests: Whether the message for an unknown name lists the known ones.
     """
@@ -58,7 +58,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return cast(type[Plugin], pkgutil.resolve_name(self._base))
 
     def name_of(self, thing: Any) -> str:
-        """Returns the name of a class, or of an object's class; `module:Class` of one that is not in the table."""
+        """Returns the name of a class, or of an object's class; `module:Class` if it is not in the table."""
         path = full_name(thing)
         return next((name for name, each in self._paths.items() if each == path), path)
 
@@ -83,7 +83,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return cast(type[Plugin], find_class(name, self.base))
 
     def configured(self, name: str, file: str = "", key: str = "") -> type[Plugin]:
-        """Returns the class of a name in somebody's configuration.
+        """Returns the class that a configuration names.
 
         Args:
             name: A name of the table, or `module:Class`.

@@ -1,4 +1,5 @@
-"""Child processes: they end when their parent does, even if that is killed, and can be killed with their own."""
+"""Child processes that end with their parent, even if it is killed, and can be killed together with their own
+children."""
 
 import contextlib
 import fcntl
@@ -11,12 +12,12 @@ from typing import Any
 
 
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:
-    """Starts a process that gets a signal when this one ends, in whichever way.
+    """Starts a process that gets a signal when this one ends, for any reason.
 
-    Its standard input is a pipe that this process holds open. When its other end is closed, by the end of the process
-    or of `stdin` of what is returned, the kernel sends the signal (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG` would
-    send it at the end of the thread that starts the child. It also needs code between fork and exec, which is not safe
-    where there are threads.
+    Its standard input is a pipe that this process holds open. When that end is closed, because this process ends or
+    closes `stdin` of the returned process, the kernel sends the signal (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG`
+    would send it at the end of the thread that starts the child. It also needs code between fork and exec, which is not
+    safe where there are threads.
 
     Args:
         command: The command line.

@@ -1,4 +1,4 @@
-"""Folders for the files of a process, which go when it ends, or when the next one starts if it was killed."""
+"""Temporary folders of a process: removed when it ends or, if it was killed, when the next process starts."""
 
 import atexit
 import os
@@ -25,7 +25,7 @@ def temporary_folder(kind: str) -> tempfile.TemporaryDirectory[str]:
 
 
 def _remove_left_behind() -> None:
-    """Removes the folders of processes of this user that have ended without it."""
+    """Removes the folders that ended processes of this user have left behind."""
     with suppress(OSError):
         for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             match = _NAME.fullmatch(folder.name)

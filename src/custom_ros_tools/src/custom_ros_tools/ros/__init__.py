@@ -1,1 +1,1 @@
-"""The part that needs ROS."""
+"""Modules that need ROS."""

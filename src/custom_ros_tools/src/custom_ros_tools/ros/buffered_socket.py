@@ -6,7 +6,7 @@ from collections import deque
 from typing import Any
 
 MAX_TOGETHER = 32
-"""Largest number of messages that one system call sends, and that are buffered until the next flush."""
+"""Largest number of messages that are buffered until the next flush and sent by one system call."""
 
 
 class BufferedSocket:
@@ -20,7 +20,7 @@ class BufferedSocket:
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
-        connection.setblocking(False)  # rospy's sockets have a timeout, for which Python would wait whatever the flags
+        connection.setblocking(False)  # else Python would wait for rospy's timeout
         if connection.family in (socket.AF_INET, socket.AF_INET6):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connection
@@ -37,8 +37,7 @@ class BufferedSocket:
     def sendall(self, data: bytes) -> None:
         """Buffers a message for the next flush; flushes now if many are buffered.
 
-        Raises:
-            OSError: If an earlier call found that the other side has gone.
+        Raises: OSError: If an earlier call found the connection closed.
         """
         with self._lock:
             if self._error is not None:
@@ -49,8 +48,8 @@ class BufferedSocket:
                 self._send_kept()
 
     def flush(self) -> None:
-        """Sends buffered messages as far as the other side accepts them; if it has gone, the next message is an "
-        "error."""
+        """Sends buffered messages as far as the other side accepts them; if the connection is closed, sending the next
+        message raises an error."""
         with self._lock:
             self._send_kept()
 
@@ -76,11 +75,11 @@ _unsent: dict[BufferedSocket, None] = {}
 
 
 _at_once = threading.Event()
-"""Set once nobody flushes any more."""
+"""Set once nothing flushes any more."""
 
 
 def send_at_once() -> None:
-    """Flushes, and sends every message at once from now on: for the end of a loop that has flushed."""
+    """Flushes, and sends every message at once from now on; called when the loop that flushes ends."""
     _at_once.set()
     flush_buffered_sockets()
 

@@ -129,7 +129,7 @@ class JointStateSubscriber(rospy.Subscriber):
         """Returns whether there is a joint state."""
         return self._newest is not None
 
-    recieved = received  # as the release spells it
+    recieved = received  # spelled as in the authors' release
 
     def get(self) -> JointState | None:
         """Returns the newest joint state, None if there is none yet."""

@@ -21,8 +21,8 @@ MIN_MEMORY_BYTES = 500_000_000
 def run(main: str) -> None:
     """Runs a node's `module:function` with SIGINT blocked for `custom_ros_tools.ros.lifecycle.run_node`.
 
-    A signal can be blocked for all threads only before the process has its first one, and libraries start theirs when
-    they are imported; therefore the function is imported here. The node ends with the roslaunch that started it.
+    A signal must be blocked before the first thread starts, and libraries start threads on import; therefore the
+    function is imported here. The node ends with the roslaunch that started it.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     end_with_roslaunch()
@@ -33,10 +33,10 @@ def run(main: str) -> None:
 def run_command(main: str, call: Callable[[Any], Any] = lambda function: function()) -> None:
     """Runs a command's `module:function` and exits with its result; Ctrl-C ends it without a traceback.
 
-    Until the function is imported, Ctrl-C ends the process at once, from then on it is a KeyboardInterrupt. A process
+    Until the function is imported, Ctrl-C ends the process at once; afterwards it raises a KeyboardInterrupt. A process
     that starts with SIGINT blocked, as by `env --block-signal=INT`, is safe before that too. In a process that ignores
-    SIGINT, as behind the `&` of a script, it stays ignored. When nobody reads its output any more, as behind
-    `| head`, it ends as by SIGPIPE, with 141.
+    SIGINT, as behind the `&` of a script, it stays ignored. When the reader of its output has ended, as with `| head`,
+    it ends as by SIGPIPE, with 141.
 
     Args:
         main: The function.
@@ -61,7 +61,7 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
     except BrokenPipeError:
         if not is_output_closed():
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python writes when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for output that Python writes when it exits
         sys.exit(128 + signal.SIGPIPE)
     finally:
         if heeds:  # while Python is ending, too
@@ -70,9 +70,9 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
 
 @contextmanager
 def late_imports() -> Iterator[None]:
-    """Has Ctrl-C end the process at once while a command imports libraries in its function.
+    """Makes Ctrl-C end the process at once while a command imports libraries in its function.
 
-    Some libraries catch a KeyboardInterrupt in their imports, and go on or fail with a traceback.
+    Some libraries catch a KeyboardInterrupt in their imports, and continue or fail with a traceback.
     """
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
@@ -88,8 +88,8 @@ def late_imports() -> Iterator[None]:
 def _prepare_for_numpy() -> None:
     """Limits matrix computations to one thread, unless the environment sets another number; before NumPy is imported.
 
-    Our matrices are small. Further threads would mostly wait for each other, which costs more the busier the machine
-    is, and under a memory limit forever. With too little memory, the program ends with 1.
+    Our matrices are small. More threads would mostly wait for each other: the busier the machine, the longer; under a
+    memory limit, forever. With too little memory, the program ends with 1.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < MIN_MEMORY_BYTES:

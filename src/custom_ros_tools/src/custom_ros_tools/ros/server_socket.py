@@ -1,4 +1,4 @@
-"""Listening socket of a node; no client can hold up others."""
+"""Listening socket of a node, in which no client can block others."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 log = logging.getLogger(__name__)
 
 HEADER_TIMEOUT_S = 60.0
-"""Time within which a connection has to send its header [s]; it is closed after it."""
+"""Time within which a connection has to send its header [s]; then it is closed."""
 MAX_HEADER_BYTES = 1 << 20
 """Largest length of a header [bytes]; the first four bytes of other protocols, read as a length, exceed it."""
 PEEKED = 1 << 15
-"""Number of bytes of a longer header that are sufficient, since the kernel's buffer is limited."""
+"""Number of bytes after which a longer header counts as arrived, since the kernel's buffer is limited."""
 OUT_OF_HANDLES_S = 0.5
 """Time for which a node without free file handles waits before it accepts again [s]."""
 
@@ -78,18 +78,18 @@ class ServerSocket:
             time.sleep(OUT_OF_HANDLES_S)
             raise TimeoutError from None
         self._pending[connection.fileno()] = _Pending(connection, address, time.monotonic() + HEADER_TIMEOUT_S)
-        # Told of once for all that has come, as it is not read here
+        # edge-triggered, since the data are not read here
         self._poll.register(connection.fileno(), select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET)
 
     def _look_at(self, pending: _Pending) -> None:
-        """Marks a connection as ready if its header has arrived, and closes it if none can arrive."""
+        """Marks a connection as ready if its header has arrived; closes it if no header can arrive."""
         try:
             peeked = pending.connection.recv(PEEKED, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
             return
         except OSError:
             peeked = b""
-        if not peeked:  # it has gone
+        if not peeked:  # it is closed
             self._forget(pending)
             pending.connection.close()
         elif len(peeked) >= 4:

@@ -35,7 +35,7 @@ def get_srv_handler(
 
 
 def get_srv_handlers(srvs: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
-    """Does the same for several services, whose types are given by name; returns the proxies by name."""
+    """Does the same for several services; `srvs` has their types by name; returns the proxies by name."""
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in srvs.items()}
 
 

@@ -64,7 +64,7 @@ class TfInterface:
     ) -> TransformStamped | None:
         """Waits until there is a transform and returns the newest, None if there was none in time.
 
-        The timeout [s] is wall time; None waits forever.
+        `timeout` is in wall time [s]; None waits forever.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.
@@ -74,7 +74,7 @@ class TfInterface:
             message = self.get_tf_msg(parent_frame_id, child_frame_id)
             if message is not None or (timeout is not None and time.monotonic() - start_s > timeout):
                 return message
-            time.sleep(POLL_S)  # rospy.sleep would hang while simulated time stands still
+            time.sleep(POLL_S)  # rospy.sleep would hang while simulated time is stopped
         raise rospy.ROSInterruptException(
             f"shut down while waiting for TF from '{parent_frame_id}' to '{child_frame_id}'"
         )

@@ -14,14 +14,14 @@ QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01
 """Largest deviation of the square of a quaternion's length from 1, as in tf2; transforms beyond it are dropped."""
 END_OF_TIME_S = 2**31
-"""Stamp from which on tf2's C++ part reads invalid memory, which ends the process [s]."""
+"""Stamp from which on tf2's C++ part reads invalid memory, which crashes the process [s]."""
 NS_PER_S = 1_000_000_000
 
 
 class TfListener:
-    """Stores transforms of /tf and /tf_static in a buffer; `tf2_ros.TransformListener` does so without checks.
+    """Stores transforms of /tf and /tf_static in a buffer, like `tf2_ros.TransformListener`, but checks them.
 
-    tf2 rejects most invalid transforms, but prints two lines on the console each time; some of them end the process.
+    tf2 rejects most invalid transforms, but prints two lines on the console each time; some of them crash the process.
 
     Args:
         buffer: The buffer.
@@ -53,7 +53,7 @@ class TfListener:
 
 
 def fault_in(transform: TransformStamped) -> str | None:
-    """Returns what is wrong with a transform, None if it is valid."""
+    """Returns a description of the fault in a transform, None if it is valid."""
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     position, quat, stamp = transform.transform.translation, transform.transform.rotation, transform.header.stamp
     if not parent or not child or parent == child:

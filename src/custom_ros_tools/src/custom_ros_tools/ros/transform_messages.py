@@ -42,10 +42,11 @@ def as_pose(transform: Transform) -> Pose:
 
 
 class TransformTopic:
-    """Sends the transform from one frame to another to /tf with the present stamp; nothing while neither has changed.
+    """Sends the transform between two frames to /tf with the present stamp, unless neither transform nor stamp has
+    changed.
 
-    While simulated time stands still, repeating the stamp would make each listener warn. New subscribers get the last
-    message all the same, since the topic is latched.
+    While simulated time is stopped, a repeated stamp would make each listener warn. New subscribers get the last
+    message, since the topic is latched.
     """
 
     def __init__(self, parent: str, child: str) -> None:

@@ -117,7 +117,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0), _within(_MAX_COUNT)]
 Hz = Annotated[float, Field(gt=0), Unit("Hz")]
 HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
-"""A rate; 0 switches off."""
+"""A rate; 0 disables it."""
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
 Metres = Annotated[float, _within(MAX_COORDINATE_M, "m"), Unit("m")]
@@ -138,14 +138,14 @@ Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
 """A list of any length, kept as a tuple: `ListOf[float]`."""
 OneAsList = BeforeValidator(_one_as_list)
-"""Takes a number as a list of one."""
+"""A list; a single number counts as a list of one."""
 
 Switch = Annotated[
     bool,
     BeforeValidator(_switch),
     WithJsonSchema({"type": ["boolean", "integer"], "minimum": 0, "maximum": 1}),
 ]
-"""True or false, which may be written 1 and 0 as PyBullet's users do."""
+"""True or false, also written as 1 or 0, as is usual with PyBullet."""
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[
     str, AfterValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{_NAME}$"}), Expects("a name")

@@ -1,4 +1,4 @@
-"""Annotations for the fields of a configuration model, beside pydantic's own."""
+"""Annotations for the fields of a configuration model, in addition to pydantic's own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,9 +38,9 @@ class Expects(_Keyword):
     keyword = "expects"
 
 
-@dataclass(frozen=True, eq=False)  # typing requires a hash, which a mapping has not
+@dataclass(frozen=True, eq=False)  # typing requires a hash, which a mapping lacks
 class AlsoTakes:
-    """Annotation that declares, by its JSON Schema, what a validator accepts beside the type itself."""
+    """Annotation with the JSON Schema of further values that a validator accepts, in addition to the type itself."""
 
     schema: Mapping[str, Any]
 

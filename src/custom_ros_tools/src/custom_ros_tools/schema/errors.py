@@ -47,7 +47,7 @@ def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[st
             problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
     if len(all_details) > MAX_PROBLEMS:
         problems.append(Problem(file, "", f"and {len(all_details) - MAX_PROBLEMS} more problems"))
-    return list(dict.fromkeys(problems))  # the same but for pydantic's additions to the location
+    return list(dict.fromkeys(problems))  # equal except for pydantic's additions to the location
 
 
 def key_path(loc: Sequence[str | int]) -> str:
@@ -83,7 +83,7 @@ def _schema_of(model: type[BaseModel]) -> Schema:
 
 
 def _property_at(root: Schema, loc: Sequence[str | int]) -> Schema | None:
-    """Returns the schema of the innermost key on the way to a location; None if a key is unknown."""
+    """Returns the schema of the innermost key in the path of a location; None if a key is unknown."""
     found, here = None, root
     for part in loc:
         mapping = mapping_in(here, root)

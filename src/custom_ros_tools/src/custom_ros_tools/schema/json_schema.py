@@ -1,9 +1,9 @@
 """JSON Schemas of configuration models; editors check YAML by them, and error messages and reference pages use them.
 
 The dialect is draft-07, the newest that yaml-language-server understands. In addition, `unit` states units, `kind`
-families of constants, and `expects` describes the expected value in words. Models inside of models are references to
-`$defs`; a description beside a reference is that of the key. The first alternative of an `anyOf` is the usual one, the
-others are accepted, too.
+families of constants, and `expects` describes the expected value in words. Models inside models are references to
+`$defs`; a description next to a reference is that of the key. The first alternative of an `anyOf` is the usual form;
+the others are accepted, too.
 """
 
 import json
@@ -27,7 +27,7 @@ _FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
 class EditorSchema(GenerateJsonSchema):
     """pydantic's generator, in draft-07 and without entries that are useless in editors."""
 
-    # Constraints that no schema can express are left to the model
+    # constraints that no schema can express are checked by the model
     ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}
 
     def field_title_should_be_set(self, schema: Any) -> bool:
@@ -89,7 +89,7 @@ def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
 
 
 def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Returns a schema with those definitions that it refers to, so that it stands alone."""
+    """Returns a self-contained schema, with the definitions that it refers to."""
     content = {key: value for key, value in schema.items() if key != DEFINITIONS}
     found: dict[str, Schema] = {}
     waiting = [*references_in(content)]
@@ -122,7 +122,8 @@ def resolved(schema: Schema, root: Schema) -> Schema:
 
 
 def mapping_in(schema: Schema, root: Schema) -> Schema | None:
-    """Returns the mapping with keys of its own that a value is, or each item of a list; None if there is none.
+    """Returns the schema of the mapping that describes a value, or each item of a list; None if the value is no
+    mapping.
 
     It may be a reference to the definitions in `root`, the schema of the file.
     """
@@ -150,8 +151,8 @@ def unit_in(schema: Schema) -> str | None:
 def explained(value: Any) -> Any:
     """Returns a schema whose descriptions end with unit and default, since editors show only descriptions.
 
-    The description of a key stands beside the reference among its alternatives, too; otherwise editors show that of the
-    mapping.
+    The description of a key is also added to its alternatives with references; otherwise editors show the mapping's
+    description.
     """
     if isinstance(value, list):
         return [explained(each) for each in value]

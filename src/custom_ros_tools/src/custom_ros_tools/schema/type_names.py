@@ -42,7 +42,7 @@ def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> s
     """Returns a description of the value that a JSON Schema expects, such as `a list of 3 numbers`.
 
     Args:
-        detailed: Whether to include bounds, and accepted forms beside the usual one.
+        detailed: Whether to include bounds, and accepted forms other than the usual one.
         plural: Whether it describes several, as in `lists of 3 numbers`.
     """
     if "expects" in schema:
@@ -58,7 +58,7 @@ def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> s
         return f"{'one of ' if len(values) > 1 else ''}{', '.join(values)}"
     kinds = [kind for kind in types_in(schema) if kind != "null"] or ["object" if "$ref" in schema else ""]
     if "boolean" in kinds:
-        return TYPE_NAMES["boolean"]  # 0 and 1 are the same in other words
+        return TYPE_NAMES["boolean"]  # 0 and 1 are other forms of the same values
     if plural and len(kinds) > 1:
         return "values"
     return " or ".join(_name_of_type(kind, schema, detailed, plural) for kind in kinds)

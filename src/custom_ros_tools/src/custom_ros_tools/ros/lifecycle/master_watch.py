@@ -1,4 +1,4 @@
-"""Keeps a node registered with a ROS master that goes away and comes back with an empty memory."""
+"""Keeps a node registered when the ROS master restarts with an empty registry."""
 
 import contextlib
 import threading
@@ -22,15 +22,15 @@ _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 class Registrations:
     """Registers the topics and services of this node, instead of rospy's own code.
 
-    That code waits for a master that has gone, with all topics locked, and registers nothing again. Here, topics and
-    services that are opened or closed without a master are registered with the next one.
+    rospy's own code blocks all topics while the master is unreachable, and never registers them again. Here, changes
+    that are made without a master are registered with the next master.
 
     Args:
         registry: The node's topics and services.
         uri: The node's master.
 
     Attributes:
-        are_complete: Whether the master has them all, as far as is known.
+        are_complete: Whether the master has all registrations, as far as is known.
     """
 
     def __init__(self, registry: Registry, uri: str) -> None:
@@ -38,7 +38,7 @@ class Registrations:
         self._registry, self._uri = registry, uri
         self._name, self._node_uri = rospy.get_name(), rospy.get_node_uri()
         self._withdrawn: list[tuple[str, tuple[str, str, str]]] = []
-        """Pending calls for a master that comes back with its memory intact."""
+        """Pending calls, for a master that was unreachable but has kept its registry."""
         registry.hand_over(self)
 
     def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
@@ -69,7 +69,7 @@ class Registrations:
 
     def repeat(self, master: Any) -> tuple[int, int]:
         """Registers everything again, and parameters with it; returns the numbers of topics and of services."""
-        with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
+        with self._registry.entries() as entries:  # topics and services do not change meanwhile
             kept_parameters.restore(master)
             calls: Any = MultiCall(master)
             for method, arguments in self._withdrawn:
@@ -132,7 +132,7 @@ class MasterWatch:
         except MASTER_FAILURES as error:
             if not self._is_gone and not rospy.core.is_shutdown_requested():
                 rospy.logwarn(
-                    "the ROS master at %s cannot be reached (%s): %s goes on with the connections that it has",
+                    "the ROS master at %s cannot be reached (%s): %s keeps its existing connections",
                     self._uri,
                     error,
                     self._name,
@@ -149,11 +149,11 @@ class MasterWatch:
         (_, _, process), (_, _, node_uri) = calls()
         if node_uri and node_uri != rospy.get_node_uri():
             if not rospy.core.is_shutdown_requested():
-                rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
+                rospy.logfatal("another node has taken the name %s (at %s): this one ends", self._name, node_uri)
                 rospy.signal_shutdown("another node has its name")
         elif self._registrations is None:
             if process != self._process:
-                rospy.logwarn("the ROS master at %s is another one: it knows nothing of %s", self._uri, self._name)
+                rospy.logwarn("the ROS master at %s was restarted: it does not know %s", self._uri, self._name)
             self._process, self._is_gone = process, False
         elif process != self._process or not node_uri or not self._registrations.are_complete:
             self._register(master, self._registrations)
@@ -173,6 +173,6 @@ class MasterWatch:
         )
 
     def _end(self) -> None:
-        """Ensures that nothing is registered after the node has unregistered."""
+        """Prevents registrations after the node has unregistered."""
         with self._registering:
             self._is_over = True

@@ -54,9 +54,9 @@ def attach_logging(modules: Iterable[str]) -> None:
 
 
 def _keep_console_from_raising() -> None:
-    """Has what cannot be written to the console dropped, as when it is a file on a full disk; /rosout still gets it.
+    """Drops log lines that cannot be written to the console, for instance on a full disk; /rosout still gets them.
 
-    rospy would raise where something is logged, and so end a thread, for instance that of a timer.
+    rospy would raise in the thread that logs, and so end a timer, for instance.
     """
     for handler in logging.getLogger(ROSPY_LOGGER).handlers:
         if isinstance(handler, RosStreamHandler):
@@ -72,7 +72,8 @@ def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) 
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Returns whether a message of rospy is worth logging; a callback that met a topic closed by the shutdown is not.
+    """Returns whether a message of rospy is logged; errors of callbacks that publish on a topic closed by the shutdown
+    are not.
 
     rospy closes topics first, and only then recognises exceptions of callbacks as a consequence.
     """
@@ -81,7 +82,7 @@ def _is_news(record: logging.LogRecord) -> bool:
 
 def log_fatal_lines(lines: Iterable[str]) -> None:
     """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
-    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
+    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on rospy's log
     end_s = time.monotonic() + MAX_WAIT_S
     expected = _count_subscribers()
     while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():

@@ -1,4 +1,4 @@
-"""Parameters of a node: checked private ones, and those that are set again at a ROS master that has lost them."""
+"""Parameters of a node: validated private ones, and parameters that are set again at a restarted ROS master."""
 
 import contextlib
 from typing import Any, TypeVar
@@ -32,7 +32,7 @@ def private_parameters(model: type[Model]) -> Model:
 
 
 class KeptParameters:
-    """Stores parameters and their values for a master that comes back without them."""
+    """Stores parameters and their values, to set them again at a restarted master."""
 
     def __init__(self) -> None:
         self._values: dict[str, Any] = {}
@@ -44,14 +44,14 @@ class KeptParameters:
             self._values[name] = rospy.get_param(name)
 
     def set(self, name: str, value: Any) -> None:
-        """Sets a parameter and stores it, for later if there is no master now."""
+        """Sets a parameter and stores it; without a master, it is set when one is back."""
         name = rospy.resolve_name(name)
         self._values[name] = value
         with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
             master.setParam(rospy.get_name(), name, value)
 
     def delete(self, name: str) -> None:
-        """Deletes a parameter from the master and the store; it, or the master, may have gone already."""
+        """Deletes a parameter from the master and the store; neither it nor the master need exist."""
         name = rospy.resolve_name(name)
         self._values.pop(name, None)
         with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:

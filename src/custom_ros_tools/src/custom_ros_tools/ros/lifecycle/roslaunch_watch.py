@@ -7,17 +7,17 @@ import threading
 import time
 
 PERIOD_S = 0.5
-"""Time between two looks at the parent [s]."""
+"""Time between two checks of the parent [s]."""
 MAX_END_S = 15.0
 """Longest time for an orderly end [s], as roslaunch gives its nodes before it sends SIGTERM."""
 
 
 def end_with_roslaunch() -> None:
-    """Has this process end soon after the roslaunch that started it, even if that is killed.
+    """Ends this process soon after the roslaunch that started it, even if roslaunch was killed.
 
-    roslaunch gives each of its nodes the argument `__log`, and rosrun does not: other processes outlive their parent,
-    such as a node in the background of a shell that is closed. The end is that of Ctrl-C, or SIGKILL if it takes
-    longer than 15 s. SIGINT must be blocked already.
+    Only nodes that roslaunch has started are affected; they have the argument `__log`. Other processes outlive their
+    parent, such as a node in the background of a closed shell. The process ends as by Ctrl-C, or by SIGKILL if that
+    takes longer than 15 s. SIGINT must be blocked already.
     """
     if any(word.startswith("__log:=") for word in sys.argv):
         threading.Thread(target=_wait_and_end, args=(os.getppid(),), name="roslaunch", daemon=True).start()

@@ -1,9 +1,9 @@
-"""The life of a node: start, wait, end; with Ctrl-C at any moment, without hanging and without a traceback.
+"""The life of a node: start, wait, end; Ctrl-C ends it at any time without a hang or traceback.
 
-rospy would shut down inside the signal handler, wherever the program happens to be. If that is inside a lock that the
-shutdown needs too, the process hangs for good; and also if anybody opens or closes a topic meanwhile. SIGINT therefore
-stays blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to act on it, in a thread. Child
-processes inherit the block, which leaves their end to this process.
+rospy would shut down inside the signal handler, at any point of the program. If the interrupted code holds a lock that
+the shutdown needs, or if a thread opens or closes a topic meanwhile, the process hangs forever. SIGINT therefore stays
+blocked (see `custom_ros_tools.ros.node`), and a thread waits for it. Child processes inherit the block; this process
+ends them.
 """
 
 import atexit
@@ -33,12 +33,12 @@ MAX_FAREWELL_S = 10.0
 """Longest time for unregistering from the ROS master [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
 INTERRUPTED_TOO_S = 1.0
-"""Time by which an interrupt may reach this node later than the node of a service, if both get it [s]."""
+"""Largest delay between an interrupt of the node of a service and of this one, if both are interrupted [s]."""
 MAX_FILES = 8192
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
-    """Makes this process a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
+    """Initialises a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
     keep_accepting()
     keep_new_connections()
     allow_large_integers()
@@ -66,8 +66,8 @@ def run_node(
 
     Args:
         name: Default name of the node.
-        start: Opens topics and services. It may do the node's work itself until ROS shuts down, which
-            `rospy.ROSInterruptException` may indicate. Its result is referenced until the end.
+        start: Opens topics and services. It may do the node's work until ROS shuts down, and may end with
+            `rospy.ROSInterruptException`. Its result is kept until the node ends.
         run: Does the work with the result of `start`, until ROS shuts down; if it is given, an interrupt waits until
             `start` has returned.
         anonymous: Whether the name is made unique.
@@ -150,7 +150,7 @@ def leave_ros_on_signals() -> None:
     thread = threading.Thread(target=wait_and_leave, name="interrupts", daemon=True)
     thread.start()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os.write(writing, b"."))  # only this is safe wherever the script happens to be
+        signal.signal(number, lambda *_: os.write(writing, b"."))  # safe at any point of the script
     atexit.register(leave)
 
 
@@ -174,7 +174,7 @@ def _wait_and_leave() -> None:
 
 
 def _allow_many_files() -> None:
-    """Raises the limit of open files, one of which every connection of a topic needs, as far as permitted."""
+    """Raises the limit of open files as far as permitted; every connection of a topic needs one."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = MAX_FILES if hard == resource.RLIM_INFINITY else min(hard, MAX_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:

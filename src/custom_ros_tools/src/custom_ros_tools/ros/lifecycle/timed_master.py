@@ -14,7 +14,7 @@ import rosgraph
 TIMEOUT_S = 2.0
 """Longest time for an answer of the master [s]; a healthy one takes milliseconds."""
 MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
-"""Exceptions of its calls if it has gone, hangs or is something else."""
+"""Exceptions of its calls if the master has ended, hangs or is another program."""
 
 PORTS = range(22000, 32000)
 """Ports for masters, below those that the kernel assigns for port 0."""
@@ -44,10 +44,10 @@ def timed_master(uri: str | None = None) -> Any:
 
 
 def allow_large_integers() -> None:
-    """Has this process send integers of more than 32 bits as `i8`, which Python reads, instead of an error.
+    """Makes XML-RPC send integers of more than 32 bits as `i8`, which Python reads, instead of raising an error.
 
-    rospy counts bytes in such integers: a node that has sent more than 2 GB could not answer `getBusStats` any more,
-    by which recorders learn how many messages it has sent.
+    rospy counts bytes in such integers: a node that has sent more than 2 GB could no longer answer `getBusStats`, from
+    which recorders read the number of sent messages.
     """
 
     def dump(_: Marshaller, value: int, write: Callable[[str], object]) -> None:
@@ -59,7 +59,8 @@ def allow_large_integers() -> None:
 
 
 def address_fault() -> str | None:
-    """Returns in one line why other nodes cannot, or may not, reach this node by its address, or None.
+    """Returns in one line why other nodes cannot, or may be unable to, reach this node by its address; None if they
+    can.
 
     The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to belong to this computer. If the
     master is reached through a network, it must not be a loopback address. If the master is on another computer, it has
@@ -67,7 +68,7 @@ def address_fault() -> str | None:
     """
     variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name)), None)
     given = rosgraph.network.get_host_name()
-    what = f"{variable} is {given}" if variable else f"the name of this computer, which nodes here go by, is {given}"
+    what = f"{variable} is {given}" if variable else f"the name of this computer, the nodes' address, is {given}"
     uri = rosgraph.get_master_uri()
     try:
         master = socket.gethostbyname(rosgraph.network.parse_http_host_and_port(uri)[0])

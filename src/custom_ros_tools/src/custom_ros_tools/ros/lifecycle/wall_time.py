@@ -1,4 +1,4 @@
-"""Timers, rates and throttled warnings by the wall clock, which goes on when simulated time stands still."""
+"""Timers, rates and throttled warnings by the wall clock, which also run while simulated time is stopped."""
 
 import re
 import threading
@@ -46,7 +46,7 @@ class WallRate:
 class WallTimer:
     """Calls a function at a rate [Hz], in a thread of its own, until it is stopped or ROS shuts down.
 
-    An exception is logged, and the next call is made all the same.
+    An exception is logged, and does not prevent the next call.
     """
 
     def __init__(self, hz: float, action: Callable[[], None]) -> None:
@@ -57,7 +57,7 @@ class WallTimer:
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
 
     def stop(self) -> None:
-        """Makes no further call; a running one ends by itself."""
+        """Prevents further calls; a running one completes."""
         self._ended.set()
 
     def _run(self) -> None:
@@ -71,7 +71,8 @@ class WallTimer:
 
 
 class ThrottledWarning:
-    """Warns of each new kind of fault of a subject at once, else at most once in a period of wall time [s].
+    """Warns at once of each new kind of fault of a subject, and of known kinds at most once in a period of wall time
+    [s].
 
     It counts the warnings that it suppresses. Messages are of one kind if they differ in numbers alone.
 

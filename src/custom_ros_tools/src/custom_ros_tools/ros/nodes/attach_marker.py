@@ -25,7 +25,7 @@ class AttachMarkerNode:
     def __init__(self) -> None:
         config = private_config(MarkerConfig)
         if config.type not in SHAPES:
-            log.warning("nothing will be seen: a marker of type %s needs more than ~config can say", config.type)
+            log.warning("the marker is invisible: type %s needs data that ~config cannot have", config.type)
         self._transform = transform_message(config.position, config.quat_xyzw)
         self._marker = _marker(config)
         self._marker.pose = as_pose(self._transform)

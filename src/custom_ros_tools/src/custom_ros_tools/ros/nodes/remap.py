@@ -28,11 +28,11 @@ START_WAIT_S = 2.0
 
 
 class RemapNode:
-    """Converts and publishes joint states while it is switched on; while off, it is not even subscribed.
+    """Converts and publishes joint states while it is switched on; while off, it is not subscribed.
 
-    It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` returns the
-    published message; it raises InterfaceError or ValueError for a message that must be refused. `config` may have a
-    condition for switching on.
+    It has the service `remap_joint_state/toggle`, and the same service under the name of its executable. `convert`
+    returns the published message; it raises InterfaceError or ValueError for a message that must be refused. `config`
+    may have a condition for switching on.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ def _one_state(topic: str) -> JointValues:
 
 
 def _float_array_node() -> RemapNode:
-    """Returns the node that publishes one quantity of joint states as numbers, in the order of `~config`.
+    """Returns the node that publishes one quantity of joint states as bare numbers, in the order of `~config`.
 
     Raises:
         ConfigError: If the configuration or a parameter is wrong.

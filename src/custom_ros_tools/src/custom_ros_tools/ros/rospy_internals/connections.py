@@ -18,9 +18,9 @@ from .expecting import expecting
 def close_poller_with(topic: rospy.topics.Topic) -> None:
     """Closes the poller of a topic's connections, a file, with the topic.
 
-    It references its own methods, so that rospy leaves it to Python's garbage collector, which may run late.
+    It references its own methods, so only Python's garbage collector frees it, which may run late.
     """
-    # Without these parts, nothing is lost but a file for a while.
+    # Without these parts, a file only stays open for a while.
     poller = getattr(getattr(topic, "impl", None), "connection_poll", None)
     for name, method in list(vars(poller).items()) if poller is not None else ():
         if getattr(method, "__self__", None) is poller:
@@ -34,7 +34,7 @@ def _call(method: WeakMethod, *arguments: Any) -> Any:
 
 
 def keep_accepting() -> None:
-    """Makes this process, before it is a node, accept connections whatever other clients do; see `ServerSocket`."""
+    """Makes the node that this process becomes accept connections regardless of other clients; see `ServerSocket`."""
 
     def wrap() -> None:
         server = import_module("rospy.impl.tcpros_base").TCPServer
@@ -43,16 +43,16 @@ def keep_accepting() -> None:
 
     expecting(
         "rospy.impl.tcpros_base.TCPServer to make its socket",
-        "who connects and sends no header, or a lack of file handles, keeps others from this node",
+        "a client that connects and sends no header, or a lack of file handles, blocks all other clients",
         wrap,
     )
 
 
 def keep_new_connections() -> None:
-    """Makes this process, before it is a node, remove from its topics only connections that have ended.
+    """Makes the node that this process becomes remove only closed connections from its topics.
 
-    rospy finds a connection by its file number too, which a new connection gets as soon as the earlier one is closed.
-    The new one may then be removed instead: without being closed, so that its subscriber waits forever, or closed.
+    rospy also finds a connection by its file number, which a new connection may get when an earlier one is closed. It
+    may then remove the new one instead, and its subscriber waits forever or is disconnected.
     """
 
     def wrap() -> None:
@@ -66,7 +66,7 @@ def keep_new_connections() -> None:
         def check_locked(self: Any) -> None:
             lock = self.c_lock
             if lock is not None and [*self.connection_poll.error_iter()]:
-                with lock:  # what it finds in here is not closed before it has removed it
+                with lock:  # connections in here are not closed before they are removed
                     if self.c_lock is not None:  # else the topic was closed meanwhile
                         check(self)
 
@@ -80,8 +80,8 @@ def keep_new_connections() -> None:
 
 
 def _remove_connection(topic: Any, connections: list[Any], ended: Any) -> None:
-    """Closes a connection of a topic and removes it from a list, in which it may be the one behind a queue."""
-    if not ended.done:  # else its file is closed, and the number may be that of another connection
+    """Closes a connection of a topic and removes it from a list, where a queue may wrap it."""
+    if not ended.done:  # otherwise its file is closed, and the number may be that of another connection
         with suppress(OSError, TypeError, ValueError):  # it was not polled
             topic.connection_poll.remove_fd(ended.fileno())
         with suppress(Exception):  # as rospy does

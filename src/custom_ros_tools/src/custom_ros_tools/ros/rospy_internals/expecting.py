@@ -13,14 +13,14 @@ T = TypeVar("T")
 def expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
     """Returns the result of using private parts; None and a warning if they are not as expected.
 
-    While rospy shuts down, its parts are in another state, which is no evidence of different internals.
+    While rospy shuts down, differences are ignored: its parts are in another state then.
     """
     try:
         return use()
-    except Exception as error:  # whatever a different rospy raises, the node continues
+    except Exception as error:  # the node continues regardless of the error
         if not rospy.core.is_shutdown_requested():
             rospy.logwarn(
-                "this rospy is built otherwise: expected %s, got %s: %s; %s",
+                "this rospy has different internals: expected %s, got %s: %s; %s",
                 expected,
                 type(error).__name__,
                 error,

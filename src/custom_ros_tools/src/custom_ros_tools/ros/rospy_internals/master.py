@@ -17,8 +17,8 @@ from .expecting import expecting
 class Subscriptions:
     """Connects the subscriptions of this node to all publishers that the ROS master has reported.
 
-    rospy handles only the last report of each topic, although reports overtake each other. It also counts connections
-    that have ended, so that it overlooks a publisher that comes back, or that has lost one connection.
+    rospy handles only the last report of each topic, although reports may arrive out of order. It also counts closed
+    connections, so it overlooks a publisher that comes back or has lost one connection.
 
     Args:
         manager: The part of rospy that receives the reports; they come here instead.
@@ -54,7 +54,7 @@ class Subscriptions:
         subscription = self._topics.get_subscriber_impl(topic)
         if subscription is None:
             return False
-        for connection in getattr(subscription, "connections", ()):  # without this list, ended ones stay
+        for connection in getattr(subscription, "connections", ()):  # without this list, closed ones stay
             if connection.done:
                 subscription.remove_connection(connection)
         return bool(subscription.has_connection(uri))
@@ -66,7 +66,7 @@ class Subscriptions:
         try:
             code, *_ = self._connect_topic(topic, uri)
         except Exception:
-            if not rospy.core.is_shutdown_requested():  # else its parts are gone
+            if not rospy.core.is_shutdown_requested():  # otherwise its parts are gone
                 raise
         finally:
             with self._lock:
@@ -97,7 +97,8 @@ class Registry:
 
     @contextmanager
     def entries(self) -> Iterator[list[tuple[str, str, str]]]:
-        """Yields the kind (`sub`, `pub`, `srv`), name and type or URI of all; none comes or goes in the context."""
+        """Yields the kind (`sub`, `pub`, `srv`), name and type or URI of all entries, which do not change inside the
+        context."""
         with self._topics.lock, self._services.lock:
             yield [
                 *(("sub", *each) for each in self._topics.get_subscriptions()),
@@ -119,7 +120,7 @@ def registry() -> Registry | None:
     """Returns the registry of this node, None if rospy's internals differ."""
     return expecting(
         "rospy.impl.registration to have RegManager among its listeners",
-        "a ROS master that comes back will not know this node: start it again then",
+        "a restarted ROS master will not know this node: restart the node then",
         Registry,
     )
 
@@ -128,6 +129,6 @@ def answer_cached(parameter: str, value: Any) -> None:
     """Makes `rospy.get_param_cached` answer without contacting the master."""
     expecting(
         "rospy.impl.paramserver to have a cache",
-        "who logs something waits for a master that hangs",
+        "logging blocks while the master hangs",
         lambda: import_module("rospy.impl.paramserver").get_param_server_cache().set(parameter, value),
     )

@@ -39,7 +39,7 @@ class DirectSending:
             cls._is_possible = bool(
                 expecting(
                     "Publisher.impl to send by the sockets of its connections",
-                    "messages go by rospy's queues and threads, which is slower at high rates",
+                    "messages are sent by rospy's queues and threads, which is slower at high rates",
                     lambda: cls._try(publisher),
                 )
             )
@@ -84,12 +84,12 @@ class DirectSending:
 
 
 class RecorderQueues:
-    """Keeps more messages for subscribers that are recorders: these want all, and a viewer the newest.
+    """Keeps more messages for recorders, which need all messages; a viewer needs the newest one.
 
-    A recorder is a node whose name begins with `record`, as that of `rosbag record` does.
+    A recorder is a node whose name begins with `record`, such as `rosbag record`.
 
     Args:
-        publisher: A publisher with a queue size, which stays as it is for others.
+        publisher: A publisher with a queue size, which stays unchanged for other subscribers.
         limit: Number of messages that are kept for a recorder; beyond it, the oldest are dropped.
     """
 
