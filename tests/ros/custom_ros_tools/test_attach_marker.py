@@ -108,7 +108,7 @@ def test_invisible_marker_is_reported(ros):
     process = start(ros, {**CUP, "type": "line_strip"})
     [marker] = ros.listen("/cup/marker", Marker).wait_for(1)[:1]
     assert marker.type == Marker.LINE_STRIP
-    assert "nothing will be seen: a marker of type LINE_STRIP needs" in ros.output(process)
+    assert "the marker is invisible: type LINE_STRIP needs" in ros.output(process)
 
 
 def test_ctrl_c_ends_it_cleanly(ros):

@@ -75,7 +75,7 @@ def test_start_outside_limits_is_moved_inside_and_reported_once(lwr, caplog):
             start = _start(lwr, [0.0, position, 0.0, -1.2, 0.0, 0.8, 2.96700001])
             lwr.solve(IKProblem(target=Pose((0.0, 0.0, 100.0)), start=start))
     assert [record.getMessage() for record in caplog.records] == [
-        "the start is outside limits and is brought in: 'lwr_arm_1_joint' 5"
+        "the start is outside limits and is moved within them: 'lwr_arm_1_joint' 5"
     ], "once for a stream, and rounding of a limit is not worth a word"
 
 
@@ -119,7 +119,7 @@ def test_unreachable_target_is_reported_and_the_arm_stretches_towards_it(lwr):
     solution = lwr.solve(IKProblem(target=target, rotation_tolerance=(4.0, 4.0, 4.0), start=_start(lwr)))
     assert not solution.success
     assert "misses the tolerances of its target by" in solution.message
-    assert "1 mm would do; it is farther away than the chain is long" in solution.message
+    assert "1 mm would do; it is beyond the reach of the chain" in solution.message
     ways = [lwr.chain.pose([0.0, shoulder, *[0.0] * 5]) for shoulder in (-math.pi / 2, math.pi / 2)]
     stretched = max(pose.position[0] for pose in ways)
     assert solution.position_error_m <= 3.0 - stretched + 0.01

@@ -72,7 +72,7 @@ def test_a_failure_leads_nowhere(solver):
 
 def test_continuity_begins_at_the_first_start_within_joint_velocities(solver, smooth):
     first = smooth.solve(at(0.5, 0.0, shoulder=-0.5, elbow=0.2), 10.0)
-    assert first.positions == (-0.5, 0.2) and "0% of the way" in first.message
+    assert first.positions == (-0.5, 0.2) and "0% of the motion" in first.message
     second = smooth.solve(at(0.5, 0.0, shoulder=0.9, elbow=0.9), 10.01)
     assert second.positions == pytest.approx((-0.5 + 0.01 * SPEED, 0.2 - 0.2 * 0.01 * SPEED))
     assert solver.starts[1] == {"shoulder": -0.5, "elbow": 0.2}, "where the last target was, whatever is measured"

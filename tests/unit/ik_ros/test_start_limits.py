@@ -20,5 +20,5 @@ def test_each_joint_outside_limits_is_reported_once(caplog):
             ((2.0, 0.0), [1.0, 0.0]),
         ]:
             assert starts.wrap_to_limits(start) == inside
-    told = "the start is outside limits and is brought in: "
+    told = "the start is outside limits and is moved within them: "
     assert [record.getMessage() for record in caplog.records] == [told + "'a' 2", told + "'b' -2"]

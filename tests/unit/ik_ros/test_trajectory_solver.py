@@ -192,7 +192,7 @@ def test_random_problems_reachable_or_not_stay_within_limits():
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
-        (IKProblem(), "waypoints: missing, and there is no target in their place"),
+        (IKProblem(), "waypoints: missing, and there is no target instead"),
         (IKProblem(waypoints=(Waypoint(0.0, Pose()),)), r"waypoints\[0\].time_s: must be after 0 s, got 0"),
         (IKProblem(waypoints=(Waypoint(2.0, Pose()), Waypoint(1.0, Pose()))), r"waypoints\[1\].time_s: must be after"),
         (IKProblem(waypoints=(Waypoint(1e8, Pose()),)), "are too many"),

@@ -1,4 +1,4 @@
-"""Tests for pytest that every solver passes; derive from `SolverConformance` to try a solver of your own."""
+"""Tests for pytest that every solver passes; derive from `SolverConformance` to test a solver of your own."""
 
 import math
 import os
@@ -37,13 +37,13 @@ pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "
 class SolverConformance:
     """Tests that any solver of a link's pose passes.
 
-    A subclass names the solver and its robot, and overrides whatever differs for its solver.
+    A subclass names the solver and its robot, and may override the methods below.
 
     Attributes:
         solver_name: Argument of `make_solver`: a name of the table, or `"their_package.module:Class"`.
-        options: Its options. `urdf_filename`, `base_link` and `tip_link` are where `forward` finds the robot.
-        least_share: The least share of reachable problems to be solved.
-        reachable_problems: Number of those to try.
+        options: Its options. `forward` reads the robot from `urdf_filename`, `base_link` and `tip_link`.
+        least_share: Smallest share of reachable problems that must be solved.
+        reachable_problems: Number of reachable problems to solve.
         random_problems: Number of problems, reachable or not, for which only limits and finiteness are checked.
         reach_m: Largest distance of random targets from the base [m].
     """
@@ -55,18 +55,18 @@ class SolverConformance:
     random_problems: ClassVar[int] = 500
     reach_m: ClassVar[float] = 1.5
 
-    # --- What a subclass may override.
+    # --- Methods that a subclass may override
 
     def make(self) -> Solver:
         """Returns a new solver."""
         return SOLVERS.make(self.solver_name, self.options)
 
     def problem(self, target: Pose, start: Mapping[str, float], seed: int = 0) -> IKProblem:
-        """Returns the problem of going to a target."""
+        """Returns a problem with a target."""
         return IKProblem(target=target, start=start, seed=seed)
 
     def forward(self, positions: Sequence[float]) -> Pose:
-        """Returns where the link is in the base, by other means than the solver's own: `robot_model`."""
+        """Returns the pose of the link in the base by `robot_model`, independently of the solver."""
         at = dict(zip(self.solver.joint_names, positions))
         q = [at.get(name, 0.0) for name in self.robot.joint_names]
         return self.robot.pose(q, str(self.options["tip_link"]), str(self.options["base_link"]))
@@ -75,7 +75,7 @@ class SolverConformance:
         """Returns random positions within limits."""
         return self.limits.random(generator, self.limits.middle)
 
-    # --- What the tests use.
+    # --- Helpers of the tests
 
     @cached_property
     def solver(self) -> Solver:
@@ -84,7 +84,7 @@ class SolverConformance:
 
     @cached_property
     def limits(self) -> Limits:
-        """Its limits, without which joints are tried half a turn both ways."""
+        """Its limits; joints without limits are sampled within half a turn in both directions."""
         return Limits(self.solver.lower, self.solver.upper, [True] * len(self.solver.joint_names))
 
     @cached_property
@@ -97,7 +97,7 @@ class SolverConformance:
         return dict(zip(self.solver.joint_names, positions))
 
     def reachable(self, generator: random.Random, count: int) -> list[IKProblem]:
-        """Returns problems that have solutions, from anywhere."""
+        """Returns solvable problems with random starts."""
         return [
             self.problem(self.forward(self.positions(generator)), self.start_at(self.positions(generator)))
             for _ in range(count)
@@ -113,18 +113,18 @@ class SolverConformance:
             for position, lower, upper in zip(positions, self.solver.lower, self.solver.upper):
                 assert lower <= position <= upper, f"outside limits: {solution}"
         assert math.isfinite(solution.position_error_m + solution.orientation_error_rad), solution
-        assert solution.message, "no word on how well it went"
+        assert solution.message, "no message about the result"
         for positions in (solution.positions, *solution.alternatives) if solution.success else ():
             assert problem.target is not None
             distance, angle = distances(self.forward(positions), problem.target)
-            assert distance <= 1.01 * POSITION_TOLERANCE_M, f"said to be solved, and {distance:g} m off"
-            assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"said to be solved, and {angle:g} rad off"
+            assert distance <= 1.01 * POSITION_TOLERANCE_M, f"reported as solved, but off by {distance:g} m"
+            assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"reported as solved, but off by {angle:g} rad"
         return solution
 
     # --- The tests.
 
     def test_its_joints_and_limits_belong_together(self) -> None:
-        """Names are unique, and each has limits in order and a velocity, which continuity needs."""
+        """Names are unique; each joint has ordered limits, and a velocity limit, which continuity needs."""
         names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
         assert names and len(set(names)) == len(names) == len(lower) == len(upper)
         assert all(low <= high for low, high in zip(lower, upper))
@@ -132,13 +132,13 @@ class SolverConformance:
         assert all(velocity > 0.0 for velocity in self.solver.velocity_limits)
 
     def test_reachable_targets_are_reached(self) -> None:
-        """Successes are true, and there are enough of them: always answering false fails here."""
+        """Reported successes are true, and frequent enough; a solver that always fails does not pass."""
         problems = self.reachable(random.Random(1), self.reachable_problems)
         share = sum(self.checked(problem).success for problem in problems) / self.reachable_problems
         assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
 
     def test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off(self) -> None:
-        """Failure is a value."""
+        """A failure is an answer, not an exception."""
         start = self.start_at(self.limits.middle)
         target = Pose((0.0, 0.0, 100.0))
         solution = self.checked(self.problem(target, start))
@@ -156,31 +156,33 @@ class SolverConformance:
             self.checked(self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed))
 
     def test_a_target_that_is_not_finite_is_refused(self) -> None:
-        """It must not get as far as the solver."""
+        """The problem itself must refuse it."""
         for bad in (math.nan, math.inf, 1e300):
             for target in (Pose((0.1, bad, 0.3)), Pose((0.1, 0.2, 0.3), (0.0, 0.0, bad, 1.0))):
                 with pytest.raises(ValueError, match="finite"):
                     self.solver.solve(self.problem(target, {}))
 
     def test_an_unknown_joint_is_refused_and_the_known_ones_are_named(self) -> None:
-        """A misspelt joint would start somewhere else unnoticed."""
+        """A misspelt joint would silently start elsewhere."""
         problem = self.problem(self.forward(self.limits.middle), {"no_such_joint": 0.0})
         with pytest.raises(UnknownNameError, match=f"no_such_joint.*{self.solver.joint_names[0]}"):
             self.solver.solve(problem)
 
     def test_equal_problems_have_equal_answers(self) -> None:
-        """Whatever was solved before, in a new solver, and in a process with another number of threads."""
+        """The answers do not depend on earlier problems, on the solver object, or on the number of threads."""
         if not self.solver.deterministic:
             pytest.skip(f"'{self.solver_name}' is not declared deterministic")
         problems = self.reachable(random.Random(3), 10) + [self.problem(Pose((0.0, 0.0, 100.0)), {})]
         first = [self.solver.solve(problem) for problem in problems]
-        assert [self.solver.solve(problem) for problem in reversed(problems)] == first[::-1], "what was before counts"
+        assert [self.solver.solve(problem) for problem in reversed(problems)] == first[::-1], (
+            "answers depend on earlier problems"
+        )
         fresh = self.make()
-        assert [fresh.solve(problem) for problem in problems] == first, "another solver answers otherwise"
-        assert self._in_another_process(problems) == first, "another process answers otherwise"
+        assert [fresh.solve(problem) for problem in problems] == first, "another solver object answers differently"
+        assert self._in_another_process(problems) == first, "another process answers differently"
 
     def _in_another_process(self, problems: Sequence[IKProblem]) -> Any:
-        threads = "2" if os.environ.get("OPENBLAS_NUM_THREADS") == "1" else "1"  # another number than here
+        threads = "2" if os.environ.get("OPENBLAS_NUM_THREADS") == "1" else "1"  # another number of threads than here
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "OPENBLAS_NUM_THREADS": threads}
         with tempfile.NamedTemporaryFile() as answers:
             asked = pickle.dumps((self.solver_name, self.options, list(problems)))
@@ -195,5 +197,5 @@ def distances(pose: Pose, other: Pose) -> tuple[float, float]:
 
 
 def random_quat(generator: random.Random) -> Quaternion:
-    """Returns a random rotation, any as likely as any other."""
+    """Returns a uniformly distributed random rotation."""
     return normalized([generator.gauss(0.0, 1.0) for _ in range(4)])

@@ -28,16 +28,16 @@ class RobotIKConfig(ConfigModel):
     """Options of the robot's own inverse kinematics; the keys are those of its message."""
 
     robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
-    link_name: Text = Field(description="The link that goes to the target.")
+    link_name: Text = Field(description="The link that is moved to the target.")
     parent_frame_id: FrameId = Field(description="TF frame of the world.")
     child_frame_id: FrameId = Field(description="TF frame that is the target.")
     lowerLimits: ListOf[float] = Field((), description="One for each joint that a motor can move, as the next three.")
-    upperLimits: ListOf[float] = Field((), description="These four go together [rad or m].")
+    upperLimits: ListOf[float] = Field((), description="Requires the other three limits and ranges, too [rad or m].")
     jointRanges: ListOf[float] = Field((), description="Range of each about its rest posture, relative to the others.")
     resetPoses: ListOf[float] = Field((), description="Rest posture.")
     jointDamping: ListOf[NonNegative] = Field((), description="Weight of the motion of each joint.")
     solver: Literal[0, 1] = Field(0, description="0 damped least squares, 1 selectively damped least squares.")
-    maxNumIterations: Count = Field(0, description="Most iterations from one start; 0 is up to the robot.")
+    maxNumIterations: Count = Field(0, description="Most iterations from one start; 0 is the robot's default.")
     residualThreshold: NonNegative = Field(0.0, description="Distance at which the search stops [m].")
 
 
@@ -59,7 +59,7 @@ class SetupParameters(StartParameters, TargetParameters):
     init_brx: NonNegative = Field(0.0, description="Largest rotation about its x axis, both ways [rad].")
     init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
     init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
-    goals: dict[Text, ListOf[float]] = Field({}, description="First goals of tasks that change, by task.")
+    goals: dict[Text, ListOf[float]] = Field({}, description="Initial goals of tasks whose goals change, by task.")
     wait_for_start: Switch = Field(True, description="Whether the first problem waits for a start.")
     max_num_prev_solutions: Count = Field(1, description="Number of previous solutions in a problem.")
     seed: Count = Field(0, description="Seed of everything random in the solver.")
@@ -93,7 +93,7 @@ class SolverNodeParameters(StartParameters):
 
 
 class TfToFloatArrayConfig(TargetParameters):
-    """Which transform becomes numbers, and which numbers."""
+    """The transform to publish, and the format of its numbers."""
 
     parent_frame_id: FrameId = Field(description="The frame that the pose is in.")
     child_frame_id: FrameId = Field(description="The frame whose pose it is.")

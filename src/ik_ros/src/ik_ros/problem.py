@@ -1,4 +1,4 @@
-"""Questions to inverse kinematics and answers, the same for every solver."""
+"""Problems and solutions of inverse kinematics, the same for every solver."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ class Waypoint:
     """A pose that a link passes at a time.
 
     Attributes:
-        time_s: When, from the start [s].
+        time_s: Time from the start [s].
         pose: The link's pose in the solver's base frame; positions [m], unit quaternion x, y, z, w.
     """
 
@@ -29,7 +29,7 @@ class AttachedFrame:
     """A frame of a scene.
 
     Attributes:
-        parent: What it is attached to: a link or another frame; empty for the root.
+        parent: The link or frame that it is attached to; empty for the root.
         pose: Its pose there; position [m], unit quaternion x, y, z, w.
     """
 
@@ -39,14 +39,14 @@ class AttachedFrame:
 
 @dataclass(frozen=True)
 class IKProblem:
-    """A problem for a solver; fields that it does not need stay empty.
+    """A problem for a solver; fields that the solver does not need stay empty.
 
     Attributes:
         target: Pose of the solver's link in its base frame; quaternions of any length but 0.
         position_tolerance: Largest error along each axis of the target, both ways [m].
-        rotation_tolerance: Largest rotation about each of them, both ways [rad]; free from pi on.
-        start: Start of the search, by joint [rad or m]; joints that are left out start at the middle of their
-            limits. Positions outside limits are brought in, with a warning.
+        rotation_tolerance: Largest rotation about each axis, both ways [rad]; from pi on, any rotation is accepted.
+        start: Start of the search, by joint [rad or m]; joints that are left out start at the middle of their limits.
+            Positions outside limits are brought within them, with a warning.
         previous: Previous solutions, newest last; solvers that can stay near them.
         goals: Values of the goals of tasks by the name of the task, for solvers that have tasks.
         waypoints: Waypoints of the link, by time, for solvers of trajectories.
@@ -135,11 +135,11 @@ class IKSolution:
     """Result of a solver.
 
     Attributes:
-        success: Whether all that was asked for is met within the tolerances, and the limits are held.
+        success: Whether all requirements are met within the tolerances, and the limits are kept.
         message: Description of the result, in words with numbers.
         joint_names: The solver's n joints, always in the same order.
-        positions: n positions within limits [rad or m]; without success, the best that were found, and without any
-            of those, where the search started.
+        positions: n positions within limits [rad or m]; without success the best that were found, or else the start of
+            the search.
         position_error_m: Distance of the link from its target beyond the tolerance [m]; for several, the largest.
         orientation_error_rad: Rotation from the target beyond the tolerance [rad]; for several, the largest.
         alternatives: Other solutions, the best first, if the solver searches several; n positions each.

@@ -1,4 +1,4 @@
-"""Problems that follow each other, and targets without jumps."""
+"""Streams of problems, and targets without jumps."""
 
 import dataclasses
 import time
@@ -22,27 +22,28 @@ class JointRateLimiterConfig(ConfigModel):
     )
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Share of these velocities that is used.")
     max_period_s: Positive = Field(
-        0.1, description="A target that comes after a longer pause goes no further than after this one [s]."
+        0.1, description="Longest pause between targets that counts [s]; after a longer one, a target moves no further."
     )
     hold: bool = Field(
-        False, description="Whether targets go on to the last solution, and stay there, while problems have none."
+        False,
+        description="Whether targets continue to the last solution, and stay there, while there is no solution.",
     )
 
 
 class JointRateLimiter:
-    """Keeps the joints between two targets within their velocities.
+    """Limits the joint velocities between successive targets.
 
-    Where the solution is further away, the target goes as far towards it as the slowest joint allows, all joints in
-    proportion. Near a singularity, where small motions of the link need large ones of the joints, the robot therefore
-    lags instead of jumping, and it changes to another posture at the speed of its joints.
+    If the solution is further away, the target moves towards it as far as the slowest joint allows, all joints in
+    proportion. Near a singularity, where small motions of the link need large joint motions, the robot therefore lags
+    instead of jumping. Changes of posture are limited to the speed of the joints.
 
     Args:
         config: Its configuration.
         joint_names: The n joints.
-        velocity_limits: Their velocities by the URDF [rad/s or m/s]; 0 and inf mean that it has none.
+        velocity_limits: Their velocities by the URDF [rad/s or m/s]; 0 and inf mean none.
 
     Attributes:
-        hold: Whether targets go on while problems have no solution.
+        hold: Whether targets continue while problems have no solution.
         max_period_s: Longest time since the last target that counts [s].
 
     Raises:
@@ -79,7 +80,7 @@ class JointRateLimiter:
             period_s: Time since the last target [s].
 
         Returns:
-            n positions [rad or m], and which share of the way to the solution they are at, 1 at the solution.
+            n positions [rad or m], and the share of the motion to the solution that they complete, 1 at the solution.
         """
         goal = np.array(solution, dtype=float)
         if self._last is None:
@@ -94,7 +95,7 @@ class JointRateLimiter:
 
 
 class ProblemStream:
-    """Solves problems one after the other, each from where the last one led.
+    """Solves problems one after the other, each from the last solution.
 
     Args:
         solver: The solver.
@@ -123,15 +124,15 @@ class ProblemStream:
         """Solves the next problem.
 
         Args:
-            problem: With its poses in the solver's base. Joints that its `start` leaves out start where the last target
-                was; with continuity, that all of them do, and the first start has to be complete.
-            stamp_s: When it was posed [s]; 0 is now.
+            problem: With its poses in the solver's base. Joints that its `start` leaves out start at the last target.
+                With continuity all joints do, and the first start has to be complete.
+            stamp_s: Its time [s]; 0 is now.
 
         Returns:
-            The solution, with positions on the way to it as far as continuity allows. A trajectory is left as it is.
+            The solution, with positions as close to it as continuity allows. A trajectory is returned unchanged.
 
         Raises:
-            UnknownNameError: If it names a joint that is not there.
+            UnknownNameError: If it names an unknown joint.
             ValueError: If it makes no sense.
         """
         self.target, is_first = None, not self._last
@@ -152,20 +153,20 @@ class ProblemStream:
             self._continuity.begin(np.clip(positions, self._solver.lower, self._solver.upper).tolist())
         self._goal = solution.positions
         target, share = self._advance(self._continuity, solution.positions, stamp_s)
-        on_the_way = f"; the joints are {share:.0%} of the way there" if share < 1.0 else ""
+        on_the_way = f"; the joints are {share:.0%} of the motion to it" if share < 1.0 else ""
         return dataclasses.replace(solution, positions=target, message=f"{solution.message}{on_the_way}")
 
     def _advance(
         self, continuity: JointRateLimiter, goal: tuple[float, ...], stamp_s: float
     ) -> tuple[tuple[float, ...], float]:
-        """Makes the next target on the way to a goal; returns it, and at which share of the way it is."""
+        """Returns the next target towards a goal, and the share of the motion that it completes."""
         positions, share = continuity.next(goal, self._period_s(stamp_s))
         self.target = tuple(positions.tolist())
         self._last = dict(zip(self._solver.joint_names, self.target))
         return self.target, share
 
     def _complete(self, start: JointPositions) -> JointPositions:
-        """Returns a start, which must have all joints or none: the robot would jump to what is made up for the rest."""
+        """Returns a start, which must have all joints or none: with guessed positions, the robot would jump."""
         missing = [name for name in self._solver.joint_names if name not in start]
         if start and missing:
             raise ValueError(f"start: continuity begins there and needs all joints; it lacks {', '.join(missing)}")

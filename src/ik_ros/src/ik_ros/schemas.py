@@ -36,7 +36,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _tasks() -> dict[str, Schema]:
-    """Returns the definitions of all types of tasks and of those of other packages, with those that they refer to."""
+    """Returns the definitions of all types of tasks, with the definitions that they refer to."""
     own_type = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     definitions: dict[str, Schema] = {
         _OWN_TYPE: {"type": "object", "properties": {"type": own_type}, "required": ["type"]}

@@ -1,4 +1,4 @@
-"""Simple shapes that stand for links and obstacles."""
+"""Simple shapes that approximate links and obstacles."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from robot_model.geometry import Pose
 
 
 class Core(NamedTuple):
-    """A shape as what is left when its roundness is taken off: a point, a line or a box, in the middle of it.
+    """The core of a rounded shape: the point, line or box at its centre.
 
     Attributes:
         half: Half lengths along x, y, z [m].
-        radius: Distance of the surface from it [m].
+        radius: Distance of the surface from the core [m].
     """
 
     half: np.ndarray
@@ -24,7 +24,7 @@ class Core(NamedTuple):
 
     @property
     def is_box(self) -> bool:
-        """Whether it is neither a point nor a line along z."""
+        """Whether it is a box, not a point or a line along z."""
         return bool(self.half[:2].any())
 
 
@@ -33,7 +33,7 @@ class ShapeConfig(ConfigModel):
 
     Attributes:
         name: Its name in tasks and messages.
-        link: The link it belongs to; None: it stands in the base.
+        link: The link it belongs to; None: it is fixed in the base.
         position: Its centre, in the link or base [m].
         orientation: Its orientation there, quaternion x, y, z, w.
         sphere: Its radius [m].
@@ -62,7 +62,7 @@ class ShapeConfig(ConfigModel):
 
     @property
     def pose(self) -> Pose:
-        """Where it is in the link or base."""
+        """Its pose in the link or base."""
         return Pose(self.position, self.orientation)
 
     @property

@@ -40,17 +40,18 @@ class Solver(ABC):
 
     @abstractmethod
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Looks for joint positions.
+        """Searches for joint positions.
 
         Raises:
-            ValueError: If the problem does not fit the solver: it lacks what is needed or asks for what this solver
-                cannot do.
+            ValueError: If the problem does not fit the solver: a required field is missing, or the solver does not
+                support a requirement.
             UnknownNameError: If it names a joint or task that is not known.
         """
 
 
 class StartLimits:
-    """Brings starts into limits, and warns of each joint once: a stream asks the same a hundred times a second."""
+    """Brings starts into limits; warns once of each joint, since a stream may repeat a start a hundred times a
+    second."""
 
     def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
         self._joint_names = tuple(joint_names)
@@ -64,6 +65,6 @@ class StartLimits:
         outside = {name: asked for name, asked, used in joints if abs(asked - used) > LIMIT_ROUNDING}
         if not outside.keys() <= self._warned_of:
             positions = ", ".join(f"'{name}' {asked:g}" for name, asked in outside.items())
-            _log.warning("the start is outside limits and is brought in: %s", positions)
+            _log.warning("the start is outside limits and is moved within them: %s", positions)
             self._warned_of |= outside.keys()
         return inside

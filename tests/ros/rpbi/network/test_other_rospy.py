@@ -20,9 +20,9 @@ NODE = "/ros_pybullet_interface"
 JOINT_STATES = "/rpbi/iiwa/joint_states"
 BUILT_OTHERWISE = "this rospy has different internals: expected "
 SENDING = "messages are sent by rospy's queues and threads, which is slower at high rates"
-REGISTERING = "a ROS master that comes back will not know this node: start it again then"
+REGISTERING = "a restarted ROS master will not know this node: restart the node then"
 REMOVING = "a subscriber that connects while another one ends may receive nothing"
-LOGGING = "who logs something waits for a master that hangs"
+LOGGING = "logging blocks while the master hangs"
 SENDERS = {
     "a publisher's implementation": (r"\bself\.impl\b", "self.inner"),
     "the list of connections": (r"\bself\.connections\b", "self.links"),
@@ -88,7 +88,7 @@ def test_returning_master_is_noticed_although_nothing_registers_again(ros, tmp_p
     second_master.kill()
     wait_until(lambda: _lines(ros, process, "cannot be reached"), "the simulator misses the master")
     second_master.start()
-    wait_until(lambda: _lines(ros, process, f"is another one: it knows nothing of {NODE}"), "it sees the next one")
+    wait_until(lambda: _lines(ros, process, f"was restarted: it does not know {NODE}"), "it sees the next one")
     before = ros.output(listening).count("\n")
     wait_until(lambda: ros.output(listening).count("\n") > before + 10, "joint states still come")
     assert second_master.registrations(NODE) == []

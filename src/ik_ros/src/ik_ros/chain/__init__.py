@@ -1,1 +1,1 @@
-"""Chains of joints between two links, and how solvers find their positions."""
+"""Chains of joints between two links, and the common part of their solvers."""

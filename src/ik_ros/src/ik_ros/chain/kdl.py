@@ -13,7 +13,7 @@ from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
 
 class KdlChain:
-    """Where the tip of a chain is, and how it moves; one thread at a time.
+    """Forward kinematics and Jacobian of the tip of a chain; not thread-safe.
 
     Attributes:
         kdl: KDL's chain; its m joints are those that are not fixed.
@@ -43,7 +43,7 @@ class KdlChain:
         return Pose((x, y, z), frame.M.GetQuaternion())
 
     def jacobian(self, q: Sequence[float]) -> np.ndarray:
-        """Returns how the tip moves with the joints, in the base: 6 x n, 3 rows [m], 3 rows of a rotation [rad]."""
+        """Returns the Jacobian of the tip in the base: 6 x n, 3 rows of translation [m], 3 rows of rotation [rad]."""
         self._set(q)
         self._to_jacobian.JntToJac(self._positions, self._jacobian)
         joints = range(self._jacobian.columns())
@@ -84,21 +84,21 @@ class Goal:
 
     @property
     def any_orientation(self) -> bool:
-        """Whether the link may be turned as it likes."""
+        """Whether any orientation of the link is accepted."""
         return min(self.tolerance[3:]) == math.inf
 
     def off(self, frame: PyKDL.Frame) -> list[float]:
-        """Returns how far a link at a pose is off: 3 ways [m] and a rotation vector [rad], in the target."""
+        """Returns the error of a link at a pose: 3 distances [m] and a rotation vector [rad], in the target frame."""
         difference = self.inverse * frame
         p, turn = difference.p, difference.M.GetRot()
         return [p[0], p[1], p[2], turn[0], turn[1], turn[2]]
 
     def beyond(self, off: list[float]) -> list[float]:
-        """Returns what of these 6 values is beyond the tolerances."""
+        """Returns the part of a 6-vector of errors that exceeds the tolerances."""
         return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
 
     def residual(self, frame: PyKDL.Frame) -> Residual:
-        """Returns how far a link at a pose is off beyond the tolerances."""
+        """Returns the error of a link at a pose in excess of the tolerances."""
         x, y, z, rx, ry, rz = self.beyond(self.off(frame))
         return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
 

@@ -12,23 +12,23 @@ from .kdl import Goal, KdlChain
 
 ITERATIONS = 60
 LEVER_M = 0.1
-"""A turn counts as much as a way, of this lever: 0.01 rad are like 1 mm."""
+"""Lever arm that weighs rotation against translation [m]: 0.01 rad count as 1 mm."""
 DONE_M = 1e-5
 """Residual at which to stop [m]."""
 LARGEST_STEP = 1.0
-"""Most that a joint moves in one iteration [rad or m]."""
+"""Largest motion of a joint in one iteration [rad or m]."""
 LEAST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-4, 1e2
 STALLED = 0.99
-"""If the squared residual keeps more than this part of itself, little is left to gain..."""
+"""Ratio of successive squared residuals above which an iteration counts as stalled."""
 PATIENCE = 3
-"""... and after so many such iterations the descent ends."""
+"""Number of stalled iterations after which the descent ends."""
 
 
 def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
     """Brings the tip of a chain towards a goal, from n positions within the limits of its joints [rad or m].
 
-    It minimises how far the link is off beyond its tolerances. Joints that are at a limit and would leave it stand
-    still for that iteration.
+    It minimises the link's error in excess of its tolerances. Joints at a limit that would exceed it are held for that
+    iteration.
 
     Returns:
         The n best positions within limits that were found [rad or m].
@@ -42,7 +42,7 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
         if cost <= DONE_M**2 or patience == 0 or damping > LARGEST_DAMPING:
             break
         jacobian = _jacobian(chain, q, to_target, turn)
-        jacobian[error == 0.0] = 0.0  # within its tolerance: let it go
+        jacobian[error == 0.0] = 0.0  # within its tolerance: leave it free
         gradient = jacobian.T @ error
         free = ~(((q <= lower) & (gradient > 0.0)) | ((q >= upper) & (gradient < 0.0)))
         if not free.any():
@@ -66,7 +66,7 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
 
 
 def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
-    """Returns what is beyond the tolerances [m], and the rotation vector from target to link [rad]."""
+    """Returns the error in excess of the tolerances [m], and the rotation vector from target to link [rad]."""
     off = goal.off(chain.frame(q.tolist()))
     error = np.array(goal.beyond(off))
     error[3:] *= LEVER_M
@@ -74,10 +74,10 @@ def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list
 
 
 def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
-    """Returns how the error changes with the joints, tolerances aside, 6 x n.
+    """Returns the Jacobian of the error, without regard to tolerances, 6 x n.
 
-    A rotation vector does not change by the angular velocity alone: that is multiplied by the inverse of the left
-    Jacobian of SO(3) (Barfoot, State Estimation for Robotics, 2017, section 7.1.5).
+    The derivative of a rotation vector is the angular velocity times the inverse of the left Jacobian of SO(3)
+    (Barfoot, State Estimation for Robotics, 2017, section 7.1.5).
     """
     x, y, z = turn
     angle = math.hypot(x, y, z)

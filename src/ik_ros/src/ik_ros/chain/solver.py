@@ -29,7 +29,7 @@ class ChainConfig(ConfigModel):
     Attributes:
         urdf_filename: The robot; `{package}/path` and `package://` are resolved.
         base_link: The link that targets are expressed in; above the tip.
-        tip_link: The link that goes to the target.
+        tip_link: The link that is moved to the target.
     """
 
     urdf_filename: ExistingFile
@@ -56,11 +56,11 @@ class ChainConfig(ConfigModel):
 class ChainSolver(Solver):
     """Brings the tip of a chain of joints to a target.
 
-    Any thread may call it; a lock inside lets one in at a time. A subclass only looks for positions: here they are
-    brought into limits, put into the chain and judged, so that success is answered only where it is true.
+    Thread-safe by a lock. A subclass only searches for positions. This class brings them into limits and checks them by
+    forward kinematics, so a reported success is always true.
 
     Attributes:
-        description: The chain as the URDF has it.
+        description: The chain in the URDF.
         chain: Its kinematics.
         limits: Limits of its joints.
     """
@@ -83,7 +83,7 @@ class ChainSolver(Solver):
 
     @abstractmethod
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Looks for joint positions.
+        """Searches for joint positions.
 
         Args:
             problem: The problem.
@@ -91,14 +91,14 @@ class ChainSolver(Solver):
             start: n positions within limits [rad or m].
 
         Returns:
-            n positions each, the best first; none if nothing was found.
+            Solutions with n positions each, the best first; empty if none was found.
         """
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Looks for joint positions that bring the tip to the target.
+        """Searches for joint positions that bring the tip to the target.
 
         Raises:
-            ValueError: If the problem has no target, or asks for what the solver cannot do.
+            ValueError: If the problem has no target, or a requirement that the solver does not support.
             UnknownNameError: If the robot has no joint of a name in `start`.
         """
         with self._lock:
@@ -118,11 +118,11 @@ class ChainSolver(Solver):
         )
 
     def residual(self, goal: Goal, q: Sequence[float]) -> Residual:
-        """Returns how far the tip is off its goal beyond the tolerances at n positions [rad or m]."""
+        """Returns the error of the tip in excess of the tolerances at n positions [rad or m]."""
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
-        """Returns whether the target is farther away than the chain is long."""
+        """Returns whether the target is beyond the reach of the chain."""
         if problem.target is None:
             return False
         return not self.description.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
@@ -139,7 +139,7 @@ class ChainSolver(Solver):
         target = "its target" if goal.is_point else "the tolerances of its target"
         words = residual.in_words(self.description.tip, not goal.any_orientation, target)
         is_far = residual.size > 1.0 and self.is_beyond_reach(problem)
-        return words + ("; it is farther away than the chain is long" if is_far else "")
+        return words + ("; it is beyond the reach of the chain" if is_far else "")
 
 
 def refuse_mimics(config: ChainConfig, solver: str) -> None:
@@ -157,12 +157,12 @@ _COUNTS_AS_REACHED = {"position_tolerance": POSITION_TOLERANCE_M, "rotation_tole
 
 
 def large_tolerances(problem: IKProblem) -> list[str]:
-    """Returns the tolerances, by field, that are larger than what counts as reached anyway."""
+    """Returns the tolerances, by field, that exceed the tolerance of success."""
     return [name for name, most in _COUNTS_AS_REACHED.items() if max(getattr(problem, name)) > most]
 
 
 def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
-    """Refuses tolerances that are larger than what counts as reached anyway; `may_turn` allows those for rotations.
+    """Refuses tolerances that exceed the tolerance of success; `may_turn` allows those for rotations.
 
     Raises:
         ValueError: If there are some; it names the field.

@@ -1,1 +1,1 @@
-"""Problems in the XML of EXOTica, expressed by the tasks of the solver `tasks`."""
+"""Problems in the XML of EXOTica, expressed as tasks of the solver `tasks`."""

@@ -49,7 +49,7 @@ def _flag(value: Any) -> Any:
 
 
 def pose_of(numbers: tuple[float, ...]) -> Pose:
-    """Returns the pose that 3 (position), 6 (and roll, pitch, yaw) or 7 numbers (and a quaternion) stand for.
+    """Returns the pose given by 3 numbers (position), 6 (with roll, pitch, yaw) or 7 (with a quaternion).
 
     Raises:
         ValueError: If there are others.
@@ -139,7 +139,7 @@ class MapFrame(ElementConfig):
 
 
 class LinkConfig(ElementConfig):
-    """A frame of the scene that is not of the robot."""
+    """A frame of the scene that does not belong to the robot."""
 
     IGNORED = frozenset(("Debug", "Mass", "CenterOfMass", "Shape"))
     Name: Text
@@ -148,7 +148,7 @@ class LinkConfig(ElementConfig):
 
 
 class SceneConfig(ElementConfig):
-    """The robot, and what is around it; collisions are not checked."""
+    """The robot and the frames around it; collisions are not checked."""
 
     IGNORED = frozenset(
         (

@@ -42,9 +42,9 @@ class MapTask(NamedTuple):
 
     Attributes:
         options: Options of the task, without name and weight.
-        rho: How much it counts.
+        rho: Its weight.
         goal: Returns the goal of the task, from the numbers of the map's goal; None: it has none.
-        on_link: The frame that the task is about, if it is about one.
+        on_link: The frame that the task concerns, if any.
     """
 
     options: dict[str, Any]
@@ -54,10 +54,10 @@ class MapTask(NamedTuple):
 
 
 class TaskMap(ElementConfig):
-    """A task map: numbers that the configuration determines, and that have a goal.
+    """A task map: a function of the configuration, with a goal for its values.
 
     Attributes:
-        is_about_links: Whether it is about links, so that there is no success without it.
+        is_about_links: Whether it concerns links; then success requires it.
     """
 
     is_about_links: ClassVar[bool] = False
@@ -70,19 +70,19 @@ class TaskMap(ElementConfig):
 
     @abstractmethod
     def size(self, scene: ExoticaScene) -> int:
-        """Returns the count of numbers in its goal."""
+        """Returns the number of values of its goal."""
 
     @abstractmethod
     def parts(self, scene: ExoticaScene, rho: Sequence[float]) -> Iterator[MapTask]:
-        """Yields the tasks that express it; `rho` has the weights of its numbers."""
+        """Yields the tasks that express it; `rho` has the weights of its values."""
 
     def weights(self, scene: ExoticaScene) -> int:
-        """Returns the count of its weights."""
+        """Returns the number of its weights."""
         return self.size(scene)
 
 
 def _groups(names: Sequence[str], rho: Sequence[float]) -> dict[float, list[str]]:
-    """Returns names by their weight, without those that do not count."""
+    """Groups names by weight; names of weight 0 are left out."""
     found: dict[float, list[str]] = {}
     for name, weight in zip(names, rho):
         if weight:

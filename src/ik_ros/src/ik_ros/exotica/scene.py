@@ -29,7 +29,7 @@ class OnLink(NamedTuple):
 
 @contextmanager
 def errors_of(key: str) -> Iterator[None]:
-    """Turns a `ValueError` or an unknown name into a `KeyedError` of a key."""
+    """Converts a `ValueError` or an unknown name to a `KeyedError` of a key."""
     try:
         yield
     except KeyedError:
@@ -72,7 +72,7 @@ class ExoticaScene:
                 self.place(name)
 
     def place(self, name: str, frames: Mapping[str, AttachedFrame] | None = None) -> OnLink | Pose:
-        """Returns where a frame is: on a link that joints move, or fixed, as a pose in the robot's root.
+        """Returns the location of a frame: on a moving link, or fixed as a pose in the robot's root.
 
         Args:
             name: A link of the robot, a frame of the scene, or empty for the root.
@@ -137,7 +137,7 @@ class ExoticaScene:
 
 
 def _world_names(srdf: Element, file: str) -> set[str]:
-    """Returns the names that the SRDF has for the frame that the root is fixed in."""
+    """Returns the SRDF's names of the frame in which the root is fixed."""
     names = set()
     for joint in srdf.iter("virtual_joint"):
         if joint.get("type") != "fixed":
@@ -148,7 +148,7 @@ def _world_names(srdf: Element, file: str) -> set[str]:
 
 
 def _joints_of_group(srdf: Element, name: str, robot: RobotModel, inside: tuple[str, ...] = ()) -> set[str]:
-    """Returns the joints of a group, those that do not move included."""
+    """Returns the joints of a group, fixed ones included."""
     groups = {group.get("name", ""): group for group in srdf.findall("group")}
     if name not in groups:
         raise UnknownNameError("group of the SRDF", name, groups)

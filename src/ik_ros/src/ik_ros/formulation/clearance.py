@@ -16,8 +16,8 @@ class RobotShape(NamedTuple):
 
     Attributes:
         core: The shape.
-        link_id: Pinocchio's number of its link; None: it stands in the base.
-        placement: Where it is in the link or base, a `pinocchio.SE3`.
+        link_id: Pinocchio's index of its link; None: it is fixed in the base.
+        placement: Its pose in the link or base, a `pinocchio.SE3`.
     """
 
     core: Core
@@ -29,10 +29,10 @@ class Clearance(NamedTuple):
     """Distance between two shapes.
 
     Attributes:
-        distance: Between the surfaces; negative if they are in each other [m].
+        distance: Distance between the surfaces [m]; negative if they penetrate.
         direction: Unit vector from the first to the second, in the base.
-        first: Where the first is nearest: a point that is fixed to it, in the base [m].
-        second: The same for the second.
+        first: Nearest point of the first shape, fixed to that shape, in the base [m].
+        second: The same for the second shape.
     """
 
     distance: float
@@ -44,7 +44,7 @@ class Clearance(NamedTuple):
 def clearance(first: Core, place: Any, second: Core, other: Any) -> Clearance:
     """Returns the distance of two shapes with their places in the base, each a `pinocchio.SE3`.
 
-    It is measured between cores, since hpp-fcl has no direction where round shapes are in each other.
+    It is measured between cores, since hpp-fcl returns no direction for round shapes that penetrate.
     """
     result = hppfcl.DistanceResult()
     places = (hppfcl.Transform3f(each.rotation, each.translation) for each in (place, other))
@@ -53,11 +53,11 @@ def clearance(first: Core, place: Any, second: Core, other: Any) -> Clearance:
     ends = result.getNearestPoint1(), result.getNearestPoint2()
     if abs(distance) > CROSSING_M:
         direction = (ends[1] - ends[0]) / distance
-    else:  # they cross
+    else:  # the cores intersect
         direction, ends = place.rotation[:, 0], (place.translation, place.translation)
     return Clearance(distance - first.radius - second.radius, direction, *ends)
 
 
 def _core(core: Core) -> Any:
-    """Returns a box, or a line or a point as a capsule that is not thick."""
+    """Returns a box, or a line or point as a capsule of radius 0."""
     return hppfcl.Box(2.0 * core.half) if core.is_box else hppfcl.Capsule(0.0, 2.0 * core.half[2])

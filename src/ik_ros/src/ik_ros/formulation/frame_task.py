@@ -24,8 +24,9 @@ class FrameTaskConfig(TaskConfig):
 
     Attributes:
         frame: The link.
-        goal: What it is to reach, in the base; None: each problem says.
-        axes: Which axes count: `x`, `y`, `z` along, and `rx`, `ry`, `rz` about, the axes of the goal.
+        goal: Pose to reach, in the base frame. None: taken from each problem.
+        axes: Axes of the goal that count: `x`, `y`, `z` for translation along them, `rx`, `ry`, `rz` for rotation about
+            them.
     """
 
     frame: Text
@@ -34,11 +35,11 @@ class FrameTaskConfig(TaskConfig):
 
 
 class FrameTask(Task):
-    """Brings a link to a pose, or near it, along and about some or all axes of the goal.
+    """Moves a link to a pose, along and about some or all axes of the goal.
 
     Attributes:
-        link_id: Pinocchio's number of the link.
-        goal: Where it shall be, a `pinocchio.SE3`.
+        link_id: Pinocchio's index of the link.
+        goal: Target pose, a `pinocchio.SE3`.
         is_complete: Whether all axes count.
     """
 
@@ -61,7 +62,7 @@ class FrameTask(Task):
         self._set_goal(self._default or Pose())
 
     def pose_of(self, values: Sequence[float]) -> Pose:
-        """Returns the goal that numbers stand for.
+        """Returns the goal given by numbers.
 
         Raises:
             ValueError: If there are more or fewer than expected.
@@ -78,12 +79,12 @@ class FrameTask(Task):
         self._set_goal(pose)
 
     def aim(self, problem: IKProblem) -> None:
-        """Takes the target of a problem, with its tolerances, as the goal."""
+        """Sets the goal and tolerances to the target of a problem."""
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: 3 ways along and the rotation vector about the axes of the goal, for axes that count."""
+        """See `Task`: 3 distances along and the rotation vector about the axes of the goal, for the selected axes."""
         off = self.goal.actInv(self.robot.frame(self.link_id))
         rotation = off.rotation
         jacobian = self.robot.jacobian(self.link_id)

@@ -14,14 +14,14 @@ from .task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class JointTask(Task):
-    """Wants positions of some joints within bounds.
+    """Keeps positions of some joints within bounds.
 
     Args:
         joints: Names of the k joints.
         key: The option that names them, for messages.
 
     Attributes:
-        indices: Where the k joints are among those of the robot.
+        indices: Indices of the k joints among those of the robot.
         bounds: k lower and k upper bounds [rad or m]; infinite at first.
     """
 

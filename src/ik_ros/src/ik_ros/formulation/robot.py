@@ -1,4 +1,4 @@
-"""A robot as Pinocchio sees it."""
+"""A robot in Pinocchio."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
@@ -18,7 +18,7 @@ from .clearance import RobotShape
 
 
 def to_se3(pose: Pose) -> Any:
-    """Returns a pose as Pinocchio has it."""
+    """Returns a pose as a `pinocchio.SE3`."""
     return pin.XYZQUATToSE3(np.array((*pose.position, *pose.quat_xyzw)))
 
 
@@ -29,31 +29,31 @@ def from_base(q: np.ndarray) -> Pose:
 
 
 FREE = 6
-"""Ways in which a floating base moves."""
+"""Degrees of freedom of a floating base."""
 
 
 class PinocchioRobot:
     """Joints, limits and kinematics of one robot, a tree of links whose root may float.
 
-    A configuration q has one number for each joint, and before them 7 of the root if that floats: x, y, z [m] and a
-    quaternion x, y, z, w. A velocity has one for each joint, and 6 of the root before them.
+    A configuration q has one number for each joint. With a floating root, 7 numbers come first: x, y, z [m] and a
+    quaternion x, y, z, w. A velocity has one number for each joint, after 6 for a floating root.
 
     Args:
         urdf_path: The robot's description; the meshes it names need not be there.
         floating: Whether the root floats.
-        joints: The n joints to find positions for; without any, all that move.
-        base: The link that poses are expressed in; None: the root, or what it floats in.
+        joints: The n joints to find positions for; by default all that move.
+        base: The link that poses are expressed in; None: the root, or the world if the root floats.
 
     Attributes:
         model: Pinocchio's model.
-        data: Its working memory, as `update` left it.
+        data: Pinocchio's working memory, set by `update`.
         joint_names: The n joints.
         lower: Their n lower limits [rad or m], -inf where there is none.
         upper: Their n upper limits [rad or m], inf where there is none.
-        limits: The same, to bring positions in.
+        limits: The same limits as an object, which can clip positions.
         is_revolute: Which of the n joints turn.
         max_velocity: Their n largest speeds [rad/s or m/s], inf where the URDF has none.
-        free: Where what may change is in a velocity: the root's m - n, and the n joints.
+        free: Indices in a velocity of the m free components: m - n of the root, and the n joints.
         all_joints: All joints that move.
         links: All links.
 
@@ -98,7 +98,7 @@ class PinocchioRobot:
         self._shapes: dict[str, RobotShape] = {}
 
     def joint_id(self, name: str) -> int:
-        """Returns Pinocchio's number of a joint.
+        """Returns Pinocchio's index of a joint.
 
         Raises:
             UnknownNameError: If there is no such joint that moves.
@@ -106,7 +106,7 @@ class PinocchioRobot:
         return int(self.model.getJointId(_known("joint", name, self.all_joints)))
 
     def moving(self, names: Iterable[str]) -> list[str]:
-        """Returns those joints that move; fixed ones, and those that mimic others, do not by themselves.
+        """Returns the given joints that move by themselves, without fixed and mimic joints.
 
         Raises:
             UnknownNameError: If there is no such joint.
@@ -114,7 +114,7 @@ class PinocchioRobot:
         return [_known("joint", name, self.all_joints) for name in names if name not in self._still]
 
     def index(self, name: str) -> int:
-        """Returns where a joint is among the n.
+        """Returns the index of a joint among the n.
 
         Raises:
             UnknownNameError: If it is none of them.
@@ -122,7 +122,7 @@ class PinocchioRobot:
         return self.joint_names.index(_known("joint", name, self.joint_names))
 
     def link_id(self, name: str) -> int:
-        """Returns Pinocchio's number of a link.
+        """Returns Pinocchio's index of a link.
 
         Raises:
             UnknownNameError: If there is no such link.
@@ -130,7 +130,7 @@ class PinocchioRobot:
         return int(self.model.getFrameId(_known("link", name, self.links), pin.BODY))
 
     def add_frame(self, name: str, link: str, pose: Pose) -> None:
-        """Adds a frame at a link, which tasks can name as they name a link.
+        """Adds a frame at a link; tasks can use its name like that of a link.
 
         Raises:
             UnknownNameError: If the link is not known.
@@ -162,7 +162,7 @@ class PinocchioRobot:
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
         """Returns the configuration with some joints at given positions, and the others in the middle of their limits.
 
-        Joints that do not move, which joint states may have too, are passed over.
+        Joints that do not move, which joint states may include, are ignored.
 
         Raises:
             UnknownNameError: If a joint is not known.
@@ -184,13 +184,14 @@ class PinocchioRobot:
         return changed
 
     def with_base(self, q: np.ndarray, pose: Any) -> np.ndarray:
-        """Returns a configuration with a floating root elsewhere, at a `pinocchio.SE3`."""
+        """Returns a configuration with a floating root at another pose, a `pinocchio.SE3`."""
         changed = q.copy()
         changed[:7] = pin.SE3ToXYZQUAT(pose)
         return changed
 
     def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Returns the configuration after a step of what is free, within n lower and n upper limits [rad or m]."""
+        """Returns the configuration after a step of the free components, within n lower and n upper limits [rad or
+        m]."""
         if not self.is_floating:
             positions = q[self._in_q] + step
         else:
@@ -201,7 +202,7 @@ class PinocchioRobot:
         return self.with_positions(q, np.minimum(np.maximum(positions, lower), upper))
 
     def update(self, q: np.ndarray) -> None:
-        """Puts the robot into a configuration, for all that is asked below."""
+        """Sets the configuration for the methods below."""
         pin.computeJointJacobians(self.model, self.data, q)
 
     def frame(self, link_id: int) -> Any:
@@ -209,14 +210,14 @@ class PinocchioRobot:
         return pin.updateFramePlacement(self.model, self.data, link_id)
 
     def jacobian(self, link_id: int) -> np.ndarray:
-        """Returns how a link moves in itself with what is free, 6 x m: linear above angular."""
+        """Returns the Jacobian of a link in its own frame for the free components, 6 x m: linear above angular."""
         return self._of_free(pin.getFrameJacobian(self.model, self.data, link_id, pin.LOCAL))
 
     def com(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the centre of mass [m], and how it moves with what is free, 3 x m."""
+        """Returns the centre of mass [m], and its Jacobian for the free components, 3 x m."""
         jacobian = self._of_free(pin.jacobianCenterOfMass(self.model, self.data, q))
         com, moving, still = self.data.com[0].copy(), self.data.mass[0], self.model.inertias[0]
-        if still.mass:  # Pinocchio leaves out what no joint moves
+        if still.mass:  # Pinocchio omits the mass of fixed links
             part = moving / (moving + still.mass)
             return part * com + (1.0 - part) * still.lever, part * jacobian
         return com, jacobian

@@ -20,11 +20,11 @@ class TaskConfig(ConfigModel):
     """Options of every task.
 
     Attributes:
-        name: What problems and messages call it.
-        type: One of the table, or `their_package.module:Class`.
-        weight: As a cost, how much its square counts.
-        required: As a cost, whether there is no success without it.
-        tolerance_m: How far off it may be to count as met [m].
+        name: Its name in problems and messages.
+        type: A name of the table, or `their_package.module:Class`.
+        weight: Factor on its square, for a cost.
+        required: For a cost, whether success requires it.
+        tolerance_m: Largest error at which it counts as met [m].
         tolerance_rad: The same for angles [rad], and for positions of joints [rad or m].
     """
 
@@ -38,7 +38,7 @@ class TaskConfig(ConfigModel):
 
 @contextmanager
 def keyed_errors(key: str) -> Iterator[None]:
-    """Turns errors of unknown names and wrong values into a `KeyedError` of an option, or of keys inside of it."""
+    """Converts errors of unknown names and wrong values to a `KeyedError` of an option, or of keys inside it."""
     try:
         yield
     except KeyedError as error:
@@ -48,13 +48,13 @@ def keyed_errors(key: str) -> Iterator[None]:
 
 
 class Linearization(NamedTuple):
-    """k numbers that a task wants between bounds, for one configuration.
+    """k task values with bounds, linearised at one configuration.
 
     Attributes:
-        values: k numbers [m or rad].
-        jacobian: How they change with what is free, k x m.
+        values: k task values [m or rad].
+        jacobian: Their derivatives by the free components, k x m.
         lower: k lower bounds, -inf where there is none.
-        upper: k upper bounds, inf where there is none; where all are like the lower ones, the same array.
+        upper: k upper bounds, inf where there is none; the same array as `lower` if all bounds are equal.
     """
 
     values: np.ndarray
@@ -64,25 +64,25 @@ class Linearization(NamedTuple):
 
     @property
     def is_exact(self) -> bool:
-        """Whether it wants values, and no ranges."""
+        """Whether it has exact values instead of ranges."""
         return self.lower is self.upper
 
     def beyond(self) -> np.ndarray:
-        """Returns how far the k numbers are outside their bounds."""
+        """Returns the violation of the bounds, k numbers."""
         if self.is_exact:
             return self.values - self.lower
         return self.values - np.minimum(np.maximum(self.values, self.lower), self.upper)
 
 
 class Task(ABC):
-    """Something that a configuration shall fulfil: a cost to keep low, or a constraint to hold.
+    """A requirement on a configuration: a cost to minimise, or a constraint to satisfy.
 
     The options of a subclass are its `Config`, in YAML. One thread at a time calls `begin`, and then `rows` for each
-    configuration that is tried.
+    candidate configuration.
 
     Args:
         config: Its options.
-        robot: The robot; in `rows`, it is in the configuration.
+        robot: The robot; `rows` is called with the configuration set.
 
     Raises:
         KeyedError: If an option does not fit the robot; it names the key.
@@ -95,11 +95,11 @@ class Task(ABC):
         self.robot = robot
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """Takes what a problem says of the task.
+        """Prepares the task for a problem.
 
         Args:
             problem: The problem.
-            goal: What it wants of this task; None: what the formulation says.
+            goal: Goal of this task; None: that of the formulation.
             q: The configuration where the search starts.
 
         Raises:
@@ -111,12 +111,12 @@ class Task(ABC):
 
     @abstractmethod
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns what it wants, for one configuration."""
+        """Returns the linearised task at one configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """Returns how far off it is when its k numbers are so far off their bounds [m or rad]; here all are lengths."""
+        """Returns the residual for k violations of the bounds [m or rad]; by default all are lengths."""
         return Residual(math.hypot(*beyond.tolist()), 0.0)
 
     def size(self, residual: Residual) -> float:
-        """Returns how far off it is in tolerances: up to 1, it is met."""
+        """Returns a residual as a multiple of the tolerances: up to 1, the task is met."""
         return max(residual.position_m / self.config.tolerance_m, residual.orientation_rad / self.config.tolerance_rad)

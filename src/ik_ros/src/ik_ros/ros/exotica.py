@@ -1,4 +1,4 @@
-"""Problems and the service of EXOTica, as clients of the authors' release know them."""
+"""Problems and the service of EXOTica, compatible with clients of the authors' release."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class SyncedFrame(NamedTuple):
 
 
 def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
-    """Returns the frames that lines of four names stand for; `''` is the empty name.
+    """Returns the frames described by lines of four names; `''` is the empty name.
 
     Raises:
         ConfigError: If a line has more or fewer names.
@@ -57,7 +57,7 @@ def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
 
 
 class ExoticaSetup:
-    """Publishes problems for the solver `exotica` as those of the authors' release: goals of task maps, and frames.
+    """Publishes problems for the solver `exotica` as in the authors' release: goals of task maps, and frames.
 
     It waits for the solver's node before it begins, to learn its task maps.
 
@@ -83,7 +83,7 @@ class ExoticaSetup:
     def _on_goal(self, name: str, message: Float64MultiArray) -> None:
         if len(message.data) != len(self._goals[name]):
             raise ValueError(f"expected {len(self._goals[name])} values, got {len(message.data)}")
-        IKProblem(goals={name: message.data})  # which checks them
+        IKProblem(goals={name: message.data})  # the constructor checks them
         self._goals[name] = list(message.data)
 
     def _problem(self) -> EXOTicaProblem:

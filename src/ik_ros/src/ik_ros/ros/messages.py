@@ -16,7 +16,7 @@ from robot_model.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:
-    """Returns the problem in a message, poses as they are there.
+    """Returns the problem in a message, with its poses unchanged.
 
     Raises:
         ValueError: If a number is not finite or out of its range, or lengths differ; it names the field.
@@ -86,7 +86,7 @@ def positions_message(positions: JointPositions) -> JointState:
 
 
 def trajectory_message(joint_names: tuple[str, ...], trajectory: SampledTrajectory | None) -> JointTrajectory:
-    """Returns a trajectory as a message, to be followed from when it arrives; without one, it is empty."""
+    """Returns a trajectory as a message, which starts on arrival; without a trajectory, it is empty."""
     if trajectory is None:
         return JointTrajectory()
     points = zip(trajectory.times_s, trajectory.positions, trajectory.velocities)

@@ -17,12 +17,12 @@ from .messages import positions_in
 
 QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
-"""Names that the release's solvers have for the same."""
+"""Names of solvers in the authors' release."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 
 
 class ProblemInputs:
-    """Start and previous solutions of the next problem, from their topics.
+    """Start and previous solutions of the next problem, received by topics.
 
     Args:
         topics: Prefix of the topics.

@@ -1,4 +1,4 @@
-"""The topic `ik` of setup nodes, which are switched on and off, and a watch over the solver that answers it."""
+"""The topic `ik` of setup nodes, its on-off switch, and a watchdog for the solver."""
 
 import threading
 import time
@@ -28,7 +28,7 @@ def publish_problems(
     problem: Callable[[], rospy.Message | None],
     has_solver_node: bool = True,
 ) -> None:
-    """Publishes problems on the topic `ik`, from now on and while it is switched on.
+    """Publishes problems on the topic `ik` while switched on.
 
     Args:
         topics: Prefix of the service `toggle`, which switches it.
@@ -37,7 +37,7 @@ def publish_problems(
         start_on_init: Whether it is on from the start.
         problem: Returns the next one; without one it returns None, or raises an `InterfaceError` or `ValueError` with
             the reason.
-        has_solver_node: Whether a node is to answer on `ik/solution`, which is watched then.
+        has_solver_node: Whether to watch for answers of a solver node on `ik/solution`.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)

@@ -31,7 +31,7 @@ START_PATIENCE_S = 2.0
 """Time without a start after which the node reports that problems wait for one [s]."""
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
-"""Keys of `~config` that are no fields of the robot's own problems."""
+"""Keys of `~config` that are not fields of the robot's problems."""
 
 
 class SetupNode:
@@ -73,7 +73,7 @@ class SetupNode:
 
     def _on_tolerance(self, key: str, message: Float64) -> None:
         changed = {**self._tolerances, key: message.data}
-        IKProblem(**_fields(changed))  # which checks them
+        IKProblem(**_fields(changed))  # the constructor checks them
         self._tolerances = changed
 
     def _on_goal(self, task: str, message: Float64MultiArray) -> None:

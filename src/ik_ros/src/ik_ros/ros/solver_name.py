@@ -16,8 +16,8 @@ def topics_of(kind: str, name: str) -> str:
 
 
 def trust_only_what_was_named() -> None:
-    """Has the solver and the tasks that the node was started with be all that it ever imports."""
-    trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import what their options name when they start, no more")
+    """Restricts imports to the solver and the tasks that the node was started with."""
+    trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import only plug-ins that their options name at the start")
 
 
 def run_for_solver(kind: str, make: Callable[[str], object]) -> None:

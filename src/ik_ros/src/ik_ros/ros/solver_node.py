@@ -55,7 +55,7 @@ PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProbl
 
 
 class SolverNode:
-    """Solves problems while it is switched on, and whenever its service is called.
+    """Solves problems from the topic while switched on, and from its service at any time.
 
     Args:
         name: Name of the solver, or `module:Class`.
@@ -89,7 +89,7 @@ class SolverNode:
         rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
         self._readers = PROBLEMS
         by_type = {"solve_ik": (SolveIK, self._serve), "solve_trac_ik": (TracIK, self._serve_trac_ik)}
-        by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the release
+        by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the authors' release
         if name == "exotica":
             self._readers = {**PROBLEMS, EXOTicaProblem._type: (EXOTicaProblem, problem_in_exotica)}
             by_type["solve"] = EXOTica, self._serve_exotica
@@ -108,7 +108,7 @@ class SolverNode:
 
     def _listen(self) -> None:
         self._stream = self._new_stream()
-        # The newest problem is the one that counts
+        # only the newest problem counts
         self._subscriber = rospy.Subscriber(
             "ik", rospy.AnyMsg, self._on_message, callback_args=self._stream, queue_size=1, tcp_nodelay=True
         )
@@ -130,7 +130,7 @@ class SolverNode:
             with self._solving:
                 if self._continuity is not None:
                     if not self._is_received:
-                        stream.restart()  # the robot is where it was: the first target that is received starts there
+                        stream.restart()  # the robot has not moved: the first received target starts there
                     self._is_received = any(each.get_num_connections() for each in (self._target, self._solution))
                 problem = self._base.with_poses_in_it(read(message), header.frame_id)
                 solution = stream.solve(problem, header.stamp.to_sec())
@@ -142,7 +142,7 @@ class SolverNode:
             if not solution.success:
                 self._warn("ik/solution", solution.message)
         with self._publishing:
-            if stream is self._stream:  # it may have been switched off meanwhile
+            if stream is self._stream:  # may have been switched off meanwhile
                 self._publish(solution, target, header.stamp)
 
     def _publish(self, solution: IKSolution, target: Sequence[float] | None, stamp: rospy.Time) -> None:
@@ -183,7 +183,7 @@ class SolverNode:
         return EXOTicaResponse(*_in_short(self._solve_alone(problem_in_exotica, request.problem)))
 
     def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
-        """Returns the answer of the solver itself, with neither start nor targets of the problems on the topic."""
+        """Returns the solver's answer to one problem, independent of the problems on the topic."""
         try:
             problem = read(message)
             with self._solving:
@@ -193,7 +193,7 @@ class SolverNode:
 
 
 def _in_short(solution: IKSolution) -> tuple[bool, str, JointState]:
-    """Returns an answer in the three fields of the release's services."""
+    """Returns an answer in the three fields of the authors' services."""
     return solution.success, solution.message, JointState(name=solution.joint_names, position=solution.positions)
 
 

@@ -15,14 +15,14 @@ from .messages import transform_in
 
 
 class FreshTf:
-    """The pose of one frame in another, as long as TF goes on.
+    """The pose of one frame in another while TF is up to date.
 
-    Wall time counts, so TF of a simulation that stands still is stale too. Static transforms never are.
+    Age is measured in wall time, so TF of a stopped simulation is stale, too. Static transforms never are.
 
     Args:
         parent: The frame that poses are in.
         child: The frame.
-        timeout_s: How long a pose lasts when nothing new comes [s].
+        timeout_s: Largest age of a pose [s].
     """
 
     def __init__(self, parent: str, child: str, timeout_s: float) -> None:
@@ -36,7 +36,7 @@ class FreshTf:
         """Returns the newest pose.
 
         Raises:
-            InterfaceError: If there is none, or nothing new has come for too long.
+            InterfaceError: If there is none, or it is too old.
         """
         try:
             message = self._buffer.lookup_transform(self._parent, self._child, rospy.Time(0))
@@ -52,10 +52,10 @@ class FreshTf:
 
 
 class BaseFrame:
-    """Turns poses of other TF frames into those of a solver's base.
+    """Transforms poses from other TF frames to a solver's base.
 
     Args:
-        frame_id: TF frame of the base; empty takes all poses as they are.
+        frame_id: TF frame of the base; if empty, poses are not transformed.
     """
 
     def __init__(self, frame_id: str) -> None:
@@ -65,7 +65,7 @@ class BaseFrame:
             self._listener = TfListener(self._buffer)
 
     def with_poses_in_it(self, problem: IKProblem, frame_id: str) -> IKProblem:
-        """Returns a problem with its poses, which are in a TF frame, in the base; an empty `frame_id` is the base.
+        """Returns a problem with its poses transformed from a TF frame to the base; an empty `frame_id` is the base.
 
         Raises:
             InterfaceError: If TF has no transform between the two frames.

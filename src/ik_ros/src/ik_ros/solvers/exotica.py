@@ -33,7 +33,7 @@ class ExoticaConfig(ConfigModel):
         use_scipy_solver: Whether costs are weighted by Rho, as EXOTica's solver by SciPy does, and not by its square;
             the file needs no solver then.
         scipy_solver_method: Accepted; the method is that of the solver `tasks`.
-        tolerance_m: Error of a link that still counts as met [m].
+        tolerance_m: Largest error of a link that counts as met [m].
         tolerance_rad: The same for rotations [rad].
     """
 
@@ -45,7 +45,7 @@ class ExoticaConfig(ConfigModel):
 
 
 class _Cost(NamedTuple):
-    """A task map that counts, and the tasks that express it.
+    """A task map with a cost, and the tasks that express it.
 
     Attributes:
         goal: Its goal when problems have none.
@@ -61,11 +61,11 @@ class ExoticaSolver(Solver):
 
     Attributes:
         config: Its options.
-        maps: All task maps by name, also those that do not count.
+        maps: All task maps by name, including those without a cost.
         scene: The robot and the frames.
 
     Raises:
-        ConfigError: If the XML has what cannot be expressed; it names file and element.
+        ConfigError: If the XML has an element that cannot be expressed; the error names file and element.
     """
 
     Config = ExoticaConfig
@@ -101,7 +101,7 @@ class ExoticaSolver(Solver):
         return self.maps[name].size(self.scene)
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Looks for joint positions that keep the costs low.
+        """Searches for joint positions that minimise the costs.
 
         Raises:
             ValueError: If a goal or a frame makes no sense, or there is a target and not exactly one EffFrame.
@@ -130,7 +130,7 @@ class ExoticaSolver(Solver):
         return self._solver.solve(dataclasses.replace(problem, goals=goals, previous=(), frames={}))
 
     def _costs_of(self, tasks: Sequence[CostConfig], key: str) -> Iterator[tuple[str, _Cost]]:
-        """Yields the maps that count."""
+        """Yields the maps that have costs."""
         seen = set()
         for task in tasks:
             name = task.Task
@@ -207,7 +207,7 @@ class ExoticaSolver(Solver):
         return rho if self.config.use_scipy_solver else rho**2  # IKSolver minimises the square of Rho times the error
 
     def _main_task(self) -> str | None:
-        """Returns the task that targets are for: that of the only EffFrame, or of the only map about one link."""
+        """Returns the task to which targets apply: that of the only EffFrame, or of the only map about one link."""
         links = [name for name in self._costs if isinstance(self.maps[name], LinkMap)]
         whole = [name for name in links if isinstance(self.maps[name], EffFrameMap)] or links
         return whole[0] if len(whole) == 1 and list(self._costs[whole[0]].parts) == whole else None

@@ -1,4 +1,4 @@
-"""Not one solution but many: elbow up, elbow down, the wrist flipped; the best of them first."""
+"""Several solutions instead of one: elbow up, elbow down, the wrist flipped; the best first."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -18,14 +18,14 @@ class GlobalConfig(KdlConfig):
     """Options of `global`.
 
     Attributes:
-        restarts: Number of random starts after the given one, also when a solution is found; fewer where they are slow
-            or useless: 15 with tolerances or joints that mimic others, 3 beyond reach, and no more after 10 starts that
-            do not even lead to the target outside limits.
-        rank_by: Order of solutions: `distance_to_start`, the length of the way of all joints together [rad or m, root
-            of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a limit is from the
-            middle, as a part of half its range.
+        restarts: Number of random starts after the given one, also when a solution is found. Fewer where starts are
+            slow or useless: 15 with tolerances or mimic joints, 3 beyond reach. The search also ends after 10 starts
+            that miss the target even without limits.
+        rank_by: Order of solutions: `distance_to_start`, the distance of all joints from the start [rad or m, root of
+            the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a limit is from the middle,
+            as a part of half its range.
         distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
-        most: Largest number of solutions to return, the best one included.
+        most: Largest number of returned solutions, including the best one.
     """
 
     restarts: Count = 100
@@ -35,9 +35,9 @@ class GlobalConfig(KdlConfig):
 
 
 class GlobalSolver(KdlSolver):
-    """Random starts of `kdl`, and the distinct solutions that they lead to.
+    """Runs `kdl` from random starts and returns the distinct solutions.
 
-    For redundant robots, solutions are not separate: it then returns samples that are `distinct`.
+    Redundant robots have a continuum of solutions, of which it returns `distinct` samples.
     """
 
     Config = GlobalConfig
@@ -51,7 +51,7 @@ class GlobalSolver(KdlSolver):
         }[config.rank_by]
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns distinct solutions, else the best that was found; see `ChainSolver`."""
+        """Returns distinct solutions, or else the best positions found; see `ChainSolver`."""
         found = [(self.residual(goal, q).size, q) for q in self.candidates(problem, goal, start, self._restarts)]
         solutions = sorted((self._cost(q, start), q) for size, q in found if size <= 1.0)
         if not solutions:

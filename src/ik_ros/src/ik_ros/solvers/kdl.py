@@ -1,4 +1,4 @@
-"""The default: the Orocos Kinematics and Dynamics Library, started again and again, within limits and tolerances."""
+"""The default solver: the Orocos Kinematics and Dynamics Library with restarts, limits and tolerances."""
 
 import math
 import random
@@ -14,16 +14,19 @@ from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem
 
 ITERATIONS = 60
-"""Most iterations from one start; where a solution is, some 20 do."""
+"""Most iterations from one start; if there is a solution, about 20 suffice."""
 THRESHOLD = 1e-5
 """Residual at which KDL stops [m]; it counts a radian as 0.01 m."""
 RESTARTS_BEYOND_REACH = 3
 """Number of further starts if the target is beyond reach, where only the nearest position can be found."""
 GIVE_UP_AFTER = 10
-"""Number of starts that may miss the target even without limits; then the search ends. Of 100 starts for a target
-within reach, 85 reach it with an arm of 6 joints, and 96 and more with one of 7."""
+"""Number of starts that miss the target even without limits after which the search ends.
+
+Of 100 starts for a target within reach, 85 reach it with an arm of 6 joints, and at least 96 with one of 7.
+"""
 MAX_DESCENTS = 15
-"""Most random starts of the own descent, which takes ten times longer and ends within limits half of the time."""
+"""Most random starts of our own descent, which takes ten times longer than KDL and ends within limits half of the
+time."""
 NEAR_M, NEAR_RAD = 0.3, 0.8
 """Distance from its target below which the tip keeps its posture [m]."""
 
@@ -41,9 +44,9 @@ class KdlConfig(ChainConfig):
 class KdlSolver(ChainSolver):
     """KDL's Levenberg-Marquardt, extended by limits and tolerances.
 
-    It goes from the start to the nearest solution. Where that is outside limits, random starts follow, after an own
-    descent within limits if the start is near the target. That descent does all where there are tolerances, or joints
-    that mimic others.
+    It searches from the start for the nearest solution. If that is outside limits, random starts follow; if the start
+    is near the target, our own descent within limits is tried first. With tolerances or mimic joints, only our own
+    descent is used.
     """
 
     Config = KdlConfig
@@ -57,7 +60,7 @@ class KdlSolver(ChainSolver):
         self._to = PyKDL.JntArray(len(self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns the first solution, else the best that was found; see `ChainSolver`."""
+        """Returns the first solution, or else the best positions found; see `ChainSolver`."""
         best, least = start, math.inf
         for q in self.candidates(problem, goal, start, self._restarts):
             size = self.residual(goal, q).size
@@ -68,7 +71,7 @@ class KdlSolver(ChainSolver):
         return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Yields where each start leads, within limits: first the one that is given, then random ones [rad or m]."""
+        """Yields the result of each start, within limits: first of the given start, then of random ones [rad or m]."""
         if not (goal.is_point and self.chain.is_plain):
             for first in self._starts(problem, start, min(restarts, MAX_DESCENTS)):
                 yield levenberg_marquardt(self.chain, goal, self.limits, first)
@@ -86,12 +89,12 @@ class KdlSolver(ChainSolver):
                 return
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Returns where to start: where it was asked for, and then at random."""
+        """Yields the given start, and then random ones."""
         most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
         return self.limits.starts(start, most, partial(random.Random, problem.seed))
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
-        """Returns where KDL gets to from `first`, brought into limits, and whether it arrived but for the limits."""
+        """Returns KDL's result from `first`, brought into limits, and whether it reached the goal before that."""
         for i, position in enumerate(first):
             self._from[i] = position
         status = self._kdl.CartToJnt(self._from, goal.frame, self._to)

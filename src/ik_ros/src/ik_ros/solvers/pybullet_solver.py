@@ -1,4 +1,4 @@
-"""PyBullet's inverse kinematics, as the robots of the simulator have it, with restarts, limits and a residual."""
+"""PyBullet's inverse kinematics as in the simulator's robots, with restarts, limits and a residual."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rpbi.kinematics.problem import PybulletProblem
 
 
 class PybulletConfig(ChainConfig):
-    """Options of `pybullet`; those with PyBullet's names mean what they do in `rpbi.kinematics.IKProblem`.
+    """Options of `pybullet`; those with PyBullet's names have the same meaning as in `PybulletProblem`.
 
     Lists have one value for each joint of the chain.
     """
@@ -68,11 +68,10 @@ class PybulletSolver(ChainSolver):
         self.use_limits(question.narrowed(self._kinematics.limits, self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns the first solution, else the best that was found; see `ChainSolver`.
+        """Returns the first solution, or else the best positions found; see `ChainSolver`.
 
         Raises:
-            ValueError: If the problem has larger tolerances than what counts as reached anyway, other than any
-                orientation.
+            ValueError: If the problem has tolerances above the tolerance of success, other than any orientation.
         """
         refuse_boxes(problem, "pybullet", goal.any_orientation)
         assert problem.target is not None

@@ -24,12 +24,12 @@ from ik_ros.task_solver.formulation import Formulation, TaskSet
 from ik_ros.task_solver.gauss_newton import Candidate, GaussNewton, Iterate
 
 AIM = 0.1
-"""Share of the tolerances at which requirements are aimed, so that solutions lie well within."""
+"""Share of the tolerances that the search aims at, so that solutions are safely within them."""
 PATIENCE, PATIENCE_OF_MANY = 5, 25
-"""Over so many iterations what is required has to get nearer by half, or the search starts elsewhere: for one task, and
-for several, which have to make way for each other."""
+"""Number of iterations in which the violation of requirements has to halve, otherwise the search restarts: for one
+task, and for several, which may conflict at first."""
 SETTLED = 1e-2
-"""Costs are as low as they get here when in `PATIENCE` iterations they lose no more than this part."""
+"""Relative decrease of the costs in `PATIENCE` iterations below which they count as minimal."""
 STANDSTILL = 1e-6
 """Step at which the search ends [rad or m]."""
 NEAR_RANGE = 0.5
@@ -37,9 +37,9 @@ NEAR_RANGE = 0.5
 
 
 class TasksSolver(Solver):
-    """Finds positions of joints that keep costs low and hold constraints, all chosen by the user.
+    """Finds joint positions that minimise costs subject to constraints, all chosen by the user.
 
-    Any thread may call it; a lock inside lets one in at a time.
+    Thread-safe by a lock.
 
     Attributes:
         tasks: The tasks, with their robot.
@@ -66,11 +66,11 @@ class TasksSolver(Solver):
         self._start_limits = StartLimits(robot.joint_names, robot.limits)
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Looks for joint positions that fulfil the formulation.
+        """Searches for joint positions that satisfy the formulation.
 
         Raises:
-            ValueError: If a goal is missing or makes no sense, there is a target and no task that it is for, or a
-                previous solution lacks a joint that a task needs.
+            ValueError: If a goal is missing or invalid, if a target has no task, or if a previous solution lacks a
+                joint that a task needs.
             UnknownNameError: If the problem names a joint or task that is not known.
         """
         with self._lock:
@@ -95,7 +95,7 @@ class TasksSolver(Solver):
         return robot.with_positions(q, self._start_limits.wrap_to_limits(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
-        """Hands all tasks what the problem wants of them."""
+        """Prepares all tasks for the problem."""
         for solution in problem.previous:
             self.tasks.robot.moving(solution)
         for name in problem.goals:
@@ -103,7 +103,7 @@ class TasksSolver(Solver):
                 raise UnknownNameError("task", name, self.tasks.parts)
         main = self.tasks.main
         if problem.target is not None and main is None:
-            raise ValueError("target: the formulation has no main task that it could be for")
+            raise ValueError("target: the formulation has no main task that could use it")
         for name, part in self.tasks.parts.items():
             is_target = name == main and problem.target is not None
             try:
@@ -119,7 +119,7 @@ class TasksSolver(Solver):
         self._gauss_newton.begin()
 
     def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
-        """Returns what was found from the first start that leads to a solution, else the best of all."""
+        """Returns the result of the first start that leads to a solution, or else the best of all."""
         candidates = []
         for first in self._starts(problem, start):
             candidates.append(self._from(self._on_anchor(first)))
@@ -140,7 +140,7 @@ class TasksSolver(Solver):
             yield robot.with_positions(start, positions)
 
     def _on_anchor(self, q: np.ndarray) -> np.ndarray:
-        """Returns a configuration with the floating base where the first link that is held is where it shall be."""
+        """Returns a configuration whose floating base puts the first constrained link at its target."""
         robot, anchor = self.tasks.robot, self.tasks.anchor
         if not robot.is_floating:
             return q
@@ -151,7 +151,7 @@ class TasksSolver(Solver):
         return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
 
     def _from(self, first: np.ndarray) -> Candidate:
-        """Returns the best that is found from one start."""
+        """Returns the best candidate found from one start."""
         candidates: list[Candidate] = []
         merits: list[float] = []
         for tried in self._gauss_newton(first):
@@ -159,11 +159,11 @@ class TasksSolver(Solver):
             merits.append(tried.merit)
             if self._is_at_its_end(candidates, merits, tried.step):
                 break
-        best = min(range(len(candidates)), key=lambda i: (candidates[i].rank, merits[i], -i))  # of equal ones the last
+        best = min(range(len(candidates)), key=lambda i: (candidates[i].rank, merits[i], -i))  # the last of equal ones
         return candidates[best]
 
     def _is_at_its_end(self, candidates: Sequence[Candidate], merits: Sequence[float], step: float) -> bool:
-        """Returns whether there is nothing more to be had from one start."""
+        """Returns whether the search from one start has converged or stalled."""
         count, size = len(candidates), candidates[-1].size
         if step < STANDSTILL or count > self._config.iterations or (size <= AIM and not self._has_wishes):
             return True
@@ -186,7 +186,7 @@ class TasksSolver(Solver):
         if missed:
             return "; ".join(missed)
         if not self._required:
-            return "costs are as low as they get; none of them is required"
+            return "costs are minimal; none of them is required"
         largest = max(self._required, key=lambda one: one[2].size(found.residuals[one[1]]))[1]
         return f"all that is required is met, '{largest}' within {_amount(found.residuals[largest])}"
 

@@ -29,7 +29,7 @@ class TracIkConfig(ChainConfig):
     """Options of `trac_ik`.
 
     Attributes:
-        timeout: Longest search from one start [s]; other solve types than `Speed` always use all of it.
+        timeout: Longest search from one start [s]; solve types other than `Speed` always use all of it.
         epsilon: Largest error of a solution [m, rad].
         solve_type: `Speed` returns the first solution, `Distance` the one nearest to the start, `Manip1` and `Manip2`
             the one with the largest product and the best ratio of the Jacobian's singular values.
@@ -43,10 +43,10 @@ class TracIkConfig(ChainConfig):
 
 
 class TracIkSolver(ChainSolver):
-    """The TRAC-IK library as the package `pytracik` has it, which leaves out Cartesian tolerances.
+    """The TRAC-IK library in the package `pytracik`, which omits Cartesian tolerances.
 
-    Targets with tolerances go to the search of `kdl` instead. It is not deterministic: its two threads race, and where
-    it ends depends on the clock.
+    Targets with tolerances are solved by the search of `kdl` instead. The solver is not deterministic: two threads
+    race, and the result depends on timing.
 
     Raises:
         ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.

@@ -34,18 +34,19 @@ from ik_ros.trajectory.spline import Spline
 from ik_ros.trajectory.symbolic import link_frames, sphere_distances
 
 MAX_INTERVALS = 128
-"""Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
+"""Largest number of intervals of a spline; waypoints closer together than two intervals can hardly all be passed."""
 MAX_WAYPOINTS = MAX_INTERVALS // 2
 """Largest number of waypoints; more are refused, whatever their times."""
 MAX_SAMPLES = 100_000
 KEPT_PROGRAMS = 4
-"""Number of programs that stay compiled, one for each number of waypoints; the least recently used one goes."""
+"""Number of compiled programs that are kept, one for each number of waypoints; the least recently used one is
+dropped."""
 CHECKS = 10
 """Number of places in each interval at which the result is checked."""
 AIM = 0.01
-"""Waypoints are aimed at with this part of the tolerance, which the smoothest motion uses up; less costs no time."""
+"""Share of the tolerance at waypoints that the program may use; the smoothest motion uses all of it."""
 SPARE = 1e-6
-"""Speeds and accelerations are kept with this part to spare, for rounding."""
+"""Relative margin of speeds and accelerations, for rounding."""
 
 
 class TrajectoryConfig(KdlConfig):
@@ -59,7 +60,7 @@ class TrajectoryConfig(KdlConfig):
         acceleration_limits: Largest acceleration of joints [rad/s^2 or m/s^2].
         shapes: Spheres on links, and obstacles in the base.
         clearance: Smallest distance of all spheres from all obstacles [m].
-        attempts: Number of further tries, by other positions at the waypoints.
+        attempts: Number of further attempts, with other positions at the waypoints.
     """
 
     duration_s: Seconds = 2.0
@@ -110,7 +111,7 @@ class TrajectorySolver(KdlSolver):
         self._distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Looks for a trajectory through the waypoints; through the target alone, if there are none.
+        """Searches for a trajectory through the waypoints; without waypoints, a trajectory to the target.
 
         Raises:
             ValueError: If there is neither, or the waypoints do not follow each other in time or are too many.
@@ -134,11 +135,11 @@ class TrajectorySolver(KdlSolver):
         return answers[-1] if answers[-1].success else answers[0]
 
     def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
-        """Returns what is to be passed, checked."""
+        """Returns the checked waypoints of a problem."""
         waypoints = problem.waypoints
         if not waypoints:
             if problem.target is None:
-                raise ValueError("waypoints: missing, and there is no target in their place")
+                raise ValueError("waypoints: missing, and there is no target instead")
             waypoints = (Waypoint(self._config.duration_s, problem.target),)
         if len(waypoints) > MAX_WAYPOINTS:
             raise ValueError(f"waypoints: expected {MAX_WAYPOINTS} at most, got {len(waypoints)}")
@@ -154,7 +155,7 @@ class TrajectorySolver(KdlSolver):
     def _postures(
         self, problem: IKProblem, waypoints: Sequence[Waypoint], start: Sequence[float], attempt: int
     ) -> tuple[list[Sequence[float]], IKSolution | None]:
-        """Returns positions that lead to the waypoints, each near those before; or why there are none."""
+        """Returns joint positions at the waypoints, each near the previous ones; or the reason why there are none."""
         postures: list[Sequence[float]] = [start]
         if attempt:
             postures[0] = self.limits.random(random.Random(f"{problem.seed} {attempt}"), start)
@@ -175,7 +176,7 @@ class TrajectorySolver(KdlSolver):
         start: Sequence[float],
         postures: Sequence[Sequence[float]],
     ) -> IKSolution:
-        """Returns the trajectory that comes of positions at the waypoints, if it keeps all that was asked for."""
+        """Returns the trajectory through positions at the waypoints, or the requirement that it violates."""
         times_s = np.array([0.0, *(waypoint.time_s for waypoint in waypoints)])
         duration_s = float(times_s[-1])
         with self._program_lock:
@@ -221,7 +222,7 @@ class TrajectorySolver(KdlSolver):
         )
 
     def _program(self, times_s: np.ndarray) -> Program:
-        """Returns the program of splines that are fine enough for the waypoints."""
+        """Returns the program whose splines are fine enough for the waypoints."""
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MAX_INTERVALS:
@@ -233,7 +234,7 @@ class TrajectorySolver(KdlSolver):
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Returns where speeds or accelerations are beyond their limits, checked closely."""
+        """Returns the first speed or acceleration that exceeds its limit, checked on a fine grid."""
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
@@ -255,7 +256,7 @@ class TrajectorySolver(KdlSolver):
 
 
 def _flat(waypoint: Waypoint) -> np.ndarray:
-    """Returns rotation by columns and position of a waypoint, 12 numbers."""
+    """Returns the rotation (by columns) and position of a waypoint, 12 numbers."""
     position, quat_xyzw = waypoint.pose
     return np.concatenate((Rotation.from_quat(quat_xyzw).as_matrix().T.ravel(), position))
 

@@ -1,4 +1,4 @@
-"""A user's own problem formulation: which costs and constraints, for which robot."""
+"""A user's problem formulation: the robot, the costs and the constraints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robot_model.asset_files import ExistingFile
 from robot_model.geometry import Pose
 
 WORLD = "world"
-"""Frame of poses when the base floats, unless the formulation names another one."""
+"""Default frame of poses for a floating base."""
 
 
 def _of_its_type(value: Any, info: ValidationInfo) -> Any:
@@ -43,7 +43,7 @@ class FrameOnLinkConfig(ConfigModel):
     """A frame at a link, such as the tip of a tool.
 
     Attributes:
-        name: What tasks call it.
+        name: Its name in tasks.
         link: The link.
         position: Position in the link [m].
         orientation: Orientation in it, quaternion x, y, z, w.
@@ -62,17 +62,17 @@ class Formulation(ConfigModel):
         urdf_filename: The robot; `{package}/path` and `package://` are resolved.
         floating_base: Whether the root of the robot is free, as that of a robot on legs is.
         base_frame: Frame of poses: a link, by default the root; with a floating base any name.
-        base_position: Position of a floating root at the start of the search [m]; only if there is no constraint of
-            type `frame_pose`, since the first one of those decides.
-        base_orientation: Its orientation then, quaternion x, y, z, w.
-        joints: The joints to find positions for; without any, all that move. The others stay where the problem starts.
-        start: Where joints start that a problem's start leaves out [rad or m]; else in the middle of their limits.
-        frames: Frames at links, which tasks can name as they name links.
+        base_position: Position of a floating root at the start of the search [m]; only without a constraint of type
+            `frame_pose`, the first of which determines it.
+        base_orientation: Orientation of the floating root at the start, quaternion x, y, z, w.
+        joints: The joints to find positions for; by default all that move. The others keep their start positions.
+        start: Default start of joints that a problem's start leaves out [rad or m]; else the middle of their limits.
+        frames: Frames at links; tasks can use their names like those of links.
         shapes: Shapes of links and obstacles in tasks of type `distance`.
         costs: Tasks to minimise.
-        constraints: Tasks that have to hold.
-        main_task: Name of the task that the target of problems is for; None: that about the pose or position of a
-            link, if there is only one.
+        constraints: Tasks that have to be satisfied.
+        main_task: Name of the task that uses the target of problems; None: the only task about the pose or position of
+            a link.
         restarts: Number of random starts after the given one.
         iterations: Most iterations from one start.
     """
@@ -96,7 +96,7 @@ class Formulation(ConfigModel):
     def _fits_the_robot(self) -> Formulation:
         for i, task in enumerate(self.constraints):
             if given := {"weight", "required"} & task.model_fields_set:
-                raise KeyedError(f"constraints[{i}].{min(given)}", "is for costs; constraints have to hold")
+                raise KeyedError(f"constraints[{i}].{min(given)}", "is for costs; constraints are always required")
         if not (self.costs or self.constraints):
             raise KeyedError("costs", "expected a task, here or among the constraints")
         TaskSet(self)
@@ -110,7 +110,7 @@ class Formulation(ConfigModel):
 
     @property
     def base_start(self) -> Pose:
-        """Where a floating root is when the search starts."""
+        """Pose of a floating root at the start of the search."""
         return Pose(self.base_position, self.base_orientation)
 
 
@@ -127,7 +127,7 @@ class Part(NamedTuple):
 
     @property
     def is_required(self) -> bool:
-        """Whether there is no success without it."""
+        """Whether success requires it."""
         return self.is_hard or self.task.config.required
 
 
@@ -138,7 +138,7 @@ class TaskSet:
         robot: The robot.
         base_frame: Frame of poses.
         parts: Its tasks by name; the costs first.
-        main: The task that targets are for, if any.
+        main: The task that uses targets, if any.
 
     Raises:
         KeyedError: If something does not fit the robot; it names the key.

@@ -1,4 +1,4 @@
-"""The way from one configuration to a better one, by quadratic programs."""
+"""Gauss-Newton steps from one configuration to a better one, by quadratic programs."""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ class Candidate(NamedTuple):
     Attributes:
         q: The configuration.
         residuals: Error of each required task.
-        size: The largest of them, in tolerances.
+        size: The largest residual as a multiple of its tolerance.
         hard_size: The same of constraints alone.
     """
 
@@ -37,32 +37,32 @@ class Candidate(NamedTuple):
 
 
 LARGEST_STEP = 1.0
-"""Most that a joint, or the base along or about an axis, goes in one step [rad or m]."""
+"""Largest motion of a joint, or of the base along or about an axis, in one step [rad or m]."""
 DAMPING = 1e-3
-"""Damping of steps as a share of the squared residual..."""
+"""Damping of steps as a share of the squared residual."""
 LEAST_DAMPING = 1e-6
-"""... at least..."""
+"""Smallest damping of steps."""
 FIRST_DAMPING, TIGHTENING, EASING = 1e-4, 10.0, 0.2
-"""... and more after steps that led nowhere: so much, so many times as much with each, and less again otherwise."""
+"""Damping after a failed step: its smallest value, its growth with each failure, and its decrease after a success."""
 HARD = 1e4
-"""Weight of constraints when a step is judged."""
+"""Weight of constraints in the merit of a step."""
 MEMORY = 2
-"""A step has to be better than the worst of so many before it, else a shorter one is tried."""
+"""Number of previous steps; a step has to be better than the worst of them, otherwise a shorter one is tried."""
 SLACK = 1e-6
-"""Weight by which a constraint yields to costs, and to constraints that contradict it."""
+"""Penalty for violating a constraint in favour of costs or conflicting constraints."""
 SOFT = 8
 """DAQP's number for a soft constraint (`sense` in its documentation)."""
 UNBOUNDED = 1e30
 
 
 class Iterate(NamedTuple):
-    """A configuration on the way.
+    """An intermediate configuration.
 
     Attributes:
         q: The configuration.
         rows: Linearisation of each task there.
         beyond: Violation of its bounds by each.
-        merit: The weighted squares of all that.
+        merit: The sum of the weighted squares of the violations.
         step: Largest motion of a joint, or of the base, from the last better one [rad or m].
     """
 
@@ -76,9 +76,8 @@ class Iterate(NamedTuple):
 class GaussNewton:
     """Minimises the costs such that the constraints hold, by Gauss-Newton steps.
 
-    Each step minimises the weighted squares of the costs, linearised, and a damping, such that the linearised
-    constraints and the limits of the joints hold. Constraints give way a little at a great price, so that there always
-    is a step.
+    Each step minimises the weighted squares of the linearised costs plus a damping, subject to the linearised
+    constraints and the joint limits. Constraints are soft with a large penalty, so there always is a step.
 
     Attributes:
         lower: n lower limits of the joints [rad or m].
@@ -98,7 +97,7 @@ class GaussNewton:
     def begin(self) -> None:
         """Sets the bounds of the tasks for a new problem.
 
-        Constraints on joints alone narrow the limits, and so hold to the last digit.
+        Constraints on joints alone narrow the limits, so they are satisfied exactly.
         """
         self.lower, self.upper = self._robot.lower.copy(), self._robot.upper.copy()
         for part in self._parts:
@@ -109,7 +108,8 @@ class GaussNewton:
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 
     def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
-        """Yields each configuration on the way from q, also worse ones; joints beyond their limits start at them."""
+        """Yields each configuration of the search from q, also worse ones; joints beyond their limits start at the
+        limit."""
         q = self._robot.moved(q, np.zeros(self._count), self.lower, self.upper)
         damping, merits = 0.0, deque([np.inf], MEMORY)
         here = tried = self._at(q, np.inf)
@@ -145,7 +145,7 @@ class GaussNewton:
                     hard.append(wanted)
                 continue
             jacobian, weight = wanted.jacobian, part.task.config.weight
-            if not wanted.is_exact:  # what is within its bounds costs nothing
+            if not wanted.is_exact:  # values within their bounds cost nothing
                 outside = over != 0.0
                 jacobian, over = jacobian[outside], over[outside]
             off += weight * float(over @ over)

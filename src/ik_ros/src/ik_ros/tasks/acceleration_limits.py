@@ -26,7 +26,8 @@ class AccelerationLimitsConfig(TaskConfig):
 
 
 class AccelerationLimits(JointTask):
-    """Keeps joints near where the last two solutions lead; with one solution they start at rest, with none free."""
+    """Keeps joints near the extrapolation of the last two solutions; with one solution they start at rest, with none
+    they are free."""
 
     Config = AccelerationLimitsConfig
 

@@ -1,4 +1,4 @@
-"""Staying where the robot was."""
+"""Staying near the previous solution."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Where the centre of mass is."""
+"""Position of the centre of mass."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -24,7 +24,7 @@ class ComConfig(TaskConfig):
 
 
 class Com(Task):
-    """Brings the centre of mass of the robot to a position."""
+    """Moves the robot's centre of mass to a position."""
 
     Config = ComConfig
 

@@ -1,4 +1,4 @@
-"""Balance: the centre of mass stays over what the robot stands on."""
+"""Balance: the centre of mass stays over the support polygon."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,7 +14,7 @@ class ComInSupportConfig(TaskConfig):
     """Options of this task.
 
     Attributes:
-        support: Points of links that stand on the ground, in the link [m], such as the corners of both soles.
+        support: Contact points with the ground by link, in the link's frame [m], such as the corners of both soles.
         margin: Smallest distance of the centre of mass from the edges of their polygon [m].
     """
 
@@ -25,8 +25,8 @@ class ComInSupportConfig(TaskConfig):
 class ComInSupport(Task):
     """Keeps the centre of mass over the support polygon, seen along the z axis of the base, which is upright.
 
-    The polygon is the convex hull of the contact points where they are now; that it moves with them is left out of the
-    Jacobian, since feet that stand are held by constraints of their own.
+    The polygon is the convex hull of the present contact points. Its motion is left out of the Jacobian, since standing
+    feet are held by constraints of their own.
     """
 
     Config = ComInSupportConfig

@@ -11,7 +11,7 @@ from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAR_M = 0.3
-"""Distance beyond the required one up to which a pair counts in this step [m]."""
+"""Pairs are considered up to this much beyond the required distance [m]."""
 
 
 class DistanceConfig(TaskConfig):
@@ -27,7 +27,7 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps shapes of the formulation apart, in pairs, of which one at least moves."""
+    """Keeps pairs of shapes apart; at least one of each pair moves."""
 
     Config = DistanceConfig
 
@@ -42,7 +42,7 @@ class Distance(Task):
             with keyed_errors(key):
                 first, second = (robot.shape(name) for name in pair)
             if first.link_id == second.link_id:
-                raise KeyedError(key, f"'{pair[0]}' and '{pair[1]}' are at the same link, or both stand still")
+                raise KeyedError(key, f"'{pair[0]}' and '{pair[1]}' are on the same link, or both are fixed")
             self._pairs.append((first, second))
 
     def rows(self, q: np.ndarray) -> Linearization:
@@ -62,7 +62,7 @@ class Distance(Task):
         return shape.placement if shape.link_id is None else self.robot.frame(shape.link_id) * shape.placement
 
     def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Returns how a point of a shape moves along a direction, with what is free."""
+        """Returns the derivative of a point of a shape along a direction by the free components."""
         if shape.link_id is None:
             return np.zeros(len(self.robot.free))
         frame = self.robot.frame(shape.link_id)

@@ -7,7 +7,7 @@ from robot_model.geometry import Pose
 
 
 class FrameOrientation(FrameTask):
-    """Turns a link to a quaternion x, y, z, w, of any length but 0; any position will do."""
+    """Turns a link to a quaternion x, y, z, w of any length but 0; its position is free."""
 
     available = ("rx", "ry", "rz")
     goal_words = "a quaternion (x, y, z, w) that is not zero"

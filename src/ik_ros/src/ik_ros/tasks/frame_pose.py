@@ -4,4 +4,4 @@ from ik_ros.formulation.frame_task import FrameTask
 
 
 class FramePose(FrameTask):
-    """Brings a link to a pose: position [m] and quaternion x, y, z, w."""
+    """Moves a link to a pose: position [m] and quaternion x, y, z, w."""

@@ -7,7 +7,7 @@ from robot_model.geometry import Pose
 
 
 class FramePosition(FrameTask):
-    """Brings the origin of a link to a position x, y, z [m]; any orientation will do."""
+    """Moves the origin of a link to a position x, y, z [m]; its orientation is free."""
 
     available = ("x", "y", "z")
     goal_words = "a position (x, y, z)"

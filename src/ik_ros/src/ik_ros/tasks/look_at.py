@@ -1,4 +1,4 @@
-"""Where a link looks."""
+"""Direction of an axis of a link."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ class LookAtConfig(TaskConfig):
 
     Attributes:
         frame: The link.
-        axis: Its axis that is to point at something, in the link; any length but 0.
+        axis: The axis to point at the goal, in the link's frame; any length but 0.
         goal: The point, x, y, z in the base [m]; None: from each problem.
     """
 
@@ -32,7 +32,7 @@ class LookAtConfig(TaskConfig):
 
 
 class LookAt(Task):
-    """Turns an axis through a link's origin towards a point, such as that of a camera."""
+    """Turns an axis through a link's origin, such as the optical axis of a camera, towards a point."""
 
     Config = LookAtConfig
 

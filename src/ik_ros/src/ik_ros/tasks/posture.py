@@ -1,4 +1,4 @@
-"""A posture that is preferred."""
+"""A preferred posture."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ class PostureConfig(TaskConfig):
 
 
 class Posture(JointTask):
-    """Brings joints to given positions; goals of problems have one for each, in the same order."""
+    """Moves joints to given positions; goals of problems have one for each, in the same order."""
 
     Config = PostureConfig
 

@@ -14,9 +14,9 @@ from .spline import Spline
 from .symbolic import link_frames, rotation_vector, sphere_distances
 
 SAMPLES = 2
-"""Number of places in each interval of the spline at which obstacles count."""
+"""Number of points in each interval of the spline at which distances to obstacles are constrained."""
 SAFETY_M = 5e-3
-"""Spheres stay this much farther away there, since between two places they may come nearer [m]."""
+"""Additional clearance at these points [m], since spheres may come nearer between them."""
 ITERATIONS = 100
 OPTIONS: Any = {
     "print_time": False,
@@ -38,7 +38,7 @@ class Program:
 
     Args:
         chain: The chain.
-        shapes: Spheres on its links, and obstacles in the base that they have to stay away from.
+        shapes: Spheres on its links, and obstacles in the base to avoid.
         intervals: Number of polynomials of each joint's spline.
         waypoints: Number of waypoints.
 
@@ -112,7 +112,7 @@ class Program:
         """
         count = self.spline.count
         lower, upper = (np.tile(ends, (count, 1)) for ends in (limits.lower, limits.upper))
-        lower[:2] = upper[:2] = start  # two equal control points are an end at rest
+        lower[:2] = upper[:2] = start  # two equal control points: at rest at that end
         speed = np.tile(max_velocity, (count - 1, 1))
         speed[-1] = 0.0
         change = np.tile(max_acceleration, (count - 2, 1))
@@ -138,5 +138,5 @@ class Program:
 
 
 def _sparse(matrix: np.ndarray) -> casadi.DM:
-    """Returns a matrix without its zeros, which would count as numbers that derivatives depend on."""
+    """Returns a matrix with its zeros as structural ones, so that derivatives do not depend on them."""
     return casadi.sparsify(casadi.DM(matrix))

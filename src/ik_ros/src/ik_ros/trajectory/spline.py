@@ -1,4 +1,4 @@
-"""Splines for joints, whose control points bound them."""
+"""Splines of joints, bounded by their control points."""
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -9,16 +9,15 @@ DEGREE = 3
 class Spline:
     """Cubic B-splines over the time from 0 to 1, for any number of joints.
 
-    Between its ends, a B-spline is a mean of its control points, and so are its derivatives of theirs: limits that
-    control points keep are kept everywhere (de Boor, A Practical Guide to Splines, 1978). Accelerations are piecewise
-    linear.
+    A B-spline is a convex combination of its control points, and so are its derivatives: limits that hold at the
+    control points hold everywhere (de Boor, A Practical Guide to Splines, 1978). Accelerations are piecewise linear.
 
     Args:
         intervals: Number of successive polynomials.
 
     Attributes:
         count: Number m of control points.
-        times: Time of the largest weight of each control point, from 0 to 1: the means of their knots.
+        times: Time of the largest weight of each control point, from 0 to 1: the mean of its knots.
         to_velocity: Control points of the velocity from those of the position, (m - 1) x m.
         to_acceleration: The same of the acceleration, (m - 2) x m.
     """
@@ -33,7 +32,7 @@ class Spline:
         self.to_acceleration = self._spline.derivative(2).c[: self.count - 2]
 
     def basis(self, times: np.ndarray, order: int = 0) -> np.ndarray:
-        """Returns what each control point counts.
+        """Returns the weight of each control point.
 
         Args:
             times: k times from 0 to 1.
@@ -47,7 +46,9 @@ class Spline:
     @property
     def roughness(self) -> np.ndarray:
         """The matrix of the integral of the squared acceleration, m x m."""
-        pair = np.array(((2.0, 1.0), (1.0, 2.0))) / (6.0 * self.intervals)  # of a line's square, by its ends
+        pair = np.array(((2.0, 1.0), (1.0, 2.0))) / (
+            6.0 * self.intervals
+        )  # integral of the square of a line, from its ends
         weights = np.zeros((self.count - 2,) * 2)
         for i in range(self.intervals):
             weights[i : i + 2, i : i + 2] += pair

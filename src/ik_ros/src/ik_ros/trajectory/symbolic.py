@@ -1,4 +1,4 @@
-"""Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel has no bindings to it."""
+"""Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel lacks CasADi bindings."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from robot_model.chain import Chain
 from robot_model.urdf.elements import UrdfJoint
 
 SMALL = 1e-12
-"""Keeps roots smooth at 0 [m^2]."""
+"""Added under square roots to keep them smooth at 0 [m^2]."""
 
 
 def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
@@ -28,7 +28,7 @@ def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
     variables = iter(range(len(chain.moving)))
     for joint in chain.joints:
         position = position + rotation @ np.array(joint.xyz)
-        rotation = rotation @ Rotation.from_euler("xyz", joint.rpy).as_matrix()  # about the fixed axes, one by one
+        rotation = rotation @ Rotation.from_euler("xyz", joint.rpy).as_matrix()  # about each fixed axis in turn
         if joint.is_moving:
             turn, shift = _motion(joint, q[next(variables)])
             position = position + rotation @ shift
@@ -38,10 +38,10 @@ def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
 
 
 def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[Any, Any]]) -> list[Any]:
-    """Returns how far each sphere on a link is from each shape in the base, negative in each other [m].
+    """Returns the distance of each sphere on a link from each shape in the base [m]; negative if they penetrate.
 
     Args:
-        shapes: Spheres on links of the chain, and whatever stands in the base.
+        shapes: Spheres on links of the chain, and shapes fixed in the base.
         frames: Rotation and position of each link in the base.
     """
     obstacles = [shape for shape in shapes if shape.link is None]
@@ -64,7 +64,7 @@ def rotation_vector(rotation: Any) -> Any:
 
 
 def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
-    """Returns how a joint turns and shifts what it carries, in its own frame."""
+    """Returns the rotation and translation of a joint's child, in the joint's frame."""
     if not joint.is_revolute:
         return casadi.DM.eye(3), np.array(joint.axis) * q
     cross = casadi.skew(casadi.DM(joint.axis))
@@ -73,7 +73,7 @@ def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
 
 
 def _distance(point: Any, obstacle: ShapeConfig) -> Any:
-    """Returns how far a point is from the surface of a shape."""
+    """Returns the distance of a point from the surface of a shape."""
     half, radius = obstacle.core
     local = Rotation.from_quat(obstacle.orientation).as_matrix().T @ (point - np.array(obstacle.position))
     if not obstacle.core.is_box:
