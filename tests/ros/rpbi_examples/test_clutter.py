@@ -24,6 +24,7 @@ def example(ros_master, tmp_path):
         system.close()
 
 
+@pytest.mark.thorough
 def test_objects_fall_on_the_table_and_appear_in_the_cloud(example):
     moving = example.listen("/tf", TFMessage)
 

@@ -89,12 +89,7 @@ class Cap:
         self._daemon.press(self.button, is_pressed)
 
 
-@pytest.fixture(
-    params=[
-        pytest.param(("joystick", Gamepad), id="joystick"),
-        pytest.param(("spacenav", Cap), id="spacenav", marks=pytest.mark.thorough),
-    ]
-)
+@pytest.fixture(params=[("joystick", Gamepad), ("spacenav", Cap)], ids=lambda param: param[0])
 def device(request, tmp_path) -> Iterator[tuple[str, Gamepad | Cap]]:
     """The operator of the launch file, and what moves its device."""
     operator, kind = request.param
@@ -103,6 +98,7 @@ def device(request, tmp_path) -> Iterator[tuple[str, Gamepad | Cap]]:
     made.close()
 
 
+@pytest.mark.thorough
 def test_a_device_demonstrates_in_the_plane(ros, tmp_path, device):
     """Its button starts and ends the demonstration; the tip moves in x and y alone, and keys stop no recording."""
     operator, stick = device
