@@ -64,5 +64,5 @@ def test_hostile_folders_are_taken_or_refused_in_words(tmp_path: Path) -> None:
 
 
 def test_trial_detects_each_forbidden_effect(tmp_path: Path) -> None:
-    done = _run("-c", CONTROL, str(ROOT), folder=tmp_path)
+    done = _run("-c", CONTROL, str(ROOT / "dev"), folder=tmp_path)
     assert done.stdout.split() == ["outside", "outside", "outside", "code", "traceback", "taken"], done.stderr
