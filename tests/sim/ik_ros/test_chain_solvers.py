@@ -135,9 +135,9 @@ def test_a_solver_that_never_finds_anything_does_not_pass():
 
 def test_solver_that_reports_a_wrong_distance_fails_the_suite():
     with pytest.raises(AssertionError):
-        OfHopeless().test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off()
+        OfHopeless().test_unreachable_target_returns_the_best_pose_and_its_distance()
 
 
 def test_a_solver_that_leaves_limits_does_not_pass():
     with pytest.raises(AssertionError, match="outside limits"):
-        OfOutsideLimits().test_whatever_is_asked_answers_are_finite_and_within_limits()
+        OfOutsideLimits().test_answers_to_random_problems_are_finite_and_within_limits()

@@ -84,8 +84,8 @@ class Chattering(TestSpacenav):
 @pytest.mark.parametrize(
     "suite, test, arguments, complaint",
     [
-        (Reversed(), "test_each_axis_goes_both_ways_and_back", (1.0,), "until axis 'x' is at 1"),
-        (Chattering(), "test_at_rest_it_has_nothing_to_say", (), "it keeps reporting readings at rest"),
+        (Reversed(), "test_each_axis_moves_in_both_directions_and_back", (1.0,), "until axis 'x' is at 1"),
+        (Chattering(), "test_device_at_rest_reports_nothing", (), "it keeps reporting readings at rest"),
     ],
 )
 def test_conformance_suite_finds_planted_faults(suite, test, arguments, complaint, tmp_path, monkeypatch):

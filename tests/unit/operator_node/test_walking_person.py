@@ -12,7 +12,7 @@ from operator_node.mvn.skeleton import BONES, INDEX
 HZ = 60.0
 
 
-@pytest.fixture(scope="module", params=[(1.75, 0.4), (1.55, 0.6), (1.95, 0.0)], ids=["walks", "is fast", "stands"])
+@pytest.fixture(scope="module", params=[(1.75, 0.4), (1.55, 0.6), (1.95, 0.0)], ids=["walks", "is fast", "at rest"])
 def walk(request):
     """Positions and orientations over 12 s, with height and speed."""
     height_m, speed = request.param

@@ -40,7 +40,7 @@ def test_weight_is_the_wrench_that_holds_the_payload():
     assert PAYLOAD.weight(gravity_in(Pose(), 9.81)) == pytest.approx([0, 0, 16.677, -0.05 * 16.677, -0.03 * 16.677, 0])
 
 
-@pytest.mark.parametrize("sign", [1, -1], ids=["what it exerts", "what acts on it"])
+@pytest.mark.parametrize("sign", [1, -1], ids=["exerted", "acting on the sensor"])
 def test_mass_centre_and_offsets_are_found(sign):
     payload = PAYLOAD.model_copy(update={"mass": sign * PAYLOAD.mass})
     found = identify_payload([sample(payload, tilted(*each)) for each in TILTS], LIMITS)

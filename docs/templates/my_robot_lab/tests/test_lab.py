@@ -48,7 +48,7 @@ def test_the_range_finder_sees_the_parcel_pass(world):
     assert seen and seen[0] == pytest.approx(0.15, abs=0.005)  # from the edge of the belt to the side of the parcel
 
 
-def test_a_mistake_in_the_yaml_is_told():
+def test_yaml_mistake_is_reported():
     with pytest.raises(ConfigError, match=r"belt.yaml: sped: unknown key 'sped'; did you mean 'speed'"):
         ConveyorConfig.parse({"name": "belt", "size": [1, 1, 1], "position": [0, 0, 0], "sped": 1}, "belt.yaml")
 

@@ -137,7 +137,7 @@ class SolverConformance:
         share = sum(self.checked(problem).success for problem in problems) / self.reachable_problems
         assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
 
-    def test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off(self) -> None:
+    def test_unreachable_target_returns_the_best_pose_and_its_distance(self) -> None:
         """A failure is an answer, not an exception."""
         start = self.start_at(self.limits.middle)
         target = Pose((0.0, 0.0, 100.0))
@@ -147,7 +147,7 @@ class SolverConformance:
         assert abs(distance - solution.position_error_m) < 1e-3, (distance, solution)
         assert abs(angle - solution.orientation_error_rad) < 0.01, (angle, solution)
 
-    def test_whatever_is_asked_answers_are_finite_and_within_limits(self) -> None:
+    def test_answers_to_random_problems_are_finite_and_within_limits(self) -> None:
         """Targets reachable or not, starts within limits or not."""
         generator = random.Random(2)
         for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
@@ -162,7 +162,7 @@ class SolverConformance:
                 with pytest.raises(ValueError, match="finite"):
                     self.solver.solve(self.problem(target, {}))
 
-    def test_an_unknown_joint_is_refused_and_the_known_ones_are_named(self) -> None:
+    def test_unknown_joint_is_refused_naming_the_known_ones(self) -> None:
         """A misspelt joint would silently start elsewhere."""
         problem = self.problem(self.forward(self.limits.middle), {"no_such_joint": 0.0})
         with pytest.raises(UnknownNameError, match=f"no_such_joint.*{self.solver.joint_names[0]}"):

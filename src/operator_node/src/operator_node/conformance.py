@@ -142,7 +142,7 @@ class DeviceConformance:
 
     # --- The tests.
 
-    def test_axes_and_buttons_have_names_and_the_first_reading_is_at_rest(self, reader: Reader) -> None:
+    def test_names_are_unique_and_the_first_reading_is_at_rest(self, reader: Reader) -> None:
         """Names are unique, and the first reading equals `at_rest`."""
         device = reader.device
         assert len(set(device.axes)) == len(device.axes) and len(set(device.buttons)) == len(device.buttons)
@@ -150,7 +150,7 @@ class DeviceConformance:
         assert reader.readings[0][:2] == device.at_rest()[:2]
 
     @pytest.mark.parametrize("share", (1.0, -1.0))
-    def test_each_axis_goes_both_ways_and_back(self, reader: Reader, share: float) -> None:
+    def test_each_axis_moves_in_both_directions_and_back(self, reader: Reader, share: float) -> None:
         """The axis has the sign of the motion, all others stay at rest, and the axis returns to rest when it is
         released.
         """
@@ -183,7 +183,7 @@ class DeviceConformance:
         with pytest.raises(DeviceError):
             device.read(0.0)
 
-    def test_at_rest_it_has_nothing_to_say(self, reader: Reader) -> None:
+    def test_device_at_rest_reports_nothing(self, reader: Reader) -> None:
         """An untouched device reports nothing new, and reading with a timeout of 0 does not wait."""
         end_s = time.monotonic() + PATIENCE_S
         while any(reader.device.read(0.0) is not None for _ in range(3)):
@@ -199,7 +199,7 @@ class DeviceConformance:
             reader.feed.close()
             assert len(reader.readings) == count + 1 and reader.is_at_rest
 
-    def test_a_device_that_is_not_there_is_an_error_that_says_so(self, device: Device) -> None:
+    def test_missing_device_raises_an_error_with_a_reason(self, device: Device) -> None:
         """The error is a plain DeviceError, since the device may appear later."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")
@@ -210,7 +210,7 @@ class DeviceConformance:
         self.plug()
         device.open()
 
-    def test_unplugged_it_is_at_rest_and_back_it_does_not_jump(self, reader: Reader) -> None:
+    def test_device_rests_while_unplugged_and_returns_without_a_jump(self, reader: Reader) -> None:
         """The device is unplugged and plugged in while an axis is held; the axis moves again once it was released."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")

@@ -70,11 +70,11 @@ class CheckConformance:
 
     # --- The tests.
 
-    def test_what_is_safe_passes(self) -> None:
+    def test_safe_motion_passes(self) -> None:
         """Refusing everything fails here."""
         assert self.make().check(*self.safe()) is None
 
-    def test_what_is_not_safe_is_refused_with_numbers_on_the_wrong_side_of_each_other(self) -> None:
+    def test_unsafe_motion_is_refused_with_value_and_limit(self) -> None:
         """Letting everything pass fails here."""
         check = self.make()
         violation = check.check(*self.unsafe())
@@ -83,7 +83,7 @@ class CheckConformance:
         assert violation.value != violation.limit
         assert f"{violation.limit:.6g}" in str(violation)
 
-    def test_equal_motions_have_equal_answers_whatever_was_asked_before(self) -> None:
+    def test_equal_motions_have_equal_answers_in_any_order(self) -> None:
         """Also of another check that is made the same way."""
         check, other = self.make(), self.make()
         answers = [check.check(*each()) for each in (self.unsafe, self.safe, self.unsafe, self.unsafe, self.safe)]
@@ -91,7 +91,7 @@ class CheckConformance:
         assert other.check(*self.safe()) is None
         assert other.check(*self.unsafe()) == answers[0]
 
-    def test_what_is_not_a_number_is_refused(self) -> None:
+    def test_non_finite_target_is_refused(self) -> None:
         """Comparisons with it are false, so a check that looks for what is too large would let it pass."""
         if not self.is_about_motion:
             pytest.skip(f"'{self.check_name}' does not look at the motion")

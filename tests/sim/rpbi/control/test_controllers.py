@@ -293,7 +293,7 @@ def test_a_force_stays_while_it_wipes(build):
         (wrong("TellsNonsense"), "reported numbers are not finite: error"),
         (wrong("Slow"), r"it needs .* ms for a tick of 1 ms"),
     ],
-    ids=["raises", "not finite", "too few", "tells nonsense", "slow"],
+    ids=["raises", "not finite", "too few", "invalid state", "slow"],
 )
 def test_failing_controller_is_stopped_and_named_and_the_world_continues(build, caplog, controller, told):
     aside = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [2.0, 0.0, 0.0]}

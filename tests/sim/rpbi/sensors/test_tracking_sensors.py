@@ -159,7 +159,7 @@ def test_a_tag_is_reported_in_the_optical_frame(build) -> None:
         ((), {"tags": [{**TAG, "body": "nobody"}]}),
         ((), {"tags": [{**TAG, "link": "none"}]}),
     ],
-    ids=["covered", "from behind", "beside the image", "too small", "by chance", "no body", "no link"],
+    ids=["covered", "from behind", "outside the image", "too small", "by chance", "no body", "no link"],
 )
 def test_a_tag_that_cannot_be_seen_is_left_out(build, more, keys, caplog) -> None:
     world = tagged(build, *more, **keys)
