@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 from import_graph import ImportGraph, circles_of
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -20,6 +21,7 @@ MAX_MODULES = 20
 MAX_SMALL = 25
 MAX_SCENE_LINES = 150
 SMALL_LINES = 80
+MAX_WORDS = 10
 TABLES = (
     "rpbi.bodies",
     "rpbi.sensors",
@@ -184,6 +186,44 @@ def long_scenes(src: Path) -> list[str]:
     return [f"{rule}, {name}.py has {count}" for name, count in sorted(lines.items()) if count > MAX_SCENE_LINES]
 
 
+def names_of_tests(tree: ast.Module) -> list[str]:
+    """Names of tests and their classes, and the literal ids of their parameters, as words."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            found.append(node.name.removeprefix("test_").replace("_", " "))
+        elif isinstance(node, ast.ClassDef) and node.name.startswith("Test"):
+            found.append(re.sub("(?<!^)(?=[A-Z])", " ", node.name.removeprefix("Test")).lower())
+        elif isinstance(node, ast.keyword) and node.arg in ("id", "ids"):
+            literals = (each.value for each in ast.walk(node.value) if isinstance(each, ast.Constant))
+            found += [each for each in literals if isinstance(each, str)]
+    return found
+
+
+def wordy_test_names(src: Path) -> list[str]:
+    """Files whose names of tests are too long to be read at once, or leave the subject to the word "what"."""
+    tests = [*src.parent.glob("tests/**/*.py"), *src.glob("*/src/*/conformance.py")]
+    rule = f"at most {MAX_WORDS} words and no 'what' in the name of a test"
+    found = {path: names_of_tests(ast.parse(path.read_text())) for path in sorted(tests)}
+    wordy = {
+        path: [name for name in names if len(name.split()) > MAX_WORDS or "what" in name.split()]
+        for path, names in found.items()
+    }
+    return [f"{path.relative_to(src.parent)}: {rule}: {', '.join(names)}" for path, names in wordy.items() if names]
+
+
+def mutants_without_a_test(src: Path) -> list[str]:
+    """Changes of the guard that no test could catch, since the one that they name has gone or has another name."""
+    tests = [*src.parent.glob("tests/*/safe_robot/*.py"), *src.glob("safe_robot/src/*/conformance.py")]
+    there = " ".join(path.read_text() for path in tests)
+    return [
+        f"{path.relative_to(src.parent)}: no test is named {name}"
+        for path in src.parent.glob("dev/robustness/mutants/*.yaml")
+        for name in sorted({name for each in yaml.safe_load(path.read_text()) for name in each["test"].split(" or ")})
+        if name not in there
+    ]
+
+
 RULES: tuple[Callable[[Path], list[str]], ...] = (
     circles,
     circles_of_rooms,
@@ -194,6 +234,8 @@ RULES: tuple[Callable[[Path], list[str]], ...] = (
     repeated,
     shared_class_names,
     long_scenes,
+    wordy_test_names,
+    mutants_without_a_test,
 )
 
 
@@ -203,6 +245,7 @@ def test_layout_keeps(rule):
 
 
 RPBI = "ros_pybullet_interface/src/rpbi"
+ROOT_OF_BREAKS = "../../../.."
 SCENES = "../../../rpbi_examples/src/rpbi_examples/scenes"
 BREAKS = {
     circles: (
@@ -226,6 +269,17 @@ BREAKS = {
     long_scenes: (
         {f"{SCENES}/__init__.py": "'rpbi_examples.scenes.new:New'", f"{SCENES}/new.py": "\n" * 150},
         "new.py has 152",
+    ),
+    wordy_test_names: (
+        {
+            f"{ROOT_OF_BREAKS}/tests/test_new.py": "def test_a_b_c_d_e_f_g_h_i_j_k(): ...\n"
+            "def test_a_b_c_d_e_f_g_h_i_j(): ...\ndef test_what(): ...\nclass TestWhat: ...\nf(ids=['what', 'l'])"
+        },
+        "in the name of a test: a b c d e f g h i j k, what, what, what",
+    ),
+    mutants_without_a_test: (
+        {f"{ROOT_OF_BREAKS}/dev/robustness/mutants/new.yaml": "[{test: lost}]"},
+        "new.yaml: no test is named lost",
     ),
 }
 """What to add to which files, so that a rule is broken; and what the message names."""
