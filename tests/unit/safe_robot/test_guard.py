@@ -326,7 +326,7 @@ class TestBadConfiguration:
             ({"checks": {"joint_velocty": {}}}, "guard.yaml: checks.joint_velocty: unknown check.*'joint_velocity'"),
             ({"policy": "stop"}, "guard.yaml: policy"),
             ({"period_s": 1e-300}, "guard.yaml: period_s: must be >= 1e-05"),
-            ({"limits": {"acceleration": 1e-6}}, "guard.yaml: limits: expected limits with which braking takes"),
+            ({"limits": {"acceleration": 1e-6}}, "guard.yaml: limits: expected limits such that braking takes"),
             ({"joint_names": []}, r"guard.yaml: joint_names: expected a joint, got \[\]"),
             ({"joint_names": ["turn"] * 2}, "guard.yaml: joint_names: expected each joint once, got text 'turn' twice"),
         ],

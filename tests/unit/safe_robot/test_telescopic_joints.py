@@ -74,6 +74,6 @@ def test_telescopic_reach_requires_position_limits_and_their_check(tmp_path):
     with pytest.raises(ConfigError, match=r"checks.joint_position.active: expected true, since joint 'reach' slides"):
         guard_of(crane(tmp_path), checks={"joint_position": {"active": False}})
     boundless = crane(tmp_path, 'lower="0" upper="0"')
-    with pytest.raises(ConfigError, match="expected limits for what slides between joint 'turn', which turns it, and"):
+    with pytest.raises(ConfigError, match="expected limits for prismatic joints between joint 'turn' and"):
         guard_of(boundless, checks={"link_velocity": {"links": {"trolley": 0.3}}})
     assert guard_of(boundless).joint_names == ("turn", "reach")

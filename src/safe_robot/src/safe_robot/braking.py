@@ -15,9 +15,9 @@ INSIDE = 1.0 - 1e-6
 """Braking keeps this share of the limits, so that rounding does not bring it over them."""
 TINY = 1e-300
 MAX_PERIODS = 10_000
-"""Largest number of periods of a braking; all lengths are prepared, and a longer one is refused."""
+"""Largest number of periods of a braking; all lengths up to it are prepared."""
 FASTEST = 10.0
-"""Speed from which braking is prepared where none is the limit [rad/s or m/s]."""
+"""Speed up to which braking is prepared for joints without a velocity limit [rad/s or m/s]."""
 
 
 class Brake(NamedTuple):
@@ -71,16 +71,16 @@ class BrakingCommands(NamedTuple):
         return BrakingCommands(*(each[1:] for each in self))
 
     def brake_from(self, position: np.ndarray) -> Brake:
-        """Returns them as a braking that begins at n positions [rad or m]."""
+        """Returns the braking that these commands describe from n positions [rad or m]."""
         return Brake(self.position - position, *self[1:])
 
 
 class Braking:
     """Finds braking trajectories of n joints, each joint by itself.
 
-    In N periods a joint comes to rest by that sequence of jerks which has the least sum of squares. It is linear in
-    velocity and acceleration, so all lengths N are prepared, and braking is one product of matrices. The length is
-    the shortest that keeps the limits.
+    A joint comes to rest in N periods with the sequence of jerks that has the least sum of squares. It is linear in
+    velocity and acceleration, so all lengths N are prepared, and braking is one product of matrices. The length is the
+    shortest that keeps the limits.
 
     Args:
         max_velocity: n largest speeds [rad/s or m/s]; inf where there is none, as below.
@@ -100,7 +100,7 @@ class Braking:
         longest_s = max(map(_longest_s, max_velocity.tolist(), max_acceleration.tolist(), max_jerk.tolist()))
         if not longest_s <= MAX_PERIODS * period_s:
             raise ValueError(
-                f"expected limits with which braking takes at most {MAX_PERIODS} periods of period_s, {period_s:g} s;"
+                f"expected limits such that braking takes at most {MAX_PERIODS} periods of period_s, {period_s:g} s;"
                 f" got {longest_s:.3g} s"
             )
         lengths = [2]
@@ -122,9 +122,9 @@ class Braking:
         self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
-        """Returns how n joints come to rest from n velocities and n accelerations, None if their limits forbid it.
+        """Returns the braking of n joints from n velocities and n accelerations, None if their limits forbid it.
 
-        Velocities and positions on the way are for others to judge.
+        Velocities and positions during braking are not checked here.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state[:, None])[:, 0]
@@ -137,9 +137,9 @@ class Braking:
         return Brake(*found.transpose(1, 2, 0))
 
     def ends(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns how far n joints go until they rest, from each of m x n states, and their largest speed on the way.
+        """Returns the braking distances of n joints from each of m x n states, and their largest speeds.
 
-        NaN where the limits of `plan` forbid it [rad or m, rad/s or m/s].
+        NaN where limits forbid the braking [rad or m, rad/s or m/s].
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state)
@@ -161,9 +161,9 @@ class Braking:
         return speed
 
     def factors(self, velocity: np.ndarray, acceleration: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns how far n joints go, by velocity and by acceleration, since it is linear; each count x n.
+        """Returns the factors of velocity and of acceleration in the distances of n joints, each count x n.
 
-        Rows are moments, evenly from the beginning to where all joints rest.
+        Rows are instants, evenly spaced from the beginning until all joints rest.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
@@ -172,7 +172,7 @@ class Braking:
         return way[0] * self._period_s, way[1] * self._period_s**2
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
-        """Returns for which of l lengths each of m x n states keeps the limits; 2 x m x n, in periods."""
+        """Returns which of l lengths keep the limits, for each of m x n states; states are 2 x m x n, in periods."""
         products = self._lines.reshape(-1, 2) @ state.reshape(2, -1)
         first, slope, first_jerk, last_jerk, first_acceleration = products.reshape(5, -1, *state.shape[1:])  # l x m x n
         length = self._lengths[:, None, None]

@@ -21,7 +21,7 @@ from .robot import GuardedRobot
 class CheckConfig(ConfigModel):
     """Options that every check has."""
 
-    active: Switch = Field(True, description="Whether it is made.")
+    active: Switch = Field(True, description="Whether the check is used.")
 
 
 class Violation(NamedTuple):
@@ -33,9 +33,9 @@ class Violation(NamedTuple):
         value: Value that the target would cause, in `unit`; NaN, as `limit`, if there is no number.
         limit: Allowed value, in `unit`.
         unit: The unit of both.
-        is_while_braking: Whether it is not the target itself but the braking from it that is not safe.
-        quantity: The quantity of the subject that value and limit are of; empty if the subject itself is one.
-        words: The same in words and what to do about it, in place of a sentence of the other attributes.
+        is_while_braking: Whether the braking after the target is unsafe, not the target itself.
+        quantity: Quantity of value and limit; empty if the subject is itself a quantity.
+        words: Text with advice, which replaces the sentence made of the other attributes.
     """
 
     check: str
@@ -57,12 +57,12 @@ class Violation(NamedTuple):
 
 
 class MarginViolation(NamedTuple):
-    """Two things that are nearer to each other than their margin.
+    """A pair that is nearer than its margin.
 
     Attributes:
         check: Name of the check.
-        pair: The two, in the check's own terms.
-        subject: The two, for messages.
+        pair: The pair, in the check's own terms.
+        subject: The pair, for messages.
         distance_m: Distance [m].
         margin_m: Smallest allowed distance [m].
         gradient: Change of distance by the motion of each of n joints [m/rad or 1].
@@ -77,14 +77,13 @@ class MarginViolation(NamedTuple):
 
 
 class CheckContext(NamedTuple):
-    """Everything beside the motion by which a target is judged.
+    """Context of a motion for the checks of a target.
 
     Attributes:
         now_s: The present time [s], of a clock that never goes back.
         age_s: Age of the target [s]; 0 if unknown.
-        stamp_step_s: Difference to the stamp of the target before [s]; None without one.
-        since_command_s: Time since the command before [s]; for a target with the stamp of the one before, since that
-            stamp was new.
+        stamp_step_s: Difference from the previous target's stamp [s]; None without one.
+        since_command_s: Time since the previous command [s]; for a repeated stamp, time since that stamp was new.
         measured: Measured positions by joint [rad or m], empty if there are none.
         measured_age_s: Their age [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].
@@ -104,24 +103,25 @@ class CheckContext(NamedTuple):
 
 
 class Check(ABC):
-    """A check of motions. It keeps no state: equal motions have equal answers, whatever was asked before. For
-    trials, only the verdict has to be equal.
+    """A check of motions.
+
+    It is stateless: equal motions have equal answers. For trials, only the verdict has to be equal.
 
     Args:
         config: Its options.
         robot: The robot.
         limits: Limits of its n joints.
-        file: Where the options come from, for messages.
+        file: Source of the options, for messages.
 
     Raises:
-        ConfigError: If the options do not go with the robot.
+        ConfigError: If the options do not fit the robot.
 
     Attributes:
         Config: Model of its options.
         name: Its name in the table and in messages.
-        is_default: Whether it is made without being named in the configuration.
-        watches: Whether it is about the context, not the command, so that it is made also while no target comes.
-        takes_obstacles: Whether it asks what is around the robot, `CheckContext.obstacles`.
+        is_default: Whether it is used by default, without an entry in the configuration.
+        watches: Whether it checks the context, not the command; such checks also run while no target comes.
+        takes_obstacles: Whether it uses `CheckContext.obstacles`.
     """
 
     Config: ClassVar[type[CheckConfig]] = CheckConfig
@@ -141,24 +141,23 @@ class Check(ABC):
         """
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
-        """Returns bounds that keep the robot safe near some configurations on its way to rest; only for the policy
-        `limit`.
+        """Returns linear bounds that keep the robot safe near some configurations of its braking.
 
-        They serve to find a command that passes `check`, and decide nothing. It is called after `check`.
+        Only for the policy `limit`, after `check`. They only guide the search for a command that passes `check`.
 
         Args:
             rows: The configurations, k x n positions [rad or m].
-            spread: Largest deviation of n joints from there; bounds out of their reach may be left out.
+            spread: Largest deviation of n joints from there; bounds beyond it may be left out.
             before: n present positions: violations there may not increase.
         """
         return ()
 
     def inside(self, q: np.ndarray) -> Sequence[MarginViolation]:
-        """Returns what is nearer than its margin in a configuration of n positions; it is called after `check`."""
+        """Returns the margin violations in a configuration of n positions; it is called after `check`."""
         return ()
 
     def require_link(self, link: str, key: str) -> None:
-        """Raises a ConfigError about an option that has a link as a key unless the robot has the link."""
+        """Raises a ConfigError if an option names a link that the robot lacks."""
         try:
             self.robot.check_link(link)
         except UnknownNameError as error:
@@ -167,10 +166,10 @@ class Check(ABC):
     def first_above(
         self, values: np.ndarray, limit: np.ndarray, quantity: str, unit: tuple[str, str]
     ) -> Violation | None:
-        """Returns the first of k x n sizes that is above n limits.
+        """Returns a violation of the first of k x n values that exceeds its limit; None if none does.
 
         Args:
-            values: Sizes, none negative.
+            values: Values, none negative.
             limit: n limits, or k x n.
             quantity: Name of the quantity.
             unit: The unit for a joint that turns, and for one that slides.

@@ -53,7 +53,7 @@ class GuardConfig(ConfigModel):
 
 
 class NodeConfig(ConfigModel):
-    """Options of the guard's node beside those of its decisions."""
+    """Options of the guard's node other than those of its decisions."""
 
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."

@@ -27,7 +27,7 @@ class CheckConformance:
         limits: Limits of the robot's joints.
         urdf: The robot's description.
         period_s: Period of the motions [s].
-        is_about_motion: Whether it judges the motion, else it only judges the context.
+        is_about_motion: Whether it checks the motion; otherwise only the context.
     """
 
     check_name: ClassVar[str]
@@ -37,17 +37,17 @@ class CheckConformance:
     period_s: ClassVar[float] = 0.01
     is_about_motion: ClassVar[bool] = True
 
-    # --- What a subclass has.
+    # --- Cases that a subclass defines
 
     def safe(self) -> tuple[CommandedMotion, CheckContext]:
-        """Returns what is safe."""
+        """Returns a safe motion and its context."""
         raise NotImplementedError
 
     def unsafe(self) -> tuple[CommandedMotion, CheckContext]:
-        """Returns what is not safe."""
+        """Returns an unsafe motion and its context."""
         raise NotImplementedError
 
-    # --- What it may use.
+    # --- Helpers for a subclass
 
     def motion(self, start: State, command: Any) -> CommandedMotion:
         """Returns the motion of a command, without braking."""
@@ -71,11 +71,11 @@ class CheckConformance:
     # --- The tests.
 
     def test_safe_motion_passes(self) -> None:
-        """Refusing everything fails here."""
+        """A check that refuses everything does not pass."""
         assert self.make().check(*self.safe()) is None
 
     def test_unsafe_motion_is_refused_with_value_and_limit(self) -> None:
-        """Letting everything pass fails here."""
+        """A check that accepts everything does not pass."""
         check = self.make()
         violation = check.check(*self.unsafe())
         assert violation is not None
@@ -84,7 +84,7 @@ class CheckConformance:
         assert f"{violation.limit:.6g}" in str(violation)
 
     def test_equal_motions_have_equal_answers_in_any_order(self) -> None:
-        """Also of another check that is made the same way."""
+        """The same holds for another check with the same options."""
         check, other = self.make(), self.make()
         answers = [check.check(*each()) for each in (self.unsafe, self.safe, self.unsafe, self.unsafe, self.safe)]
         assert answers == [answers[0], None, answers[0], answers[0], None]
@@ -92,7 +92,7 @@ class CheckConformance:
         assert other.check(*self.unsafe()) == answers[0]
 
     def test_non_finite_target_is_refused(self) -> None:
-        """Comparisons with it are false, so a check that looks for what is too large would let it pass."""
+        """Comparisons with NaN are false, so a check for values that are too large would accept it."""
         if not self.is_about_motion:
             pytest.skip(f"'{self.check_name}' does not look at the motion")
         motion, context = self.safe()
@@ -100,7 +100,7 @@ class CheckConformance:
         assert self.make().check(nowhere, context) is not None
 
     def test_an_unknown_option_is_named(self) -> None:
-        """A misspelt one would leave a limit away unnoticed."""
+        """A misspelt option would silently remove a limit."""
         robot = self.robot
         limits = MotionLimits.of(robot, LimitsConfig(), "guard.yaml")
         with pytest.raises(ConfigError, match=f"guard.yaml: checks.{self.check_name}.no_such_option"):

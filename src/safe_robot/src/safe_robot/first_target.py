@@ -1,4 +1,4 @@
-"""Where a robot starts from: the first target has to be near, and safe to go to."""
+"""The first target after a start: it has to be near the robot, and safe."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from safe_robot.motion import CommandedMotion, State
 from safe_robot.robot import MAX_OUTSIDE, GuardedRobot
 
 SLOW_S = 1e6
-"""Assumed duration of the motion to the first target [s]; so long that its speed is not judged."""
+"""Assumed duration of the motion to the first target [s]; long enough that its speed is never a violation."""
 
 UNKNOWN = (
     "no measured positions of all guarded joints on joint_states/measured; publish them there, or, where nothing"
@@ -21,21 +21,21 @@ UNKNOWN = (
 
 
 class FirstTarget:
-    """Judges the first target after a start.
+    """Checks the first target after a start.
 
     Args:
         config: Configuration of the guard.
         robot: The robot.
-        checks: The checks that are made.
-        file: Where the configuration comes from, for messages.
+        checks: The checks in use.
+        file: Source of the configuration, for messages.
 
     Raises:
-        ConfigError: If how far links reach hangs on limits that are not checked.
+        ConfigError: If the reach of links depends on limits that are not checked.
     """
 
     def __init__(self, config: GuardConfig, robot: GuardedRobot, checks: Sequence[Check], file: str) -> None:
         if robot.telescopic and not any(check.name == "joint_position" for check in checks):
-            message = f"expected true, since joint '{robot.telescopic[0]}' slides in what others turn, got false"
+            message = f"expected true, since joint '{robot.telescopic[0]}' moves links that others turn, got false"
             raise ConfigError([Problem(file, "checks.joint_position.active", message)])
         self._config, self._robot, self._checks = config, robot, checks
 
@@ -44,7 +44,7 @@ class FirstTarget:
 
         Args:
             target: n positions [rad or m].
-            last: The n positions that were commanded last [rad or m]; None if none were.
+            last: The last n commanded positions [rad or m]; None if there are none.
             context: Everything else that the decision depends on.
         """
         there = self._whereabouts(target, last, context)
@@ -86,7 +86,7 @@ class FirstTarget:
         return "rad" if self._robot.joints[i].is_revolute else "m"
 
     def _far_outside(self, there: np.ndarray) -> Violation | None:
-        """Returns which joint is so far outside its limits that it is not known how far links reach."""
+        """Returns a joint that is so far outside its limits that the reach of links is unknown."""
         for name in self._robot.telescopic:
             i = self._robot.joint_names.index(name)
             joint, position = self._robot.joints[i], float(there[i])

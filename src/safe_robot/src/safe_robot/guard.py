@@ -27,17 +27,17 @@ from .robot import GuardedRobot
 log = logging.getLogger(__name__)
 
 MENDED_BY_BRAKING = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
-"""Checks that braking for a period may satisfy where a smoothed command, whose steps are finite, just fails."""
+"""Checks that a period of braking may satisfy when a smoothed command narrowly fails."""
 
 
 class Decision(NamedTuple):
     """Answer of a guard to a target.
 
     Attributes:
-        command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent,
-            as for a target with the stamp of the one before.
+        command: n positions to be commanded [rad or m]; those of the target if it is safe. None: nothing is sent, as
+            for a repeated stamp.
         violation: Why the target is not safe; None if it is.
-        is_halted: Whether nothing is sent from now on until `Guard.start`.
+        is_halted: Whether nothing is sent until `Guard.start`.
         is_shaped: Whether the target was smoothed.
     """
 
@@ -58,32 +58,32 @@ class _Safe(NamedTuple):
 class Guard:
     """Passes safe targets.
 
-    A target is safe if it and the braking from it pass every check. After every command the robot can therefore be
-    brought to rest within all limits, by a known braking: no state is entered without a safe way to rest.
+    A target is safe if it and the braking from it pass every check. After every command, a known braking can therefore
+    bring the robot to rest within all limits.
 
-    The reference is the command before, never a measurement. Every command counts as one period, whatever its stamp, so
-    that stamps cannot make the robot faster; the sender ensures that no command follows sooner.
+    The reference is the previous command, never a measurement. Every command counts as one period regardless of its
+    stamp, so stamps cannot make the robot faster; the sender ensures that commands are at least a period apart.
 
-    Targets of one stamp are one target: the first one gives a command. Only a new stamp shows that targets continue, so
-    `staleness` applies while the stamp stands still.
+    Targets with the same stamp are one target: only the first one causes a command. Only a new stamp shows that targets
+    continue, so `staleness` applies while the stamp does not change.
 
-    With `shape`, the command on the way to a target that joints cannot follow is checked instead of it.
+    With `shape`, the smoothed command is checked instead of a target that joints cannot follow.
 
     Args:
         config: Configuration of the guard.
         robot: The robot.
-        file: Where the configuration comes from, for messages.
+        file: Source of the configuration, for messages.
 
     Attributes:
         config: Its configuration.
         robot: The robot.
         joint_names: The n joints.
         limits: Their limits.
-        checks: The checks that are made.
+        checks: The checks in use.
         is_halted: Whether nothing is sent until `start`, as at first.
 
     Raises:
-        ConfigError: If the configuration does not go with the robot.
+        ConfigError: If the configuration does not fit the robot.
     """
 
     def __init__(self, config: GuardConfig, robot: GuardedRobot, file: str = "~") -> None:
@@ -126,17 +126,17 @@ class Guard:
 
     @property
     def stop_commands(self) -> np.ndarray:
-        """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
+        """The commands of the braking that was found safe, k x n [rad or m]."""
         return self._stop.position.copy()
 
     def way_out(self) -> EscapeDirection | None:
-        """Returns how the robot, where it was commanded to last, leaves the margins that it is in; None if in none."""
+        """Returns the motion that leaves the violated margins at the last command; None if no margin is violated."""
         if self._state is None or self._is_first:
             return None
         return find_escape(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
-        """Lets targets pass again; the first one has to be near where the robot is.
+        """Passes targets again; the first one has to be near the robot.
 
         Raises:
             RuntimeError: If the robot still brakes.
@@ -146,7 +146,7 @@ class Guard:
         self.is_halted, self._is_late, self._is_first = False, False, True
 
     def halt(self) -> None:
-        """Lets no target pass any more; with `on_halt: brake` the robot is to be braked by `next_braking`."""
+        """Passes no further targets; with `on_halt: brake`, `next_braking` has the commands that brake the robot."""
         self.is_halted = True
         if self.config.on_halt == "nothing":
             self._take_as_at_rest()
@@ -161,7 +161,7 @@ class Guard:
             self._take_as_at_rest()
 
     def rest(self) -> None:
-        """Halts without braking: the robot is taken to stand where it was commanded to last."""
+        """Halts without braking: the robot is assumed to rest at the last command."""
         self.is_halted = True
         self._take_as_at_rest()
 
@@ -187,14 +187,14 @@ class Guard:
         try:
             decision = self._decision_for(tuple(target), context)
         except BaseException:
-            self.halt()  # fails closed: who cannot judge does not let pass
+            self.halt()  # fails closed: without a verdict, the target is refused
             raise
         if decision.is_halted:
             self.halt()
         return decision
 
     def refuse(self, reason: str) -> Decision:
-        """Returns what to command in place of a target that cannot even be judged, and why it cannot."""
+        """Returns the command in place of a target that cannot be checked, with the reason."""
         if self.is_halted:
             return Decision(None, None, True)
         decision = self._brake_or_halt(Violation("input", reason, math.nan, math.nan, ""))
@@ -203,7 +203,8 @@ class Guard:
         return decision
 
     def check_watchdogs(self, context: CheckContext) -> Violation | None:
-        """Returns what is wrong between targets; if anything is, it halts, or for late targets waits for the next."""
+        """Returns a violation found between targets, after which the guard halts or, for late targets, waits for the
+        next."""
         if self.is_halted or self._is_first or self._state is None:
             return None
         try:
@@ -227,13 +228,13 @@ class Guard:
             return self._brake_or_halt(violation)
         is_first = self._is_first
         if is_first and (violation := self._start_at(target, context)):
-            return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
+            return Decision(None, violation, math.isfinite(violation.value))  # unknown values are waited for
         assert self._state is not None
         if context.stamp_step_s == 0.0 and not is_first:
             repeated = self._watchdog_violation(context)
             return Decision(None) if repeated is None else self._brake_or_halt(repeated)
         wanted = target
-        if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
+        if self._shaper is not None:  # controllers assume rest at the first command, so it is the present position
             wanted = (
                 tuple(self._state.position.tolist())
                 if is_first
@@ -251,7 +252,7 @@ class Guard:
         return Decision(self._commit(found), is_shaped=wanted != target)
 
     def _passes(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
-        """Returns which joint goes past its target though the target stands still; only for the policy `limit`."""
+        """Returns a joint that passes its target although the target does not move; only for the policy `limit`."""
         if self.config.policy == "reject" or before is None or not len(safe.stop.position):
             return None
         assert self._state is not None
@@ -265,7 +266,7 @@ class Guard:
 
     @property
     def _way_to_rest(self) -> np.ndarray:
-        """The commands of the braking that is known to be safe, k x n; one at least."""
+        """The commands of the braking that was found safe, k x n, k >= 1."""
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
 
@@ -291,7 +292,7 @@ class Guard:
         return None
 
     def _start_at(self, target: tuple[float, ...], context: CheckContext) -> Violation | None:
-        """Puts the guard where the robot starts, if the first target allows it."""
+        """Sets the guard's state to the start of the robot, if the first target is accepted."""
         last = None if self._state is None else self._state.position
         found = self._first_target.judged(np.array(target), last, context)
         if isinstance(found, Violation):
@@ -317,7 +318,7 @@ class Guard:
         return _Safe(tuple(command), state, motion.braking_commands)
 
     def _brake(self, state: State) -> Brake | None:
-        """Returns how joints come to rest after a command; those that were braking, and go on so, as before."""
+        """Returns the braking after a command; joints that continue their present braking keep it."""
         goes_on = np.zeros(len(state.position), dtype=bool)
         if len(self._stop.position):
             goes_on = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
@@ -340,9 +341,9 @@ class Guard:
         return safe.command
 
     def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
-        """Returns the nearest safe command that is found, or the next one of the braking that is known to be safe."""
+        """Returns the nearest safe command, or the next command of the braking that was found safe."""
         assert self._state is not None
-        if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
+        if self.config.policy == "reject" or violation.check in self._watches:  # no other command can satisfy these
             return self._brake_or_halt(violation)
         safe = self._nearest.find(
             np.array(target),

@@ -29,7 +29,7 @@ BY_JOINT = {
 AXES = {f"{prefix}_{axis}lim": axis for prefix in ("box", "link") for axis in "xyz"}
 LINKS = ("links", "safe_links")
 UNUSED = ("exotica_xml_filename", "stop_after_first_fail", "debug")
-"""Keys that the release needed, and that this guard ignores."""
+"""Keys of the authors' release that this guard ignores."""
 KEYS = (
     "checker", "joint_name_order", "safe_distance", *SWITCHES, *FACTORS, *BY_JOINT, *AXES, *LINKS, *UNUSED,
 )  # fmt: skip
@@ -39,9 +39,9 @@ def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> d
     """Returns the keys of `GuardConfig` equivalent to parameters of the release.
 
     Args:
-        given: The parameters; others than those of the release are left as they are.
+        given: The parameters; parameters that the release lacks are passed on unchanged.
         joint_names: The joints of the robot, in the order of lists of numbers, unless `joint_name_order` names others.
-        file: Where they come from, for messages.
+        file: Source of the parameters, for messages.
 
     Raises:
         ConfigError: If one is not as the release has it.
@@ -87,7 +87,7 @@ def _words(value: Any, key: str, file: str) -> list[str]:
 
 
 def _numbers(value: Any, count: int, key: str, file: str) -> list[float]:
-    """Returns the numbers of a text, or a list, or of one number."""
+    """Returns the numbers in a text, a list, or a single number."""
     try:
         numbers = [float(word) for word in (str(value).split() if not isinstance(value, list) else value)]
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Makes the checks of a guard from its configuration."""
+"""Creates the checks of a guard from its configuration."""
 
 from collections.abc import Mapping
 from typing import Any

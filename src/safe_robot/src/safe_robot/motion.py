@@ -13,7 +13,7 @@ WAYPOINT_SPACING = 0.15
 
 
 class State(NamedTuple):
-    """Where n joints were commanded to last, and how they moved there: backward differences of the commands.
+    """Last command to n joints, with its backward differences.
 
     Attributes:
         position: n [rad or m].
@@ -27,7 +27,7 @@ class State(NamedTuple):
 
     @classmethod
     def at_rest(cls, position: np.ndarray) -> "State":
-        """Returns the state of a robot that stands."""
+        """Returns the state of a robot at rest."""
         return cls(position, np.zeros_like(position), np.zeros_like(position))
 
     @property
@@ -62,7 +62,7 @@ class CommandedMotion:
         robot: The robot.
         period_s: The period [s].
         start: The state before the command.
-        is_trial: Whether only the verdict counts, so that any violation may be reported.
+        is_trial: Whether only the verdict matters, so any violation may be reported.
         position: k x n [rad or m].
         velocity: k x n [rad/s or m/s].
         acceleration: k x n [rad/s^2 or m/s^2].
@@ -109,7 +109,7 @@ class CommandedMotion:
 
     @cached_property
     def waypoints(self) -> np.ndarray:
-        """Rows not far from each other, the first one and the last one among them."""
+        """Rows close enough to each other, including the first and the last."""
         travelled = self.travelled.sum(axis=1)
         marks = np.arange(WAYPOINT_SPACING, travelled[-1], WAYPOINT_SPACING)
         rows = np.searchsorted(travelled, marks).tolist()
@@ -117,7 +117,7 @@ class CommandedMotion:
 
     @cached_property
     def waypoint_frames(self) -> np.ndarray:
-        """Where links are at the waypoints, see `LinkFrames`."""
+        """Frames of links at the waypoints, see `LinkFrames`."""
         return self.robot.frames.at(self.position[self.waypoints])
 
     @property
@@ -127,7 +127,7 @@ class CommandedMotion:
         return path
 
     def link_positions(self, link: str) -> np.ndarray:
-        """Returns where the origin of a link is in the robot's root, in the command before and the k rows [m]."""
+        """Returns the positions of a link's origin in the robot's root, at the previous command and the k rows [m]."""
         if link not in self._link_positions:
             self._link_positions[link] = self.robot.frames.positions(self.with_start, link)
         return self._link_positions[link]

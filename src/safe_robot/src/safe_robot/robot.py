@@ -13,13 +13,13 @@ MAX_OUTSIDE = 0.1
 
 
 class GuardedRobot(RobotModel):
-    """A robot whose driven joints are those that are guarded, in the order in which they are checked.
+    """A robot whose driven joints are the guarded ones, in the order in which they are checked.
 
-    Joints that are not guarded stand at 0, or at the limit that is nearest to it; those that mimic others follow.
+    Other joints are at 0, or at the limit nearest to 0; mimic joints follow.
 
     Attributes:
-        telescopic: Names of the guarded joints along which a link slides that other joints turn.
-        still: Names of the joints that do not move, which joint states may have too.
+        telescopic: Names of the guarded prismatic joints that move links which other joints turn.
+        still: Names of the joints that do not move; joint states may include them.
     """
 
     def __init__(self, urdf_path: str, joint_names: Sequence[str] = ()) -> None:
@@ -38,7 +38,7 @@ class GuardedRobot(RobotModel):
         Args:
             link: The link.
             radius_m: Distance of the farthest point of its shape from its origin [m].
-            other: The other link, by default the root; joints above both do not move one in the other.
+            other: The other link, by default the root; joints above both have no effect.
 
         Raises:
             ConfigError: If a distance has no limit.
@@ -49,14 +49,14 @@ class GuardedRobot(RobotModel):
             if joint.name in still:
                 break
             if joint.is_moving:
-                moved = self._factors[joint.name].nonzero()  # others are not, even if the rest has no limits
+                moved = self._factors[joint.name].nonzero()  # the others are not needed, even if they have no limits
                 reach[moved] += self._factors[joint.name][moved] * (beyond if joint.is_revolute else 1.0)
             beyond += math.hypot(*joint.xyz)
             if joint.is_moving and not joint.is_revolute:
                 beyond += self._travel(joint.name)
         if not np.isfinite(reach).all():
             name = self.joint_names[int(np.argmin(np.isfinite(reach)))]
-            message = f"expected limits for what slides between joint '{name}', which turns it, and link '{link}'"
+            message = f"expected limits for prismatic joints between joint '{name}' and link '{link}'"
             raise ConfigError([Problem(self.urdf_path, "", message)])
         return reach
 

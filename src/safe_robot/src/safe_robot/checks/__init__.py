@@ -1,4 +1,4 @@
-"""The checks; a new one is a class in a file of its own and a line here."""
+"""The checks; to add one, write a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 from safe_robot.check import Check

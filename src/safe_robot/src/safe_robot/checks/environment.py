@@ -22,7 +22,9 @@ class EnvironmentConfig(CheckConfig):
     """Least distances between links and bodies of the environment."""
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
-    timeout_s: Seconds = Field(0.5, description="Oldest place of a live body; while one is older, no target is safe.")
+    timeout_s: Seconds = Field(
+        0.5, description="Largest age of a live body's pose; with an older one, no target is safe."
+    )
     geometry: Geometry = Field("hulls", description=GEOMETRY)
     world: Text | None = Field(
         None, description="Main YAML file of a world: its bodies as they are at the start; without it, live ones."
@@ -35,8 +37,8 @@ class EnvironmentConfig(CheckConfig):
 class Environment(ProximityCheck):
     """Links keep away from bodies of the environment, also while the robot brakes.
 
-    Bodies are those of a world file and, with a source of them, live ones. A body that comes nearer than the
-    margin by itself leaves the robot only ways that do not bring it nearer still.
+    Bodies are those of a world file and, with a source of them, live ones. If a body comes nearer than the margin by
+    itself, the robot may only move such that the distance does not decrease.
     """
 
     Config = EnvironmentConfig
@@ -81,7 +83,7 @@ class Environment(ProximityCheck):
 
     def _update_poses(self, live: tuple[Obstacle, ...]) -> None:
         """Updates the poses of obstacles that have moved."""
-        self._live = None  # until all are there
+        self._live = None  # until all poses are updated
         count = len(self._obstacles)
         obstacles = (*self._still, *live)
         for obstacle in live:

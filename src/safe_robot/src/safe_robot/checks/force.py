@@ -18,7 +18,7 @@ class ForceConfig(CheckConfig):
 
 
 class Force(Check):
-    """A sensor feels no more force and torque than it may, and its measurement is not old."""
+    """Force and torque of a sensor are within their limits, and the measurement is recent."""
 
     Config = ForceConfig
     name = "force"

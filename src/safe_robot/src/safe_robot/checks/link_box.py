@@ -13,9 +13,9 @@ from safe_robot.motion import Bound, CommandedMotion
 from safe_robot.robot import GuardedRobot
 
 STEP = 1e-6
-"""Step of the joints by which the motion of a link is tried [rad or m]."""
+"""Step of the joints for numerical derivatives of a link's motion [rad or m]."""
 SPARE_M = 1e-4
-"""Distance from the faces of its box that a link keeps where a command is chosen [m]."""
+"""Safety distance from the faces of the box when a command is searched [m]."""
 
 
 class BoxConfig(ConfigModel):
@@ -63,7 +63,7 @@ class LinkBox(Check):
     def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._boxes: dict[str, Box] = {}
-        self._room: dict[str, tuple[np.ndarray, float]] = {}  # in some configuration a link had so much of it
+        self._room: dict[str, tuple[np.ndarray, float]] = {}  # largest value over random configurations
         for link, box in config.boxes.items():
             self.require_link(link, "boxes")
             low = [-math.inf if axis[0] is None else axis[0] for axis in (box.x, box.y, box.z)]
@@ -75,7 +75,7 @@ class LinkBox(Check):
         for link, (low, high, reach) in self._boxes.items():
             if link in self._room:
                 place, room = self._room[link]
-                if (np.abs(motion.with_start - place) @ reach).max() < room:  # it cannot get out
+                if (np.abs(motion.with_start - place) @ reach).max() < room:  # the link cannot leave its box
                     continue
             position = motion.link_positions(link)
             self._room[link] = motion.start.position, float(np.minimum(position[0] - low, high - position[0]).min())

@@ -19,14 +19,14 @@ class LinkVelocityConfig(CheckConfig):
 
 
 class LinkVelocity(Check):
-    """The origins of links are not faster than they may be, also while all joints brake."""
+    """The origins of links keep their speed limits, also while all joints brake."""
 
     Config = LinkVelocityConfig
     name = "link_velocity"
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self._reach: dict[str, np.ndarray] = {}  # how far, at most, each joint moves a link, for 1 rad or m each
+        self._reach: dict[str, np.ndarray] = {}  # largest motion of a link by each joint, for 1 rad or m
         for link in config.links:
             self.require_link(link, "links")
             self._reach[link] = robot.reach(link, 0.0)
@@ -34,7 +34,7 @@ class LinkVelocity(Check):
     def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         for link, limit in self.config.links.items():
-            if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # no joints could make it faster
+            if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # a bound for all joints together
                 continue
             position = motion.link_positions(link)
             step = position[1:] - position[:-1]

@@ -1,4 +1,4 @@
-"""Which things come too near to each other while a robot moves."""
+"""Pairs that come too near to each other while a robot moves."""
 
 import math
 from abc import abstractmethod
@@ -13,15 +13,15 @@ from safe_robot.geometry.separation import Separation
 from safe_robot.motion import Bound, CommandedMotion
 
 LEAST_SPACING_M = 0.01
-"""The braking is tried no more densely than this [m], however small the margin is."""
+"""Smallest sampling distance of the braking [m], for small margins."""
 ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
 SPARE_M = 3e-4
-"""Distance kept beyond the margin where a command is chosen [m], since distances count as linear there."""
+"""Safety distance beyond the margin when a command is searched [m], since distances are linearised there."""
 LOOSE_M = 0.003
-"""A bound that is that much below the distance is made anew [m]."""
+"""A bound that is this much below the distance is renewed [m]."""
 FAR_M = 10.0
-"""Distances are not looked at beyond this [m]."""
+"""Largest distance that is measured [m]."""
 
 
 class TooNear(NamedTuple):
@@ -39,13 +39,13 @@ class TooNear(NamedTuple):
 
 
 class Proximity:
-    """Finds out which pairs come nearer than a margin, and nearer than they were.
+    """Finds pairs that come nearer than a margin, and nearer than before.
 
-    Most pairs are so far apart that how far joints may move them is enough, or a plane between them. Only those that
-    are left are measured.
+    For most pairs, a bound by the joints' motion or a separating plane is sufficient. Only the other pairs are
+    measured.
 
     Args:
-        distances: Where shapes are.
+        distances: Distances between shapes.
         pairs: The pairs.
         margin_m: The margin [m].
     """
@@ -60,7 +60,7 @@ class Proximity:
         self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
 
     def forget(self, indices: Sequence[int]) -> None:
-        """Looks at some pairs anew, since what moved are not the joints."""
+        """Discards bounds of some pairs, after a motion that was not one of the joints."""
         self._known_m[:, list(indices)] = -np.inf
         for i in indices:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
@@ -68,8 +68,8 @@ class Proximity:
     def first(self, motion: CommandedMotion) -> TooNear | None:
         """Returns a pair that comes too near in a motion; None if none does in any row.
 
-        A pair that is d and e away at two rows, between which it moves by m, is (d + e - m) / 2 away between them.
-        Where that is not enough, every row is judged.
+        If the distance of a pair is d and e at two rows, and it moves by m in between, its distance between them is at
+        least (d + e - m) / 2. If that bound is not sufficient, every row is checked.
         """
         if not len(self._pairs):
             return None
@@ -99,8 +99,8 @@ class Proximity:
     def _judged(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
         """Returns one of s pairs that comes too near in some of k rows of a motion; None if none does in any of them.
 
-        Rows far from each other are judged first: a motion that is not safe shows there soonest, and what is found
-        there is enough for most rows between them.
+        Rows far from each other are checked first: they reveal an unsafe motion soonest, and their distances bound
+        those of most rows in between.
 
         Args:
             motion: The motion.
@@ -125,7 +125,7 @@ class Proximity:
         ways: np.ndarray,
         spare: np.ndarray,
     ) -> TooNear | None:
-        """Returns one of s pairs that comes too near in some chosen ones of k rows, by measuring if need be.
+        """Returns one of s pairs that comes too near in some of k rows, measured if necessary.
 
         In a trial, the row with the smallest bound is measured next, since it is most likely too near. Otherwise rows
         are measured in order, so that equal motions have equal answers.
@@ -136,7 +136,8 @@ class Proximity:
             rows: Numbers of the k rows.
             chosen: Indices of the rows to judge.
             ways: Distance that each pair has moved by each row, k x s [m].
-            spare: Lower bounds of distances less the margin, k x s [m], which are raised; inf where the pair may be.
+            spare: Lower bounds of distances less the margin, k x s [m], updated in place; inf where the pair is allowed
+                to be near.
         """
         least_m = self._margin_m + ROUNDING_M
         frames = self._distances.frames(motion.position[rows[chosen]])
@@ -161,7 +162,7 @@ class Proximity:
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
-        """Returns lower bounds of the distances [m] by what is known at both ends of a motion, ... x 2 x pairs.
+        """Returns lower bounds of the distances [m] from the data at both ends of a motion, ... x 2 x pairs.
 
         Args:
             q: Positions of the n joints, ... x 2 x 1 x n; or ... x 1 x 1 x n for both.
@@ -170,7 +171,7 @@ class Proximity:
         return known
 
     def _sparse(self, travelled: np.ndarray) -> np.ndarray:
-        """Returns some of k rows in order, the first and the last among them, a spacing apart."""
+        """Returns some of k rows in order, a spacing apart, including the first and the last."""
         spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
         marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
         between = np.searchsorted(travelled, marks, side="right").tolist()
@@ -180,7 +181,8 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns a pair if its contact is too near and nearer than at the start; the robot has to stand at the row."""
+        """Returns a pair if its contact is too near and nearer than at the start; the robot must be placed at the
+        row."""
         if contact is None or contact.distance >= self._margin_m:
             return None
         self._distances.place(motion.start.position)
@@ -192,7 +194,7 @@ class Proximity:
         return TooNear(self._pairs[i], contact.distance, row > 0)
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """Returns what keeps pairs apart near some configurations, see `Check.bounds`."""
+        """Returns bounds that keep pairs apart near some configurations, see `Check.bounds`."""
         if not len(self._pairs):
             return []
         within_m = self._margin_m + SPARE_M + self._reach @ spread
@@ -225,7 +227,7 @@ class Proximity:
         return bounds
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
-        """Yields the pairs that are nearer than a distance in a configuration of n positions, and where they are."""
+        """Yields the pairs that are nearer than a distance in a configuration of n positions, with their contacts."""
         self._distances.place(q)
         for pair in self._pairs:
             contact = self._distances.contact(pair, within_m, within_m)
@@ -237,7 +239,7 @@ class ProximityCheck(Check):
     """Base of the checks that keep pairs further apart than the margin of their configuration.
 
     Attributes:
-        distances: Where shapes are.
+        distances: Distances between shapes.
         proximity: The pairs.
     """
 
@@ -265,10 +267,10 @@ class ProximityCheck(Check):
 
     @abstractmethod
     def subject(self, pair: Pair) -> str:
-        """Returns a pair in words."""
+        """Returns a description of a pair."""
 
     def undefined(self, motion: CommandedMotion) -> Violation | None:
-        """Returns a violation by a motion with numbers that are not finite, near which PyBullet would find nothing."""
+        """Returns a violation for a motion with non-finite numbers, for which PyBullet would find no contact."""
         if np.isfinite(motion.position).all():
             return None
         return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
@@ -283,7 +285,8 @@ class ProximityCheck(Check):
 
 
 def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
-    """Raises lower bounds in k rows by those in some of them: between two rows a pair moves by no more than its way.
+    """Raises lower bounds in k rows from those in some of them: between two rows, a distance changes at most by the
+    pair's motion.
 
     Args:
         bounds: k x s [m]; inf of a row bounds no other one.

@@ -22,9 +22,9 @@ from safe_robot.robot import GuardedRobot
 from .proximity import Proximity, ProximityCheck
 
 SAMPLES = 200
-"""Random configurations in which pairs are tried that may always be near."""
+"""Number of random configurations that are used to find pairs that are always near."""
 ALWAYS = 0.95
-"""Pairs that are too near in this share of them are left out: they are built so."""
+"""Pairs that are too near in this share of configurations are left out, since they are near by construction."""
 
 
 class SelfCollisionConfig(CheckConfig):
@@ -34,7 +34,7 @@ class SelfCollisionConfig(CheckConfig):
     geometry: Geometry = Field("hulls", description=GEOMETRY)
     srdf: Text | None = Field(None, description="A SRDF; pairs for which it disables collisions are left out.")
     pairs_file: Text | None = Field(
-        None, description="YAML of the pairs; it is written if it is not there, and read if it is."
+        None, description="YAML file of the pairs; it is read if it exists, and written otherwise."
     )
 
 
@@ -116,8 +116,8 @@ class SelfCollision(ProximityCheck):
 def pairs_that_may_meet(robot: GuardedRobot, distances: LinkDistances, margin_m: float) -> list[tuple[str, str]]:
     """Returns the pairs of links that may come nearer than a margin [m].
 
-    Those that a joint ties, or several fixed ones, are left out, and those that nearly always are nearer than the
-    margin, as in a compact wrist. It goes by random configurations, the same every time.
+    Pairs connected by a joint, or by several fixed ones, are left out, and so are pairs that are nearly always nearer
+    than the margin, as in a compact wrist. Random configurations, always the same, decide this.
     """
     groups = {link: _group(robot, link) for link in distances.links}
     parents = {joint.child: _group(robot, joint.parent) for joint in robot.document.joints.values() if joint.is_moving}
@@ -137,7 +137,7 @@ def pairs_that_may_meet(robot: GuardedRobot, distances: LinkDistances, margin_m:
 
 
 def _group(robot: GuardedRobot, link: str) -> str:
-    """Returns the first of the links that fixed joints tie to a link."""
+    """Returns the first of the links that fixed joints connect to a link."""
     for joint in reversed(robot.chain(link)):
         if joint.is_moving:
             return joint.child

@@ -1,4 +1,4 @@
-"""Targets that come too late, or whose time jumps."""
+"""Targets that come too late, or whose stamps jump."""
 
 from pydantic import Field
 
@@ -14,7 +14,7 @@ class StalenessConfig(CheckConfig):
 
 
 class Staleness(Check):
-    """Targets are fresh, in order, and do not fail to come while the robot moves."""
+    """Targets are recent, in order, and keep coming while the robot moves."""
 
     Config = StalenessConfig
     name = "staleness"

@@ -13,13 +13,13 @@ class TrackingConfig(CheckConfig):
 
     tolerance: Positive = Field(0.1, description="Largest distance between command and measured position [rad or m].")
     lag_s: NonNegative = Field(
-        0.0, description="Lag of the robot behind commands [s]; by that time its speed adds to the tolerance."
+        0.0, description="Lag of the robot behind commands [s]; speed times this lag is added to the tolerance."
     )
     timeout_s: Seconds = Field(0.1, description="Oldest measured positions.")
 
 
 class Tracking(Check):
-    """Measured positions are near the last command, but for what the robot is late, and not old."""
+    """Measured positions are recent and near the last command, apart from the robot's lag."""
 
     Config = TrackingConfig
     name = "tracking"

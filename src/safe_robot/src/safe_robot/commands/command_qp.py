@@ -1,4 +1,4 @@
-"""The command nearest to one that is wanted that keeps out of what is in the way: a quadratic program, by DAQP."""
+"""The command nearest to a desired one that satisfies bounds of checks: a quadratic program, solved by DAQP."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -9,9 +9,9 @@ from safe_robot.braking import Braking
 from safe_robot.motion import Bound, State
 
 MOMENTS = 5
-"""Number of moments on the way to rest at which bounds are kept."""
+"""Number of instants during braking at which bounds are kept."""
 TINY = 1e-12
-"""A bound that changes by less within what is possible [m] does not hinder the solver."""
+"""A bound that changes by less than this within the range of commands is ignored [m]."""
 
 
 def can_keep_bounds() -> bool:
@@ -20,7 +20,7 @@ def can_keep_bounds() -> bool:
 
 
 class StoppingTrajectory:
-    """Positions of n joints at some moments while they come to rest after a command, linear in the command near it.
+    """Positions of n joints at some instants of braking after a command, linearised about the command.
 
     Args:
         command: n positions [rad or m].
@@ -28,8 +28,8 @@ class StoppingTrajectory:
         period_s: The period [s].
 
     Attributes:
-        slope: Derivative of each moment by the command, MOMENTS x n; the first is that of the command, the last the
-            end.
+        slope: Derivative of the positions at each instant by the command, MOMENTS x n; the first instant is the
+            command, the last is rest.
     """
 
     def __init__(self, command: np.ndarray, state: State, braking: Braking, period_s: float) -> None:
@@ -41,19 +41,19 @@ class StoppingTrajectory:
         self._start = state.position
 
     def of(self, command: np.ndarray) -> np.ndarray:
-        """Returns where they are after a command, MOMENTS x n."""
+        """Returns the positions after a command, MOMENTS x n."""
         return self._offset + self.slope * (command - self._start)
 
 
 class CommandQP:
-    """The command nearest to one that is wanted, between two others, with which bounds are kept until the robot rests.
+    """The command nearest to a desired one, between two others, that satisfies bounds until the robot rests.
 
-    Bounds are linear, while their constraints seldom are. Where a command turns out to be unsafe, further bounds are
-    therefore added that hold there, and the next command is better.
+    Bounds are linearised constraints. If a command turns out to be unsafe, bounds that are linearised there are added,
+    and the next command is better.
 
     Args:
         wanted: n positions [rad or m].
-        other: n positions, at the other end of what is possible.
+        other: n positions, at the other end of the range of commands.
     """
 
     def __init__(self, wanted: np.ndarray, other: np.ndarray) -> None:
@@ -63,7 +63,7 @@ class CommandQP:
         self._rooms: list[float] = []
 
     def add(self, bounds: Sequence[Bound], at: np.ndarray, stop: StoppingTrajectory) -> None:
-        """Adds bounds that are true near k x n positions, at the last k moments of the way to rest."""
+        """Adds bounds that hold near k x n positions, at the last k instants of braking."""
         slope, way = stop.slope[-len(at) :], stop.of(self._wanted)[-len(at) :] - at
         for row, gradient, room in bounds:
             self._rows.append(gradient * slope[row])

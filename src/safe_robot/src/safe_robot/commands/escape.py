@@ -1,4 +1,4 @@
-"""The motion by which a robot leaves margins: it moves all things that are too near apart at once."""
+"""The motion by which a robot leaves margins: it separates all pairs that are too near at once."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -11,9 +11,9 @@ from safe_robot.geometry.distances import Pair
 from safe_robot.limits import MotionLimits
 
 STEP = 1e-3
-"""A motion counts if things are further apart when the joint that moves most has moved so much [rad or m]."""
+"""Test step: a motion counts if pairs are further apart after the fastest joint has moved this far [rad or m]."""
 MIN_SPEED_SHARE = 0.05
-"""A motion counts if each pair goes apart by at least this share of how fast it can go apart by itself."""
+"""A motion counts if it separates each pair at least at this share of the fastest separation of that pair alone."""
 MIN_GAIN_SHARE = 0.1
 """Least share of its expected gain that a motion has to reach."""
 TRIES = 12
@@ -22,7 +22,7 @@ MIN_GRADIENT = 1e-4
 
 
 class EscapeDirection(NamedTuple):
-    """Things that a robot is too near to, and the motion that leads away from them.
+    """Violations of margins, and the motion that leaves them.
 
     Attributes:
         inside: Violations of margins; if it is locked, also those that a motion would cause.
@@ -34,17 +34,17 @@ class EscapeDirection(NamedTuple):
 
     @property
     def is_locked(self) -> bool:
-        """Whether no motion, or hardly any, separates one pair without moving another one closer."""
+        """Whether no motion separates all pairs at once."""
         return self.direction is None
 
     def words(self, joint_names: Sequence[str]) -> str:
-        """Returns it in a sentence."""
+        """Returns a sentence that describes it."""
         each = ", ".join(
             f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)"
             for one in self.inside
         )
         if self.direction is None:
-            return f"locked inside the margin of {each}: no motion takes all of them further apart"
+            return f"locked inside the margin of {each}: no motion separates all of them"
         way = ", ".join(
             f"{name} {speed:+.2f}" for name, speed in zip(joint_names, self.direction) if abs(speed) > 0.005
         )
@@ -54,17 +54,17 @@ class EscapeDirection(NamedTuple):
 def find_escape(
     q: np.ndarray, limits: MotionLimits, inside: Callable[[np.ndarray], Sequence[MarginViolation]]
 ) -> EscapeDirection | None:
-    """Returns how n joints leave the margins that they are in; None if they are in none.
+    """Returns the motion of n joints that leaves violated margins; None if no margin is violated.
 
     It is a linear program: the largest t with `gradient @ direction >= t |gradient|` for all pairs, no joint faster
     than 1, none further out of its limits. If t is at most `MIN_SPEED_SHARE` there is no direction. Distances have
-    kinks, for instance where another corner becomes the nearest. The motion is therefore tried, and each pair that
-    comes nearer on it is one more row.
+    kinks, for instance where another corner becomes the nearest. The motion is therefore tested, and each pair that
+    comes nearer is added as a row.
 
     Args:
         q: n positions.
         limits: Limits of the joints.
-        inside: Returns what is too near in a configuration.
+        inside: Returns the margin violations of a configuration.
     """
     now = inside(q)
     if not now:

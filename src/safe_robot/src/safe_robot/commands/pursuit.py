@@ -1,4 +1,4 @@
-"""Motion of joints towards a target as fast as their limits allow, with a stop there."""
+"""Motion of joints towards a target as fast as their limits allow, stopping there."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ class Pursuit(NamedTuple):
     """Range of the commands that n joints can follow in the next period.
 
     Attributes:
-        wanted: n positions that come nearest to the targets [rad or m].
+        wanted: n reachable positions nearest to the targets [rad or m].
         slowest: n positions at the other end, for most a braking [rad or m].
     """
 
@@ -37,11 +37,10 @@ def pursue(
 ) -> Pursuit:
     """Returns the command nearest to n targets, a period later, without any joint having to pass its target.
 
-    It keeps the limits of joints; whether the command is safe is for checks to say. What comes nearest to n
-    accelerations [rad/s^2 or m/s^2], if they are given, takes the place of what comes nearest to the targets.
-
-    The shortest braking from a new state may be longer than what is left of the one before, and go past a target that
-    the latter stays before. Such joints go on with the latter.
+    It keeps the limits of joints; checks decide whether the command is safe. If n accelerations [rad/s^2 or m/s^2] are
+    given, it returns the command nearest to these instead. The shortest braking from a new state may be longer than the
+    rest of the present braking, and pass a target that the present one does not pass. Such joints continue the present
+    braking.
 
     Args:
         target: n positions [rad or m].

@@ -16,15 +16,15 @@ from .pursuit import pursue
 Safe = TypeVar("Safe")
 
 SHARES = (0.5, 0.2)
-"""Shares of the way from braking to the wanted command that are tried."""
+"""Shares of the step from braking to the desired command that are tried."""
 DETOURS = 3
-"""Number of times that missed bounds are added and another command is tried."""
+"""Number of times that violated bounds are added and another command is tried."""
 OVER, OVER_M = 0.5, 1e-8
-"""Where a bound was not kept, it is asked for more: by this share of what is missing, and by so much."""
+"""Tightening of a violated bound: a share of the violation, and a constant."""
 
 
 class SafeCommandSearch:
-    """Finds safe commands to n joints that come near a target.
+    """Finds safe commands to n joints near a target.
 
     Args:
         limits: Limits of the joints.
@@ -45,15 +45,15 @@ class SafeCommandSearch:
         stop: np.ndarray,
         judged: Callable[[np.ndarray, Sequence[Check]], Safe | Violation],
     ) -> Safe | None:
-        """Returns the first command that is safe of those near to what the joints alone can do; None if none is.
+        """Returns the first safe command among those near the desired one; None if there is none.
 
-        The check that refused what was tried last is asked first, since it likely refuses again.
+        The check that refused the last candidate is asked first, since it likely refuses again.
 
         Args:
             target: n positions.
-            state: Where the robot is.
-            stop: The commands that bring it to rest from there, as they were found safe, k x n; one at least.
-            judged: Judges n positions by checks in an order.
+            state: Present state of the robot.
+            stop: The commands of the braking from there that was found safe, k x n, k >= 1.
+            judged: Evaluates n positions by checks in a given order.
         """
         for command in self._commands(target, state, stop):
             found = judged(command, sorted(self._checks, key=lambda check: check.name != self._suspect))
@@ -63,7 +63,7 @@ class SafeCommandSearch:
         return None
 
     def _commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields what is worth judging, the best first; each one because the last was not safe."""
+        """Yields candidate commands, the best first; each one after the last was not safe."""
         best, slowest = pursue(target, state, self._limits, self._braking, self._period_s, stop)
         for wanted in self._detours(best, slowest, state, stop) if self._keeps_bounds else [best]:
             best = wanted
@@ -72,7 +72,7 @@ class SafeCommandSearch:
             yield stop[0] + share * (best - stop[0])
 
     def _detours(self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields the command nearest to one that is wanted with which bounds are kept, and each time a better one."""
+        """Yields the command nearest to the desired one that satisfies the bounds, then improved ones."""
         there, after = stop[-1:], StoppingTrajectory(wanted, state, self._braking, self._period_s)
         spread = np.abs(after.of(wanted)[-1] - there[0])
         end = after.of(slowest)[-1]
@@ -89,7 +89,7 @@ class SafeCommandSearch:
                 yield found
 
     def _add_missed(self, detour: CommandQP, command: np.ndarray, state: State) -> bool:
-        """Adds the bounds that are not kept on the way to rest after a command; returns whether there are any."""
+        """Adds the bounds that are violated during braking after a command; returns whether there are any."""
         stop = StoppingTrajectory(command, state, self._braking, self._period_s)
         at = stop.of(command)
         missed = [bound for bound in self._bounds(at, np.zeros_like(command), state) if bound.room < 0.0]

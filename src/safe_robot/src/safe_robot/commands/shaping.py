@@ -1,4 +1,4 @@
-"""Rough targets become a motion within the limits of joints, before they are judged."""
+"""Smooths rough targets to a motion within the limits of joints, before they are checked."""
 
 from typing import Annotated
 
@@ -13,9 +13,9 @@ from safe_robot.motion import State
 from .pursuit import pursue
 
 CAUGHT_UP = 0.05
-"""Largest share of a joint's acceleration and jerk to reach its target with which it has caught up."""
+"""A joint has caught up if it needs at most this share of its acceleration and jerk to reach its target."""
 OVERSHOOT = 0.01
-"""A target outside limits by no more than this counts as one at the limit: motors go as much past it [rad or m]."""
+"""Targets outside limits by at most this count as at the limit, since motors overshoot by as much [rad or m]."""
 
 
 class ShapingConfig(ConfigModel):
@@ -33,9 +33,9 @@ class ShapingConfig(ConfigModel):
 class Shaper:
     """Follows the targets of n joints within their limits of velocity, acceleration and jerk.
 
-    Targets within these limits are commands, to the last bit. From one on that is not, each command follows the
-    targets as a critically damped filter of second order does, as far as limits allow and no joint has to go past its
-    target, until all joints have caught up. Jitter of targets therefore does not reach the robot.
+    Targets within these limits are passed on unchanged. After a target outside of them, commands follow the targets
+    like a critically damped second-order filter, within limits and without overshoot, until all joints have caught up.
+    Jitter of targets therefore does not reach the robot.
 
     Args:
         config: Parameters of the smoothing.
@@ -50,15 +50,15 @@ class Shaper:
         self._is_behind = False
 
     def shaped(self, target: tuple[float, ...], state: State, stop: np.ndarray) -> tuple[float, ...]:
-        """Returns what comes after a state on the way to n positions [rad or m].
+        """Returns the next command towards n positions [rad or m].
 
-        Positions that can be commanded are returned themselves, and so are those that are a jump or outside limits by
-        more than `OVERSHOOT`.
+        Positions that can be commanded are returned unchanged, and so are jumps and positions outside limits by more
+        than `OVERSHOOT`.
 
         Args:
             target: n positions [rad or m].
-            state: Where the robot is.
-            stop: The commands that bring it to rest from there, k x n [rad or m].
+            state: Present state of the robot.
+            stop: The commands of the braking from there, k x n [rad or m].
         """
         asked = np.array(target)
         position = asked.clip(self._limits.lower, self._limits.upper)
@@ -73,12 +73,12 @@ class Shaper:
         return tuple(wanted.tolist())
 
     def _can_be(self, position: np.ndarray, state: State) -> bool:
-        """Returns whether joints may be commanded to positions: they can stop from there, and have caught up."""
+        """Returns whether positions can be commanded: joints can stop from there, and have caught up."""
         limits, share = self._limits, CAUGHT_UP if self._is_behind else 1.0
         after = state.then(position, self._period_s)
         jerk = (after.acceleration - state.acceleration) / self._period_s
         way, fastest = self._braking.ends(after.velocity[None], after.acceleration[None])
-        end = position + way[0]  # NaN, which is within nothing, where there is no braking
+        end = position + way[0]  # NaN where there is no braking: all comparisons are false
         return bool(
             (
                 (fastest[0] <= limits.velocity)

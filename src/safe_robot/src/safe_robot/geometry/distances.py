@@ -73,7 +73,7 @@ class Contact(NamedTuple):
     """Distance between two things.
 
     Attributes:
-        distance: Between their surfaces; negative if they are in each other [m].
+        distance: Between their surfaces; negative if they penetrate [m].
         direction: Unit vector from one to the other, in the robot's root.
         first: Where one of them is nearest, in the root [m].
         second: The same for the other.

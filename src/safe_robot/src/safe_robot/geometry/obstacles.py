@@ -1,4 +1,4 @@
-"""Bodies of the environment: what a robot may not touch."""
+"""Bodies of the environment that a robot must not touch."""
 
 from typing import Any, Literal, NamedTuple
 

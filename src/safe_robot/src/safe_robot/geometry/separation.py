@@ -1,4 +1,4 @@
-"""Lower bounds of distances: how far apart planes can be that go between two things."""
+"""Lower bounds of distances: the gap between two parallel separating planes."""
 
 from collections.abc import Sequence
 

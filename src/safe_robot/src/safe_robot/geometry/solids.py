@@ -1,4 +1,4 @@
-"""Few balls whose convex hull holds a collision shape."""
+"""A few balls whose convex hull contains a collision shape."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class ClosestPoints(NamedTuple):
     """Points at which two shapes are nearest to each other.
 
     Attributes:
-        distance: Distance between the surfaces; negative if they are in each other [m].
+        distance: Distance between the surfaces; negative if they penetrate [m].
         direction: Unit vector from one to the other, either way, in the robot's root.
         first: The point of one of them, in the root [m].
         second: The point of the other, in the root [m].

@@ -29,7 +29,7 @@ class GuardMarkers:
 
     Args:
         guard: The guard.
-        lock: Held while it is asked.
+        lock: Held while the guard is used.
         frame: TF frame of the robot's root.
     """
 
@@ -40,7 +40,7 @@ class GuardMarkers:
         self._timer = WallTimer(HZ, self._publish)
 
     def close(self) -> None:
-        """Publishes no more."""
+        """Closes the topics."""
         self._timer.stop()
         self._publisher.unregister()
         self._box.unregister()
@@ -57,7 +57,7 @@ class GuardMarkers:
         self._publisher.publish([self._marker("", 0, Marker.CUBE, action=Marker.DELETEALL), *markers, *self._boxes()])
 
     def _lines(self, q: np.ndarray) -> Iterator[Marker]:
-        """Returns a line for each pair that is near, and how near."""
+        """Returns a line for each near pair, with its distance."""
         for check in self._guard.checks:
             if not isinstance(check, (SelfCollision, Environment)):
                 continue

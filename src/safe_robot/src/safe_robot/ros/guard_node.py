@@ -33,11 +33,11 @@ QUEUE_SIZE = 100
 WATCH_HZ = 100.0
 """Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
-"""Largest difference between two stamps beyond the time between their targets [s]; more is a jump."""
+"""Largest excess of the difference of two stamps over the time between their targets [s]; more is a jump."""
 FIRST_STATE_S = 1.0
-"""Longest time for which the node waits for a measured state before it subscribes to targets [s]."""
+"""Longest wait for a measured state before the node subscribes to targets [s]."""
 BODIES_TIMEOUT_S = 0.5
-"""Largest age of the places of bodies for checks that have no `timeout_s` [s]."""
+"""Largest age of the poses of bodies for checks without `timeout_s` [s]."""
 NEVER_S = float("-inf")
 REPEATED = "the stamp is that of the target before: both are one target, with one command"
 SWITCH_S = 0.0005
@@ -62,7 +62,7 @@ class GuardNode:
         self._command = rospy.Publisher(
             "joint_states/command",
             JointState if self._as_joint_state else Float64MultiArray,
-            queue_size=QUEUE_SIZE,  # a command that is left out would make the next one a jump
+            queue_size=QUEUE_SIZE,  # a dropped command would make the next one a jump
             tcp_nodelay=True,
         )
         self._sending = DirectSending.of(self._command, QUEUE_SIZE)
@@ -74,7 +74,7 @@ class GuardNode:
         base_frame = config.base_frame if takers else None
         self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out, timeout_s)
         self._guard.start()
-        # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
+        # `limit` and `shape` tolerate skipped targets; with `reject`, the next one would be a jump
         can_skip = self._guard.config.policy == "limit" or self._guard.config.shape
         size = 1 if can_skip else QUEUE_SIZE
         self._queue = TargetQueue(
@@ -90,7 +90,7 @@ class GuardNode:
         rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
         rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
         gc.collect()
-        gc.freeze()  # what is there stays, so that collecting the rest takes next to no time
+        gc.freeze()  # existing objects are frozen, so that garbage collection is fast
         WallTimer(WATCH_HZ, self._watch)
 
     def _receive(self, message: JointState) -> None:
@@ -138,7 +138,7 @@ class GuardNode:
             self._brake_for(too_old(age_s, self._silence_s, "silence_s"))
 
     def _lose_master(self) -> None:
-        reason = f"the ROS master at {self._master.uri} has gone, and nobody could find stop_subscriber"
+        reason = f"the ROS master at {self._master.uri} has gone, and stop_subscriber could not be found"
         with self._queue.lock:
             if not self._guard.is_halted:
                 self._halt(violation_of("master", reason))
@@ -184,7 +184,7 @@ class GuardNode:
                     return self._guard.refuse(f"stamps jump by {step_s:g} s")
                 if step_s == 0.0:
                     self._last_stamp, self._repeated_s, since_s = last, now_s, last[1]
-            if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
+            if self._guard.last_command is None and age_s > self._silence_s:  # the command waited for a connection
                 return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
         return self._guard.decide(values.position, self._measurements.context(since_s, age_s, step_s))
 
@@ -193,7 +193,7 @@ class GuardNode:
 
         Raises:
             MissingJointsError: If some are missing.
-            ValueError: If the message has something that the guard cannot check.
+            ValueError: If the message has values that the guard cannot check.
         """
         values, names = values_in(message), self._guard.joint_names
         ordered = values.in_order(names)
@@ -226,7 +226,7 @@ class GuardNode:
             self._command.publish(message)
             flush_buffered_sockets()
         except BaseException:
-            self._guard.rest()  # nothing can be braked from a command that has not gone out
+            self._guard.rest()  # braking must not start from a command that was not sent
             raise
 
     def _watch(self) -> None:
@@ -239,7 +239,7 @@ class GuardNode:
                 self._halt(violation_of("source", reason))
                 return
             try:
-                last_s = max(self._sent_s, self._repeated_s)  # repeated targets are judged when they come
+                last_s = max(self._sent_s, self._repeated_s)  # repeated targets are checked on arrival
                 violation = self._guard.check_watchdogs(self._measurements.context(last_s))
             except Exception as error:
                 violation = violation_of("input", f"a check raised an error: {error!r}")
@@ -268,7 +268,7 @@ class GuardNode:
 
 
 def _now() -> rospy.Time:
-    """Returns ROS time if it has begun, else wall time."""
+    """Returns ROS time if it is available, else wall time."""
     return rospy.Time.now() or rospy.Time.from_sec(time.time())
 
 

@@ -15,7 +15,8 @@ from safe_robot.msg import Violation as ViolationMessage
 
 QUEUE_SIZE = 100
 WARNING_PERIOD_S = 60.0
-"""Shortest time between two warnings of one check while the guard goes on [s]; the status topic has each violation."""
+"""Shortest time between two warnings of one check while the guard is not halted [s]; the status topic has each
+violation."""
 
 
 def violation_of(check: str, reason: str) -> Violation:
@@ -37,7 +38,7 @@ class GuardStatus:
         kind = DiagnosticStatus if as_diagnostic else Status
         self._status = rospy.Publisher("robot_safety/status", kind, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
-        self._warn = ThrottledWarning(WARNING_PERIOD_S, max_kinds=1)  # its messages name whatever is near
+        self._warn = ThrottledWarning(WARNING_PERIOD_S, max_kinds=1)  # its messages name the nearest pair
         self._way_out_from: object = None
         self._way_out_words = ""
 
@@ -72,7 +73,7 @@ class GuardStatus:
                 message=message,
             )
         )
-        if self._guard.is_halted:  # in any case, whatever has been warned of a moment ago
+        if self._guard.is_halted:  # always, even shortly after another warning
             then = "braking to rest, and halted" if self._guard.is_braking else "halted"
             rospy.logwarn("%s: %s; %s until robot_safety/start_subscriber is called", self._subject, message, then)
         else:
@@ -93,10 +94,11 @@ class GuardStatus:
 
     def warn_of_halt(self) -> None:
         """Warns that a target was ignored."""
-        self._warn(self._subject, "halted; call robot_safety/start_subscriber to go on")
+        self._warn(self._subject, "halted; call robot_safety/start_subscriber to continue")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:
-        """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""
+        """Returns a description of the motion that leaves the violated margins; computed once for each
+        configuration."""
         if self._guard.is_moving:
             return ""
         place = self._guard.last_command, obstacles

@@ -1,4 +1,4 @@
-"""Bodies around the robot, live from the markers that the simulator publishes."""
+"""Bodies around the robot, from the markers that the simulator publishes."""
 
 from collections.abc import Iterator, Sequence
 from urllib.parse import unquote
@@ -28,15 +28,15 @@ KINDS: dict[int, Kind] = {
 
 
 class LiveObstacles:
-    """The visual shapes of all bodies of `rpbi/markers`, but those that are left out, where TF has them.
+    """The visual shapes of all bodies of `rpbi/markers`, except those left out, at their poses in TF.
 
     Args:
         base_frame: TF frame of the robot's root.
-        left_out: Bodies that are none: the robot itself, and what can be gone through.
+        left_out: Bodies that are no obstacles: the robot itself, and bodies that it may pass through.
         timeout_s: Largest age of a transform [s]; beyond it, the pose of the body is unknown.
 
     Attributes:
-        obstacles: The shapes in the robot's root; None while it is not known what there is or where.
+        obstacles: The shapes in the robot's root; None while bodies or poses are unknown.
     """
 
     def __init__(self, base_frame: str, left_out: Sequence[str], timeout_s: float) -> None:
@@ -51,7 +51,7 @@ class LiveObstacles:
         self._timer = WallTimer(HZ, self._look)
 
     def close(self) -> None:
-        """Looks no more, and leaves its topics."""
+        """Stops reading, and unsubscribes."""
         self._timer.stop()
         self._subscriber.unregister()
         self._listener.unregister()
@@ -73,7 +73,7 @@ class LiveObstacles:
         try:
             found = tuple(self._found())
         except (tf2_ros.TransformException, ValueError) as error:
-            self._warn(TOPIC, f"what is around the robot is not known: {error}")
+            self._warn(TOPIC, f"the bodies around the robot are unknown: {error}")
             self.obstacles = None
             return
         if self.obstacles is None or _differ(self.obstacles, found):

@@ -1,4 +1,4 @@
-"""A connection to the ROS master that shows at once when it dies."""
+"""A connection to the ROS master that detects its end at once."""
 
 import socket
 import threading
@@ -14,16 +14,16 @@ TIMEOUT_S = 1.0
 
 
 class MasterConnection:
-    """Holds a connection to the ROS master open, over which nothing is sent: its end is that of the master's process.
+    """Keeps an idle connection to the ROS master open; it closes when the master's process ends.
 
-    A master that hangs, or a cable that is pulled, does not show.
+    A master that hangs, or a pulled cable, is not detected.
 
     Args:
-        lost: Is called when the master has gone, by a thread of its own.
+        lost: Called in a thread of its own when the master has ended.
 
     Attributes:
         uri: The master's address.
-        is_there: Whether the master is there.
+        is_there: Whether the connection is open.
     """
 
     def __init__(self, lost: Callable[[], None]) -> None:

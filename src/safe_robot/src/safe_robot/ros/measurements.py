@@ -1,4 +1,4 @@
-"""Inputs of the guard's node beside targets: measured positions and forces, and bodies around the robot."""
+"""Inputs of the guard's node other than targets: measured positions and forces, and bodies around the robot."""
 
 import threading
 import time
@@ -22,17 +22,18 @@ NEVER = 0.0, NEVER_S
 
 
 class Measurements:
-    """Receives measured states and wrenches, and bodies of the environment; the last ones count.
+    """Receives measured states and wrenches, and bodies of the environment; keeps the newest.
 
-    A state may have some of the guarded joints, as that of one of several arms: the newest position of each joint
-    counts, and the oldest of these is their age. A state without any guarded joint, or with values that are not finite,
-    is refused with a warning. Wrenches are in N and N m of their own frame. A missing value is infinitely old.
+    A state may have only some of the guarded joints, for instance those of one of several arms. The newest position of
+    each joint is used; the age is that of the oldest of these. A state without any guarded joint, or with values that
+    are not finite, is refused with a warning. Wrenches are in N and N m of their own frame. A missing value is
+    infinitely old.
 
     Args:
         joint_names: The n guarded joints.
         base_frame: TF frame of the robot's root; None without a source of bodies.
-        left_out: Bodies that are none.
-        bodies_timeout_s: Largest age of the places of bodies [s].
+        left_out: Bodies that are no obstacles.
+        bodies_timeout_s: Largest age of the poses of bodies [s].
     """
 
     def __init__(

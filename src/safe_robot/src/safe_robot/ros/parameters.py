@@ -37,7 +37,7 @@ def guard_of_parameters() -> tuple[Guard, NodeConfig]:
 
 
 def guard_of(given: Mapping[str, Any], path: str, node: str) -> tuple[Guard, NodeConfig]:
-    """Returns the guard of a robot that parameters describe, and what its node does beside.
+    """Returns the guard described by parameters, and the configuration of its node.
 
     Args:
         given: The parameters.

@@ -1,4 +1,4 @@
-"""Targets on their way to the guard: one by one, and only while their source is alive."""
+"""Queue of targets for the guard: one at a time, and only while their source is alive."""
 
 import threading
 import time
@@ -8,13 +8,13 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 PATIENCE_S = 0.1
-"""Time that targets wait for a sign of life of their source [s]."""
+"""Longest time that targets wait for a sign of life of their source [s]."""
 WAKE_UP_S = 0.0002
-"""Time before a target is due at which the queue's thread is woken up [s]."""
+"""Time by which the queue's thread wakes up before a target is due [s]."""
 
 
 class TargetQueue(Generic[Item]):
-    """Passes targets on, a period apart, as long as the newest one is fresh.
+    """Passes targets on, a period apart, while the newest one is recent.
 
     A target that comes after the period is passed on at once, in the thread that delivers it. An earlier one waits, so
     that a burst does not make the robot faster. Waiting targets are passed on only while the newest one is younger than
@@ -48,7 +48,7 @@ class TargetQueue(Generic[Item]):
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
     def put(self, item: Item, age_s: float) -> None:
-        """Passes a target on, now or later.
+        """Passes a target on, at once or later.
 
         Args:
             item: The target.
@@ -64,7 +64,7 @@ class TargetQueue(Generic[Item]):
                 self.lock.notify()
 
     def clear(self) -> None:
-        """Drops all that waits; `lock` is held."""
+        """Drops all waiting targets; `lock` is held."""
         self._waiting.clear()
 
     def run_instead(self, step: Callable[[], bool]) -> None:
@@ -87,7 +87,7 @@ class TargetQueue(Generic[Item]):
 
     def _hand_on(self) -> None:
         item, _ = self._waiting.popleft()
-        begin_s = time.monotonic()  # else each period would be longer by what a decision takes
+        begin_s = time.monotonic()  # otherwise each period would be longer by the time of a decision
         if self._on_target(item):
             self._due_s = max(self._due_s, begin_s) + self._period_s
 
@@ -97,7 +97,7 @@ class TargetQueue(Generic[Item]):
                 self.lock.wait(self._rest_s())
 
     def _rest_s(self) -> float | None:
-        """Hands on what is due; returns how long there is nothing to do then [s], None: until a target comes."""
+        """Passes on targets that are due; returns the time until the next one is due [s], None if none waits."""
         while self._step or self._waiting:
             now_s = time.monotonic()
             if (left_s := self._left_s(now_s)) > WAKE_UP_S:
