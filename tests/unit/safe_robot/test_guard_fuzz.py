@@ -90,8 +90,6 @@ def test_robot_locked_between_margins_is_released_by_a_smaller_one():
     assert out.is_locked and is_locked(oracle, there)
     words = out.words(driver.guard.joint_names)
     assert words.startswith("locked inside the margin of self_collision (links 'base' and 'lower': ")
-    assert "environment (link 'lower' and 'table': " in words and words.endswith(
-        "no motion separates all of them"
-    )
+    assert "environment (link 'lower' and 'table': " in words and words.endswith("no motion separates all of them")
     assert not is_locked(oracle, np.array((0.0, -2.642))), "the oracle finds a way where there is one"
     assert leave_with_smaller_margin(TWO, oracle, Grid(oracle), there, out) is None

@@ -71,7 +71,10 @@ def test_a_link_is_no_faster_where_the_boom_is_longest(tmp_path):
 
 
 def test_telescopic_reach_requires_position_limits_and_their_check(tmp_path):
-    with pytest.raises(ConfigError, match=r"checks.joint_position.active: expected true, since joint 'reach' slides"):
+    with pytest.raises(
+        ConfigError,
+        match=r"checks.joint_position.active: expected true, since joint 'reach' moves links that others turn",
+    ):
         guard_of(crane(tmp_path), checks={"joint_position": {"active": False}})
     boundless = crane(tmp_path, 'lower="0" upper="0"')
     with pytest.raises(ConfigError, match="expected limits for prismatic joints between joint 'turn' and"):

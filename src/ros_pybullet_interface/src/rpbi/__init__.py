@@ -8,13 +8,13 @@ _GREETING = b"pybullet build time: "
 
 
 def _import_pybullet() -> None:
-    """Imports PyBullet without the line about its build, which it prints on standard error when it is imported first.
+    """Imports PyBullet without the line about its build, which its first import prints on standard error.
 
-    All else that is printed meanwhile, such as a warning of NumPy, is printed afterwards.
+    All other output of the import, such as a warning of NumPy, is printed afterwards.
     """
     try:
         stderr = os.dup(2)
-    except OSError:  # there is none
+    except OSError:  # no such stream
         return
     with os.fdopen(os.memfd_create("stderr"), "rb") as printed, os.fdopen(stderr, "wb", buffering=0) as original:
         sys.stderr.flush()

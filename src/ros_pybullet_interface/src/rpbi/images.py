@@ -32,9 +32,9 @@ LONGEST_S = 60.0
 
 
 class CameraImages:
-    """Draws what the cameras of a world see, in the thread that asks, which is always the same one.
+    """Renders the cameras of a world in the calling thread, which must always be the same.
 
-    The renderer is opened when it is made, and draws the scene of the present tick, also while the world stands still.
+    The renderer is opened on construction, and draws the scene of the present tick, also while the world is stopped.
 
     Args:
         world: The world, with one camera or more.
@@ -54,14 +54,14 @@ class CameraImages:
         return self._renderer
 
     def frame(self, camera: str = "") -> Frame:
-        """Returns what a camera sees now, which need not be a tick at which it is due.
+        """Returns the present frame of a camera, also at ticks at which the camera is not due.
 
         Args:
             camera: Its name; the first one by default.
 
         Raises:
             UnknownNameError: If there is none of that name.
-            ValueError: If nobody has put its pose yet.
+            ValueError: If its pose is unknown.
         """
         world = self._world
         world.apply_inputs()

@@ -1,4 +1,4 @@
-"""Plain Python data in the place of named tuples, for scripts: mappings, lists and arrays."""
+"""Plain Python data instead of named tuples, for scripts: mappings, lists and arrays."""
 
 from __future__ import annotations
 

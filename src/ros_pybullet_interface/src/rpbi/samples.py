@@ -44,7 +44,7 @@ class LinkPoseSample(NamedTuple):
 
 
 class BaseStateSample(NamedTuple):
-    """Where the base of a robot is and how it moves.
+    """Pose and velocity of the base of a robot.
 
     Attributes:
         name: The robot.
@@ -76,7 +76,7 @@ class BodyState(NamedTuple):
 
 
 class SceneSample(NamedTuple):
-    """All that a camera sees, for the renderer.
+    """The scene of a camera, for the renderer.
 
     Attributes:
         name: The camera.
@@ -144,7 +144,7 @@ class ContactPoint(NamedTuple):
 
 
 class ContactsSample:
-    """Where a body touches others.
+    """Contact points of a body.
 
     Attributes:
         name: The body.
@@ -169,7 +169,7 @@ class ContactsSample:
         return hash((self.name, self.points))
 
     def __reduce__(self) -> tuple[Callable[..., ContactsSample], tuple[Any, ...]]:
-        """Has it pickled with its points: what makes them stays where it is."""
+        """Pickles the points, not the object that computes them."""
         return _contacts_of, (self.name, self.points)
 
     def __repr__(self) -> str:
@@ -216,7 +216,7 @@ class SurfaceSample(NamedTuple):
 
 
 class ViconSample(NamedTuple):
-    """A body as Vicon sees it.
+    """A body as reported by Vicon.
 
     Attributes:
         name: `BODY/SENSOR`, which are Vicon's subject and segment.

@@ -136,7 +136,7 @@ def test_velocity_is_displacement_from_the_current_position_divided_by_time(ros,
 def test_strict_robot_refuses_unreachable_targets_and_others_approach_them(ros, node, kinematics):
     refused, near = (_solve(ros, robot, _problem(Pose((4.0, 0.0, 0.5)))) for robot in ("arm", "shown"))
     assert (refused.success, near.success) == (False, True)
-    assert near.message == f"as near as it comes: {refused.message}"
+    assert near.message == f"as near as possible: {refused.message}"
     assert refused.message.startswith("'lbr_iiwa_link_7' misses its target by ") and "rad" in refused.message
     assert near.solution.position == pytest.approx(refused.solution.position)
     assert (np.abs(near.solution.position) <= kinematics.limits.upper).all()
@@ -216,7 +216,7 @@ def test_topic_moves_the_link_as_near_as_possible_and_warns(ros, node):
     with publishing("/rpbi/gripper/ik", CalculateInverseKinematicsProblem) as topic:
         topic.publish(CalculateInverseKinematicsProblem(link_name="hand", targetPosition=away))
         wait_until(lambda: math.dist(_hand(states), (0.0, 0.7)) < 5e-3, "the arm is stretched out towards it")
-    rosout.wait_for(["/rpbi/gripper/ik: as near as it comes: 'hand' misses its target by 1300 mm; 1 mm would do"])
+    rosout.wait_for(["/rpbi/gripper/ik: as near as possible: 'hand' misses its target by 1300 mm; 1 mm would do"])
 
 
 def test_topic_of_a_strict_robot_moves_nothing_and_reports_residual(ros, node):

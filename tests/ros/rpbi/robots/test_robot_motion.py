@@ -256,4 +256,4 @@ def test_a_base_that_is_put_elsewhere_ends_the_motion(ros, states):
     transform = SetTransform._request_class().transform
     transform.rotation.w = 1.0
     assert ros.call("/rpbi/iiwa/set_pose", SetTransform, transform).success
-    assert "the robot was put elsewhere before the goal" in moving().message
+    assert "the robot was moved to another pose before the goal" in moving().message

@@ -166,7 +166,7 @@ def test_joint_states_that_are_off_have_no_topic(ros, simulator):
             "set_real_time_factor",
             SetRealTimeFactor,
             [-1.0],
-            "real_time_factor: must be 0, which is as fast as it goes, or >= 0.001, got -1",
+            "real_time_factor: must be 0 (as fast as possible) or >= 0.001, got -1",
         ),
         ("set_real_time_factor", SetRealTimeFactor, [1e-300], "or >= 0.001, got 1e-300"),
         ("set_real_time_factor", SetRealTimeFactor, [math.nan], "real_time_factor: must be 0"),

@@ -154,7 +154,7 @@ def test_a_newer_motion_replaces_the_older_which_answers(build):
         ("the robot was removed", lambda world: world.remove("iiwa")),
         ("the control mode was changed", lambda world: world.bodies["iiwa"].switch_mode(pybullet.VELOCITY_CONTROL)),
         (
-            "its joints were put elsewhere",
+            "its joints were set to other positions",
             lambda world: world.bodies["iiwa"].set_joint_state(JointCommand([JOINTS[0]], [0.0])),
         ),
         ("the simulation ended", lambda world: world.close()),
@@ -227,7 +227,7 @@ def test_a_teleport_ends_a_motion(build):
     motion = start(world, {JOINTS[0]: 1.0}, 2.0)
     world.step()
     world.bodies["iiwa"].teleport(Pose((1.0, 0.0, 0.0)))
-    assert motion.result.result().message.startswith("the robot was put elsewhere")
+    assert motion.result.result().message.startswith("the robot was moved to another pose")
 
 
 def test_very_long_motion_does_not_break_the_world(build, tmp_path):

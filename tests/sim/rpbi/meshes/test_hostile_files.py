@@ -203,7 +203,7 @@ VISUAL, COLLISION = "createVisualShape", "createCollisionShape"
 BROKEN = {
     "visual, no scene": (VISUAL, "no.dae", "<COLLADA/>", r"PyBullet crashes when it loads it \(SIG\w+\)"),
     "collision, no scene": (COLLISION, "no.dae", "<COLLADA/>", "PyBullet cannot load it"),
-    "visual, nothing": (VISUAL, "empty.obj", "# nothing", "PyBullet cannot load it: it gets nothing out of it"),
+    "visual, nothing": (VISUAL, "empty.obj", "# nothing", "PyBullet cannot load it: it reads nothing from it"),
     "collision, nothing": (COLLISION, "empty.obj", "# nothing", "PyBullet cannot load it"),
     "corners that there are not": (
         COLLISION,

@@ -200,7 +200,7 @@ def test_contacts_come_back_after_a_reset(build):
 def test_contacts_are_off_by_default_and_refused_for_visual_robots(build):
     assert run(build(box(basePosition=[0.0, 0.0, 0.1])), 10) == {}
     robot = {"name": "ghost", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}, "is_visual_robot": True}
-    with pytest.raises(ConfigError, match="contacts: a visual robot touches nothing"):
+    with pytest.raises(ConfigError, match="contacts: a visual robot has no contacts"):
         load_object("visual_robot", {**robot, "contacts": {}}, "ghost.yaml")
 
 

@@ -131,5 +131,5 @@ def test_marker_is_at_the_body_not_at_the_seen_frame(build) -> None:
 
 
 def test_maximal_coordinates_follow_nothing(build) -> None:
-    with pytest.raises(ConfigError, match="useMaximalCoordinates: what moves in maximal coordinates follows no TF"):
+    with pytest.raises(ConfigError, match="useMaximalCoordinates: a body in maximal coordinates cannot follow TF"):
         build(useMaximalCoordinates=True)

@@ -1,4 +1,4 @@
-"""The types of bodies; a new one is a class in a file of its own and a line here."""
+"""The types of bodies; to add one, write a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 
@@ -20,6 +20,6 @@ BODY_TYPES: PluginTable[Body] = PluginTable(
     },
     suggests=False,
 )
-"""In the order in which a world loads them; soft bodies may be attached to any of the others."""
+"""Types of bodies in the order of loading: soft bodies come last, since they may be attached to any others."""
 
 __all__ = ["BODY_TYPES", "Body", "BodyConfig"]

@@ -1,4 +1,4 @@
-"""Base class of everything in the world."""
+"""Base class of all bodies in the world."""
 
 from __future__ import annotations
 
@@ -25,36 +25,36 @@ from rpbi.sensors.sensor import Sensor
 log = logging.getLogger(__name__)
 
 MULTI_BODY = 2
-"""PyBullet's type of bodies that have joints in reduced coordinates, or could have, in `getDynamicsInfo`."""
+"""Type in `getDynamicsInfo` of bodies in reduced coordinates."""
 UNNAMED_LINK = "link0"
-"""PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
+"""PyBullet's name of the only link of a shape; missing in maximal coordinates."""
 
 
 class Body:
     """A body in one PyBullet client.
 
-    A new type is a subclass with a `Config` and an `__init__` that creates the body and hands its id on; the rest may
-    stay as it is. Whatever PyBullet created when `__init__` raises is removed by the caller.
+    A new type is a subclass with a `Config` and an `__init__` that creates the body and passes its id on; all other
+    methods have defaults. If `__init__` raises, the caller removes everything that PyBullet has created.
     """
 
     Config: ClassVar[type[ConfigModel]]
     is_soft: ClassVar[bool] = False
     """Whether it has neither links nor a fixed shape."""
     has_physics: ClassVar[bool] = True
-    """Whether it can be felt, else it is only seen."""
+    """Whether it has contacts; otherwise it is only visible."""
     section: ClassVar[str] = "objects"
-    """The list of the main YAML file that names objects of this type; that of types from other packages, as a rule."""
+    """List of the main YAML file that names objects of this type; by default the list for types from other packages."""
     example: ClassVar[Mapping[str, Any]] = {}
-    """Keys of a YAML, without its name, that asks for all that a body of this type can have in ROS, and follows the TF
-    frame `FRAME` if it can follow one. The reference pages are written from it."""
+    """YAML keys, without the name, of an example with all ROS interfaces of this type, which follows the TF frame
+    `FRAME` if the type can follow one. Used to write the reference pages."""
     not_in_keyframes: ClassVar[tuple[str, ...]] = ("_inertial", "_base")
-    """Attributes that are no state but caches, which somebody who looks at the body fills."""
+    """Attributes that are caches, not state; reading the body fills them."""
     object_tf: ObjectTf | None = None
     """The TF frame that its base follows, if it follows one."""
 
     @classmethod
     def prepare(cls, config: Any, has_window: bool) -> None:
-        """Prepares and caches what is slow to make for a body, except PyBullet's own part; any thread may call it.
+        """Prepares and caches data that are slow to compute, without calls to PyBullet; any thread may call it.
 
         Raises:
             ConfigError: If the configuration does not fit.
@@ -78,7 +78,7 @@ class Body:
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
         self._inertial: Any = None
         self._base = Pose()
-        """PyBullet's last pose of the base, and the frame pose from it; cached since most bodies rest."""
+        """PyBullet's last pose of the base, and the frame pose computed from it; cached since most bodies rest."""
         self.pose_follower: PoseFollower | None = None
         self._has_jumped = False
         """Whether it was warned that the body moves without a velocity."""
@@ -92,7 +92,7 @@ class Body:
         return ExternalWrenches(self)
 
     def push(self, wrench: ExternalWrench) -> None:
-        """Has a wrench act on a link from the coming tick on.
+        """Applies a wrench to a link from the next tick on.
 
         Raises:
             UnknownNameError: If it has no such link.
@@ -126,7 +126,7 @@ class Body:
         )
         mass, friction, inertia = info[:3]
         if mass:
-            inertia = tuple(moment or math.inf for moment in inertia)  # PyBullet tells 0 when it has kept 1/inf
+            inertia = tuple(moment or math.inf for moment in inertia)  # PyBullet returns 0 for a stored 1/inf
         inertial_frame = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
         front = (mass, friction, inertia, *inertial_frame, restitution)
         return (*front, *info[6:8], *damping_and_stiffness, *info[10:])
@@ -154,7 +154,7 @@ class Body:
             log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
 
     def _follow(self, object_tf: ObjectTf | None) -> None:
-        """Lets a fixed base move along the poses of its TF frame, if there is one.
+        """Makes a fixed base follow the poses of its TF frame, if there is one.
 
         A body loaded with `useMaximalCoordinates` is set to the poses instead: PyBullet ignores the velocity of its
         base, so it carries nothing.
@@ -165,51 +165,52 @@ class Body:
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
     def _track(self, object_tf: ObjectTf | None) -> None:
-        """Has a base that physics moves follow its TF frame while that is seen, if there is one."""
+        """Makes a base that physics moves follow its TF frame while it is up to date, if there is one."""
         self.object_tf = object_tf
         if object_tf is not None:
             centre = self.inertial_pose_in_base
             self.pose_follower = TrackedBase(self.pb, self.name, self.body_id, centre, object_tf)
 
     def before_step(self, tick: int) -> None:
-        """Acts just before the physics of each tick; bodies that need nothing leave it."""
+        """Called before the physics of each tick; does nothing by default."""
 
     @property
     def is_idle(self) -> bool:
-        """Whether `before_step` does nothing at the coming ticks unless an input or a request comes."""
+        """Whether `before_step` does nothing until an input or a request comes."""
         return False
 
     def halt(self, reason: str) -> None:
-        """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing."""
+        """Aborts actions over future ticks, which may not come; does nothing by default."""
 
     def restart(self) -> bool:
-        """Becomes what it was when it was made, after PyBullet has gone back to that state of motion.
+        """Restores its initial state, after PyBullet has restored its motion.
 
         Returns:
-            Whether that is possible; bodies of most types are made anew instead.
+            Whether that is possible; by default a body is created anew instead.
         """
         return False
 
     def resume(self) -> None:
-        """Tells PyBullet again what it keeps beside motion and dynamics, for a client into which the body has moved."""
+        """Sends PyBullet its settings other than motion and dynamics again, after the body has moved to another
+        client."""
 
     def pause(self, reason: str) -> None:
-        """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all."""
+        """Aborts actions that cannot be paused while the world is stopped; by default all."""
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Ties it to bodies that are there already, by name, when it comes into their world; most are tied to none.
+        """Attaches it to existing bodies, by name, when it is added to their world; does nothing by default.
 
         Raises:
             ConfigError: If it cannot be done.
         """
 
     def detach(self, name: str | None = None) -> None:
-        """Undoes what `attach` did with a body that is about to go, or with all."""
+        """Undoes `attach` for a body that is about to be removed, or for all bodies."""
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML of its section is one of this type, where several types share a section."""
+        """Returns whether a YAML of its section has this type, if several types share a section."""
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:
@@ -251,12 +252,12 @@ class Body:
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
 
     def _jump(self, pose: Pose) -> None:
-        """Puts a base that has no velocity at a pose of its TF frame; warns once if it moves while others touch it."""
+        """Sets a base without velocity to a pose of its TF frame; warns once if it moves while others touch it."""
         if self.has_physics and not self._has_jumped and self.pb.getContactPoints(self.body_id):
             self._has_jumped = True
             log.warning(
-                "%s: object_tf: moves without a velocity, because of useMaximalCoordinates: it pushes away what it "
-                "meets, but neither carries nor rubs what touches it; remove useMaximalCoordinates",
+                "%s: object_tf: moves without a velocity, because of useMaximalCoordinates: it pushes other bodies, "
+                "but neither carries them nor has friction with them; remove useMaximalCoordinates",
                 self.name,
             )
         self.set_base_pose(pose)
@@ -301,7 +302,7 @@ class Body:
         return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
     def close(self) -> None:
-        """Closes what it has beside its part of the world."""
+        """Closes its resources outside the world."""
 
     def remove(self) -> None:
         """Removes the body from the world."""

@@ -18,7 +18,7 @@ def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
 SensorEntry = Annotated[
     Any,
     PlainValidator(_sensor_config, json_schema_input_type=SensorConfig),
-    Expects("a list of sensors"),  # said of the list; what is wrong with an entry, the validator says
+    Expects("a list of sensors"),  # error text for the list; the validator reports errors of entries
 ]
 """A sensor of another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
 

@@ -1,4 +1,4 @@
-"""Collision objects: felt by others, moved by nobody but TF."""
+"""Collision objects: they have contacts, and move only by TF."""
 
 from pydantic import Field
 
@@ -14,7 +14,7 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class CollisionObjectConfig(BodyConfig):
-    """A collision object: it is felt, and nothing but TF moves it."""
+    """A collision object: it has contacts, and moves only by TF."""
 
     createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")
@@ -23,12 +23,12 @@ class CollisionObjectConfig(BodyConfig):
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
     useMaximalCoordinates: MaximalCoordinates = False
     convexDecomposition: Decomposition = None
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays where it is.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, the object stays in place.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
 class CollisionObject(ShapeObject):
-    """An object of infinite mass that follows a TF frame or stays where it is put."""
+    """An object of infinite mass that follows a TF frame or stays in place."""
 
     Config = CollisionObjectConfig
     section = "collision_objects"
@@ -56,5 +56,5 @@ class CollisionObject(ShapeObject):
         self._contacts = config.contacts
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its contacts, if they are asked for."""
+        """Its contacts, if configured."""
         return contact_sensors(self, self._contacts)

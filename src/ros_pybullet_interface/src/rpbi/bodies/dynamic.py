@@ -1,4 +1,4 @@
-"""Dynamic objects: moved by physics, or by TF while that sees them."""
+"""Dynamic objects: moved by physics, or by TF while it is up to date."""
 
 from pydantic import Field
 
@@ -35,7 +35,7 @@ class DynamicObjectConfig(BodyConfig):
     convexDecomposition: Decomposition = None
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     tracked_tf: ObjectTf | None = Field(
-        None, description="TF frame to follow while it is seen; physics moves it in between, and without it always."
+        None, description="TF frame to follow while it is up to date; otherwise physics moves the object."
     )
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
     base_state_hz: HzOrOff = Field(0.0, description="Rate of its pose and velocity on `base_state`; 0 is off.")
@@ -59,10 +59,10 @@ class DynamicObject(ShapeObject):
 
     def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
         if config.useMaximalCoordinates and pb.is_deformable:
-            message = "soft bodies do not feel what moves in maximal coordinates; remove it in a deformable world"
+            message = "soft bodies have no contacts with bodies in maximal coordinates; remove it in a deformable world"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
         if config.useMaximalCoordinates and config.tracked_tf is not None:
-            message = "what moves in maximal coordinates follows no TF; remove one of the two"
+            message = "a body in maximal coordinates cannot follow TF; remove one of the two"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
         super().__init__(
             pb,
@@ -82,7 +82,7 @@ class DynamicObject(ShapeObject):
         self.config = config
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its pose, the state of its base and its contacts, each if it is asked for."""
+        """Its pose, the state of its base and its contacts, each if configured."""
         frame, config = f"rpbi/{self.name}", self.config
         sensors: list[Sensor] = []
         if config.broadcast_hz:

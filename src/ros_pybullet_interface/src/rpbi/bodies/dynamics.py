@@ -18,7 +18,7 @@ class LinkDynamics(NamedTuple):
     """Dynamics of a link, with the field names of the message ObjectDynamics.
 
     Attributes:
-        mass: Mass [kg], 0 for what never moves.
+        mass: Mass [kg], 0 for static bodies.
         lateral_friction: Coulomb friction coefficient.
         local_inertia_diagonal: Principal moments of inertia [kg m^2].
         local_inertia_pos: Centre of mass in the link's frame [m].
@@ -51,7 +51,7 @@ _UNCHANGEABLE = ("local_inertia_pos", "local_inertia_orn", "body_type")
 
 
 def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
-    """Returns what has to be changed, by PyBullet's name; empty lists ask for nothing.
+    """Returns the values to change, by PyBullet's name; empty lists change nothing.
 
     Raises:
         ValueError: If a value is not finite, negative, or cannot be changed; it names all such fields.
@@ -108,7 +108,7 @@ def link_index(body: Body, link: str) -> int:
         ValueError: If the body is soft.
     """
     if body.is_soft:
-        raise ValueError(f"'{body.name}' is soft: what it is made of stands in its file and does not change")
+        raise ValueError(f"'{body.name}' is soft: its material is set in its file and cannot be changed")
     known = [body.root_link, *map(body.link_name, body.link_indices)]
     wanted = link or body.root_link
     if wanted not in known:
@@ -117,7 +117,7 @@ def link_index(body: Body, link: str) -> int:
 
 
 def read_dynamics(body: Body, link: str) -> LinkDynamics:
-    """Returns how a link behaves now.
+    """Returns the present dynamics of a link.
 
     Raises:
         UnknownNameError: If the body has no such link.
@@ -157,7 +157,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
 
 
 def _renew_contacts(body: Body, index: int) -> None:
-    """Has PyBullet make the contacts of a link anew: those that last keep the friction that they began with."""
+    """Makes PyBullet create the contacts of a link anew: existing ones keep their friction."""
     ends = {((touch[1], touch[3]), (touch[2], touch[4])) for touch in body.pb.getContactPoints(body.body_id)}
     for (body_a, link_a), (body_b, link_b) in sorted(ends):
         if (body.body_id, index) in ((body_a, link_a), (body_b, link_b)):
@@ -173,7 +173,7 @@ def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str
         static = f"'{what}' is static, and stays so; add a dynamic object instead"
         problems += [f"{key}: {static}" for key in ("mass", "localInertiaDiagonal") if key in arguments]
     if present.mass and arguments.get("mass") == 0:
-        problems.append("mass: must be > 0 [kg], got 0: what moves cannot be made static")
+        problems.append("mass: must be > 0 [kg], got 0: a moving body cannot be made static")
     if present.mass and 0.0 in arguments.get("localInertiaDiagonal", ()):
         problems.append("localInertiaDiagonal: must be > 0 [kg m^2] each")
     if arguments.get("contactStiffness") == 0:

@@ -1,4 +1,4 @@
-"""Files that a configuration names, looked at before PyBullet gets them: some would end the process."""
+"""Files that a configuration names, checked before PyBullet reads them: some would crash the process."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -31,7 +31,7 @@ _PARTS: dict[str, type[PybulletModel]] = {
 
 
 def check_files(config: BodyConfig) -> None:
-    """Checks the meshes and the URDF of a body; new ones take a while.
+    """Checks the meshes and the URDF of a body; new files take a while.
 
     Raises:
         ConfigError: If one cannot be loaded; it lists all problems.
@@ -87,7 +87,7 @@ def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDecomposition) -> str:
-    """Returns why a shape cannot be divided into convex parts, empty if it can, and then is."""
+    """Divides a shape into convex parts; returns the reason if that fails, else an empty text."""
     if shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
         return "expected a createCollisionShape of GEOM_MESH with a fileName"
     if (shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH:
@@ -100,7 +100,7 @@ def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDec
 
 
 def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:
-    """Returns what a shape's file is for, None if PyBullet does not read it."""
+    """Returns the use of a shape's file, None if PyBullet does not read it."""
     if shape.shapeType == pybullet.GEOM_MESH:
         return Use.VISUAL if isinstance(shape, CreateVisualShape) else Use.COLLISION
     is_field = shape.shapeType == pybullet.GEOM_HEIGHTFIELD and isinstance(shape, CreateCollisionShape)

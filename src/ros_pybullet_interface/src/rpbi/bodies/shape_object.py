@@ -1,4 +1,4 @@
-"""Objects made of one visual and perhaps one collision shape."""
+"""Objects of one visual shape and an optional collision shape."""
 
 from typing import Annotated, Any
 
@@ -78,5 +78,5 @@ class ShapeObject(Body):
         self.visual = visual
 
     def restart(self) -> bool:
-        """Has nothing to do, unless it is tracked: no other state changes without a command."""
+        """Restores nothing: without tracking, only commands change its state."""
         return not isinstance(self.pose_follower, TrackedBase)

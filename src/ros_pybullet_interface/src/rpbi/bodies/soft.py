@@ -29,7 +29,7 @@ from .dynamics import link_index
 
 
 class SoftObjectConfig(BodyConfig):
-    """A soft body: it has no fixed shape."""
+    """A soft body: it deforms."""
 
     loadSoftBody: LoadSoftBody | None = Field(None, description="Its mesh and what it is made of; this or loadURDF.")
     loadURDF: LoadURDF | None = Field(None, description="A URDF with a `<deformable>`; this or loadSoftBody.")
@@ -50,10 +50,10 @@ class SoftObjectConfig(BodyConfig):
 
 
 class SoftObject(Body):
-    """A body without a fixed shape, in a world that was set up for such.
+    """A deformable body, in a world that is configured for soft bodies.
 
-    Its base pose is the mean position and rotation of its corners. PyBullet reports no velocity of it, and replays do
-    not reproduce it.
+    Its base pose is the mean position and rotation of its corners. PyBullet reports no velocity, and replays do not
+    reproduce its motion.
 
     Raises:
         ConfigError: If the mesh is broken, or the world is not one for soft bodies.
@@ -67,7 +67,7 @@ class SoftObject(Body):
 
     @classmethod
     def prepare(cls, config: SoftObjectConfig, has_window: bool) -> None:
-        """Prepares what PyBullet gets in the place of the URDF, if there is one."""
+        """Prepares the files that PyBullet reads instead of the URDF, if there is one."""
         if config.loadURDF is not None:
             prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
@@ -77,7 +77,7 @@ class SoftObject(Body):
             raise ConfigError([Problem(config.name, "", message)])
         super().__init__(pb, config.name, _load(pb, config))
         self.config = config
-        self.inertial_pose_in_base = self._base_pose_in_inertial = Pose()  # PyBullet has nothing sensible to tell
+        self.inertial_pose_in_base = self._base_pose_in_inertial = Pose()  # PyBullet's value is meaningless
         # A soft body that sleeps feels nothing, and bodies that poses move go through it.
         pb.changeDynamics(self.body_id, -1, activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)
         self._anchors: list[tuple[str | None, int]] = []
@@ -86,7 +86,7 @@ class SoftObject(Body):
             pb.changeVisualShape(self.body_id, -1, **config.changeVisualShape.kwargs())
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Makes its anchors.
+        """Creates its anchors.
 
         Raises:
             ConfigError: If an anchor names a body, link or node that does not exist.
@@ -114,7 +114,7 @@ class SoftObject(Body):
         return surface + contact_sensors(self, self.config.contacts)
 
     def base_twist(self) -> Twist:
-        """Refuses: PyBullet reports another velocity.
+        """Raises an error, since PyBullet reports a wrong velocity.
 
         Raises:
             PhysicsError: Always.
@@ -122,7 +122,7 @@ class SoftObject(Body):
         raise PhysicsError(f"{self.name}: a soft body has no twist")
 
     def motion_state(self) -> tuple[float, ...]:
-        """Returns nothing: soft bodies do not move the same every time."""
+        """Returns an empty state: soft bodies are not deterministic."""
         return ()
 
     def state(self) -> BodyState:

@@ -1,4 +1,4 @@
-"""URDF objects: things with links and joints, but without motors."""
+"""URDF objects: bodies with links and joints, but without motors."""
 
 import pybullet
 from pydantic import Field
@@ -38,7 +38,7 @@ class UrdfObjectConfig(BodyConfig):
 
 
 class UrdfObject(Body):
-    """A thing that others push and open, such as a cup, a door or a drawer.
+    """An object that others push or open, such as a cup, a door or a drawer.
 
     Its joints move freely within their limits, but for the damping and the friction of the URDF's `dynamics`.
 
@@ -59,7 +59,7 @@ class UrdfObject(Body):
 
     @classmethod
     def prepare(cls, config: UrdfObjectConfig, has_window: bool) -> None:
-        """Prepares what PyBullet gets in the place of the URDF."""
+        """Prepares the files that PyBullet reads instead of the URDF."""
         prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
     def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
@@ -76,7 +76,7 @@ class UrdfObject(Body):
         self._start_base(config.resetBaseVelocity, config.object_tf, is_fixed)
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """The poses of its links, the state of its base and its contacts, each if it is asked for."""
+        """The poses of its links, the state of its base and its contacts, each if configured."""
         config = self.config
         sensors: list[Sensor] = []
         if config.broadcast_hz:
@@ -129,7 +129,7 @@ def _refuse_soft(config: UrdfObjectConfig) -> None:
     try:
         is_soft = bool(UrdfDocument(file).deformable_meshes())
     except ConfigError:
-        return  # loading it tells what is wrong
+        return  # loading it reports the error
     if is_soft:
         message = f"{file} has a <deformable>: soft bodies belong to the list `soft_objects`"
         raise ConfigError([Problem(config.name, "loadURDF.fileName", message)])

@@ -1,4 +1,4 @@
-"""Visual objects: seen, never felt."""
+"""Visual objects: visible, without contacts."""
 
 from pydantic import Field
 
@@ -11,7 +11,7 @@ from .shape_object import ShapeObject
 
 
 class VisualObjectConfig(BodyConfig):
-    """A visual object: it is seen and never felt."""
+    """A visual object: visible, without contacts."""
 
     createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape | None = Field(
@@ -19,11 +19,11 @@ class VisualObjectConfig(BodyConfig):
     )
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays where it is.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, the object stays in place.")
 
 
 class VisualObject(ShapeObject):
-    """An object without collision shape that follows a TF frame or stays where it is put."""
+    """An object without collision shape that follows a TF frame or stays in place."""
 
     Config = VisualObjectConfig
     section = "visual_objects"

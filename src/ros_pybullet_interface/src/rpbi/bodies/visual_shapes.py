@@ -64,7 +64,7 @@ def body_shapes(body: Body) -> list[BodyShape]:
     simulation thread may call it.
     """
     if body.is_soft:
-        return []  # it tells its surface itself
+        return []  # it reports its surface itself
     found = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
     return [part for data in found for part in _parts(body, data)]
 
@@ -77,10 +77,10 @@ def link_pose(body: Body, link_index: int) -> Pose:
 
 
 def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
-    """Returns what a row of PyBullet's visual shapes consists of."""
+    """Returns the shapes in a row of PyBullet's visual shapes."""
     _, index, kind, size, file, position, quat, rgba, texture = data
     link, frame = body.link_name(index), Pose(position, quat)
-    visual = body.visual if isinstance(body, ShapeObject) else None  # what the object's own file says
+    visual = body.visual if isinstance(body, ShapeObject) else None  # from the object's own file
 
     def shape(kind: ShapeKind, size: Vector, pose: Pose = frame, **more: Any) -> BodyShape:
         return BodyShape(index, link, kind, size, pose, rgba, **more)
@@ -97,7 +97,7 @@ def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
         ends = [frame @ Pose((0.0, 0.0, z)) for z in (length / 2, -length / 2)]
         return [cylinder, *(shape(ShapeKind.SPHERE, _cube(diameter), end) for end in ends)]
     if kind == pybullet.GEOM_PLANE:
-        # PyBullet does not tell the normal of a plane; that of a URDF is taken to be z.
+        # PyBullet does not report the normal of a plane; for a URDF, z is assumed
         normal = visual.planeNormal if visual is not None else None
         surface = frame @ Pose(quat_xyzw=turned_to(normal or (0.0, 0.0, 1.0)))
         middle = surface @ Pose((0.0, 0.0, -PLANE_THICKNESS_M / 2))

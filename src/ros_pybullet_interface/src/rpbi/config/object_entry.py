@@ -66,6 +66,6 @@ FileOrOverrides = Annotated[
     Any,
     AfterValidator(_check),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object", "required": [FILE]}]}),
-    Expects(FILES),  # said of the list; what is wrong with an entry, the validator says
+    Expects(FILES),  # error text for the list; the validator reports errors of entries
 ]
 """A file of an object, or `{file: FILE, KEY: VALUE, ...}`."""

@@ -262,11 +262,11 @@ class ChangeVisualShape(PybulletModel):
 
 
 class CreateSoftBodyAnchor(PybulletModel):
-    """A corner that is tied to the world or to a link, at the distance that they have at the start.
+    """A corner that is attached to the world or to a link, at the distance that they have at the start.
 
     YAML has a list of the function's arguments: `[node, body, link, position]`, of which all but the first may be left
-    out. `body` is a name, or -1 for the world; `link` a name, or an index where -1 is the base. An id of the soft body
-    itself in front of them, as PyBullet has it, is accepted and means nothing.
+    out. `body` is a name, or -1 for the world; `link` a name, or an index where -1 is the base. A leading id of the
+    soft body itself, as in PyBullet, is accepted and ignored.
     """
 
     node: Count = Field(description="Number of the corner in the simulated mesh.")

@@ -56,7 +56,7 @@ def _as_list(given: Any) -> Any:
 
 LONGEST_STEP_S = 10.0
 MIN_REAL_TIME_FACTOR = 1e-3
-"""Slowest pace: with less, motions last for hours, and services that wait for them seem not to answer."""
+"""Smallest factor: below it, motions would last for hours, and services that wait for them seem to hang."""
 
 
 def checked_real_time_factor(factor: float) -> float:
@@ -67,7 +67,7 @@ def checked_real_time_factor(factor: float) -> float:
     """
     if factor == 0.0 or MIN_REAL_TIME_FACTOR <= factor < math.inf:
         return factor
-    raise ValueError(f"must be 0, which is as fast as it goes, or >= {MIN_REAL_TIME_FACTOR:g}, got {factor:g}")
+    raise ValueError(f"must be 0 (as fast as possible) or >= {MIN_REAL_TIME_FACTOR:g}, got {factor:g}")
 
 
 def _whole_nanoseconds(seconds: float) -> float:
@@ -90,7 +90,7 @@ WORLD_FRAME = "rpbi/world"
 
 
 class StaticFrame(ConfigModel):
-    """A TF frame that nobody else publishes, and where it is; the interface puts it on TF as a static one."""
+    """A TF frame that no other node publishes, with its pose; the interface publishes it as a static transform."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
     parent: FrameId = Field(WORLD_FRAME, description="The frame that its pose is in.")
@@ -137,7 +137,7 @@ class WorldConfig(ConfigModel):
         SetPhysicsEngineParameter(), description="Solver of contacts and joints."
     )
     real_time_factor: Annotated[NonNegative, AfterValidator(checked_real_time_factor)] = Field(
-        1.0, description="Simulated seconds in a second of wall time, at least 0.001; 0 is as fast as it goes."
+        1.0, description="Simulated seconds in a second of wall time, at least 0.001; 0 is as fast as possible."
     )
     clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
     tf_prefix: FrameId | None = optional("Prefix of all TF frames, so that two worlds can share one TF tree.")

@@ -1,4 +1,4 @@
-"""Joints that follow others, as the fingers of a gripper with one motor do."""
+"""Mimic joints, such as the fingers of a gripper with one motor."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Forces and torques from outside on the links of a body, for a time or until others replace them."""
+"""External forces and torques on the links of a body, for a time or until they are replaced."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class ExternalWrenches:
 
     @property
     def acts(self) -> bool:
-        """Whether something acts in the coming tick."""
+        """Whether a wrench acts in the next tick."""
         return bool(self._acting)
 
     def check(self, given: ExternalWrench | Mapping[str, Any]) -> ExternalWrench:
@@ -92,9 +92,9 @@ class ExternalWrenches:
         return wrench._replace(link=link)
 
     def set(self, wrench: ExternalWrench) -> None:
-        """Has a wrench that was checked act from the coming tick on; one without force and torque ends the one before.
+        """Applies a checked wrench from the next tick on; one without force and torque ends the previous one.
 
-        Bodies that sleep are woken.
+        Sleeping bodies are woken.
         """
         index = self._indices[wrench.link]
         if not any(wrench.force) and not any(wrench.torque):
@@ -105,7 +105,7 @@ class ExternalWrenches:
         self._pb.changeDynamics(self._body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
 
     def apply(self, link_pose: Callable[[int], Pose]) -> None:
-        """Acts for a tick: PyBullet forgets forces after each step.
+        """Applies the wrenches for a tick: PyBullet clears forces after each step.
 
         Args:
             link_pose: Returns the pose of a link's URDF frame in the world by PyBullet's index.

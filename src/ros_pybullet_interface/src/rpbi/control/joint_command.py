@@ -11,7 +11,7 @@ from rpbi.plain_values import joint_values
 
 
 class WrongQuantityError(ValueError):
-    """A command has other quantities than those that are asked for."""
+    """A command lacks the required quantity."""
 
 
 class JointCommand(NamedTuple):

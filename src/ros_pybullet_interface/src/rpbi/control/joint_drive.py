@@ -55,7 +55,7 @@ class JointDrive:
                 self.motors.follow(command)
 
     def drop_targets(self, joints: Iterable[int] | None = None) -> None:
-        """Forgets the streams of targets of joints, or all targets."""
+        """Drops the streams of targets of joints, or all targets."""
         if joints is None:
             self._streams.clear()
         else:
@@ -74,7 +74,7 @@ class JointDrive:
             ValueError: If the robot is under torque control, or a controller drives one of its joints.
         """
         if self.motors.mode == pybullet.TORQUE_CONTROL:
-            raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
+            raise ValueError("the robot is under TORQUE_CONTROL, which cannot hold a position")
         if taken := self.controlled() & motion.joints:
             names = ", ".join(self.model.joints[index].name for index in sorted(taken))
             raise ValueError(f"a controller drives {names} until it is stopped")
@@ -97,7 +97,7 @@ class JointDrive:
         return self.motion is None and self._streams.rest
 
     def advance(self, tick: int) -> None:
-        """Sets the motors to where targets and motion are to be after this tick."""
+        """Sets the motors to the positions of targets and motion after this tick."""
         motion = self.motion
         self._streams.advance(tick, frozenset() if motion is None else motion.joints)
         if motion is None:

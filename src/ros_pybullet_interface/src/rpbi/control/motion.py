@@ -22,7 +22,7 @@ class MotionResult(NamedTuple):
 
 
 class Motion(ABC):
-    """Drives some joints of one robot; `JointDrive.run` starts it, on the simulation thread, where all of it happens.
+    """Drives some joints of one robot; `JointDrive.run` starts it, on the simulation thread, which makes all calls.
 
     Args:
         joints: Indices of the joints that it drives.

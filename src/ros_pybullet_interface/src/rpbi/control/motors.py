@@ -74,7 +74,8 @@ class ResolvedCommand(NamedTuple):
     stamp_ns: int = 0
 
     def merged(self, newer: ResolvedCommand) -> ResolvedCommand:
-        """Returns both as one: the newer one wins joint by joint, or as a whole if the mode changed between them."""
+        """Merges both: the newer one replaces the older joint by joint, or as a whole if the mode changed between
+        them."""
         return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
 
 
@@ -102,8 +103,8 @@ class MotorGains(NamedTuple):
 class Motors:
     """Drives the joints of one robot within the efforts and velocities of its URDF.
 
-    Positions hold until the next target. Velocities and efforts that are not renewed go back to 0 after a while of
-    simulated time: a sender that stops stops the robot.
+    Positions hold until the next target. Velocities and efforts that are not renewed return to 0 after some simulated
+    time: the robot stops when its sender stops.
 
     Args:
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
@@ -198,7 +199,7 @@ class Motors:
         """
         mode = self.mode
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
-        # Others than those asked for are looked at too: what has one that is no number is not to be trusted.
+        # also checks quantities that are not used: a target with a non-finite number is refused
         resolved = {
             quantity: self._model.resolve(target.names, given)
             for quantity in dict.fromkeys(QUANTITIES.values())

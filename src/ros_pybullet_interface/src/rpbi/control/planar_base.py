@@ -39,10 +39,10 @@ class PlanarVelocity(NamedTuple):
 
     @classmethod
     def checked(cls, twist: Twist | Mapping[str, Any]) -> PlanarVelocity:
-        """Returns what a twist, or a mapping of its fields, asks of a base that stays in its plane.
+        """Returns the planar velocity in a twist, or in a mapping of its fields.
 
         Raises:
-            ValueError: If a number is not finite or points out of the plane; it names what does.
+            ValueError: If a number is not finite or points out of the plane; it names the field.
         """
         given = {
             f"{part}.{axis}": value
@@ -58,7 +58,7 @@ class PlanarVelocity(NamedTuple):
         return cls(given["linear.x"], given["linear.y"], given["angular.z"])
 
     def turned(self, yaw: float) -> PlanarVelocity:
-        """Returns the same velocity expressed in a frame in which the present one stands at an angle [rad]."""
+        """Returns the same velocity expressed in a frame in which the present one has a yaw angle [rad]."""
         cos, sin = math.cos(yaw), math.sin(yaw)
         return PlanarVelocity(cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw)
 
@@ -99,9 +99,10 @@ class PlanarBaseConfig(ConfigModel):
 GRAVITY = 9.81
 """Gravity for the default force limits [m/s^2], whatever the world's is."""
 POSITION_GAIN = 0.1
-"""Share of its lag that the base makes up for in a tick."""
+"""Share of its lag that the base recovers in a tick."""
 CATCH_UP_SPEED = (0.5, 0.5, 1.0)
-"""Largest speed to make up for lag [m/s, m/s, rad/s]; lag beyond it is dropped, since an obstacle blocks the base."""
+"""Largest additional speed to recover lag [m/s, m/s, rad/s]; lag beyond it is dropped, since an obstacle blocks the
+base."""
 
 
 def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
@@ -155,7 +156,7 @@ class PlanarBase:
         self._set_point = [state[0] for state in self._joint_states()]
 
     def before_step(self, tick: int) -> None:
-        """Moves the set point on by a tick."""
+        """Advances the set point by a tick."""
         if self._expiry is None:
             self._expiry = tick + self._timeout_ticks
         elif tick >= self._expiry:
@@ -170,7 +171,7 @@ class PlanarBase:
             if abs(lag) > max_lag:
                 self._set_point[axis] = position + math.copysign(max_lag, lag)
                 velocity[axis], is_held_up = speed, True
-        if is_held_up:  # go on from the velocity that it has
+        if is_held_up:  # continue from its present velocity
             self._velocity = PlanarVelocity(*velocity).turned(-yaw)
         self._pb.setJointMotorControlArray(
             self._body_id,
@@ -200,8 +201,8 @@ class PlanarBase:
     def _force_limits(self) -> tuple[float, float, float]:
         """Returns the force along x and y [N] and the torque about z [N m] that the motors have.
 
-        Where the configuration says nothing they have what wheels with a friction coefficient of 1 would have: the
-        robot's weight, and its weight at its radius of gyration.
+        Defaults are those of wheels with a friction coefficient of 1: the robot's weight, and its weight at its radius
+        of gyration.
         """
         joints = range(self._pb.getNumJoints(self._body_id))
         infos = [self._pb.getJointInfo(self._body_id, index) for index in joints]

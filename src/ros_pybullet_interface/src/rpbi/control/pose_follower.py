@@ -1,4 +1,4 @@
-"""Bodies that follow a stream of poses with a velocity, so that contacts are right."""
+"""Bodies that follow a stream of poses with a velocity, so that contact forces are correct."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ INTERVALS = 5
 LONGEST_GROWTH = 2
 """Largest growth of the longest interval by a new one; a longer interval is a pause, and clipped to it."""
 JUMP_S = 0.1
-"""Longest motion to a pose at the largest speeds [s], two periods if that is longer; beyond it, the pose is a jump."""
+"""Longest motion to a pose at the largest speeds [s], or two periods if that is longer; a pose further away is a
+jump."""
 QUIET_S = 5.0
 """Time after a warning of a jump without another [s] of the world's time."""
 
@@ -32,17 +33,17 @@ _Numbers = npt.NDArray[np.float64]
 
 
 class PosePath:
-    """Smooths a stream of poses that are held until the next one comes; all by ticks.
+    """Smooths a stream of poses, tick by tick.
 
-    The line goes straight to each pose, in the longest of the last few intervals between poses, or longer at the
-    largest speeds. The path is the mean of that line over a number of ticks: the velocity changes evenly, and nothing
-    overshoots. Quaternions are averaged as vectors, signs aligned.
+    Straight lines lead to each pose, in the longest of the last few intervals between poses, or longer at the largest
+    speeds. The path is the moving average of these lines: the velocity changes evenly, without overshoot. Quaternions
+    are averaged as vectors, signs aligned.
 
     Args:
         start: Pose at the beginning, at rest.
         ticks: Expected interval between poses [ticks], over which the mean is taken.
-        max_step: Longest way in a tick [m].
-        max_turn: Largest turn in a tick [rad].
+        max_step: Largest translation in a tick [m].
+        max_turn: Largest rotation in a tick [rad].
     """
 
     def __init__(self, start: Pose, ticks: int, max_step: float, max_turn: float) -> None:
@@ -105,9 +106,9 @@ def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
 class PoseFollower:
     """Moves a fixed base of one PyBullet body along a stream of poses.
 
-    A base without mass moves at its set velocity, and contacts are solved with it: it carries, pushes and rubs other
-    bodies, and nothing stops it. Before each tick its velocity is set to reach the path's next pose. The first pose,
-    and any beyond a jump, is set at once, at rest.
+    A base without mass moves at its set velocity, and contacts are solved with it: it carries and pushes other bodies,
+    with friction, and nothing stops it. Before each tick its velocity is set to reach the path's next pose. The first
+    pose, and any beyond a jump, is set at once, at rest.
 
     Args:
         name: The body, for messages.
@@ -133,7 +134,7 @@ class PoseFollower:
             self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Puts the frame that follows somewhere at once, at rest."""
+        """Sets the following frame to a pose at once, at rest."""
         self._waiting = None
         self._begin(pose @ self._centre)
 
@@ -186,7 +187,7 @@ class PoseFollower:
         """Sets the velocity that leads to a pose in a tick."""
         position, quat = self._pb.getBasePositionAndOrientation(self._body_id)
         way, turn = minus(pose.position, position), rotation_between(quat, pose.quat_xyzw)
-        # PyBullet moves a base that turns by way + turn x way, so its velocity is the inverse of that
+        # PyBullet moves a rotating base by d + r x d, so the velocity is the inverse of that
         across = cross(turn, way)
         told = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
         linear, angular = scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn)
@@ -194,7 +195,7 @@ class PoseFollower:
         self._is_moving = True
 
     def _velocity_before(self, velocity: Vector) -> Vector:
-        """Returns what a velocity [m/s] is before the forces of a tick act, which none do on a base without mass."""
+        """Returns the velocity [m/s] before the forces of a tick act; no forces act on a base without mass."""
         return velocity
 
 
@@ -218,7 +219,7 @@ class TrackedBase(PoseFollower):
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Leaves the body, which was put somewhere, to physics until the next pose comes."""
+        """Leaves the body to physics until the next pose comes, after it was set to a pose."""
         self._path = self._waiting = None
 
     def before_step(self, tick: int) -> None:

@@ -14,7 +14,7 @@ REST = {"rad": 0.05, "m": 0.005}
 SETTLING_S = 1.0
 """Longest time after the last set point until joints rest at the goal [s] of the world's time; then it fails."""
 LONGEST_S = 1e6
-"""Longest motion [s]; what is longer was not meant."""
+"""Longest motion [s]; longer ones are refused as errors."""
 SHORTEST_S = 0.04
 """Shortest duration of a motion [s], as in the first release; shorter ones are extended to it."""
 PEAK = 15.0 / 8.0
@@ -59,7 +59,7 @@ class TimedMotion(Motion):
         self._time_s, self._set_point = time_s, tuple(start)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Follows the plan, then waits at the goal until the joints have come, or have had their time."""
+        """Follows the plan, then waits at the goal until the joints arrive or the time is over."""
         if time_s > self._trajectory.end_s + 1e-9:
             missed = self._missed(measured)
             if not missed and self._rests(measured):
@@ -69,7 +69,7 @@ class TimedMotion(Motion):
                 else:
                     self.end(True, f"reached: {reached}")
             elif time_s > self._trajectory.end_s + SETTLING_S:
-                why = "missed the goal" if missed else "still swings about the goal"
+                why = "missed the goal" if missed else "still oscillates about the goal"
                 self.end(False, f"{why}: {self._residuals(measured, missed or None)}; {self._reached(measured)}")
         before, duration_s = self._set_point, time_s - self._time_s
         self._set_point, self._time_s = self._trajectory.sample(time_s).position, time_s

@@ -27,7 +27,7 @@ PRINTING = frozenset(
     "createCollisionShape createMultiBody createSoftBodyAnchor createConstraint changeConstraint removeConstraint "
     "removeBody startStateLogging stopStateLogging vhacd".split()
 )
-"""Functions in which PyBullet may print something; the others are called often, and print nothing."""
+"""Functions in which PyBullet may print; the others are called often, and never print."""
 CHANGING = frozenset(
     "applyExternalForce applyExternalTorque changeConstraint changeDynamics createConstraint createMultiBody "
     "createSoftBodyAnchor loadBullet loadMJCF loadSDF loadSoftBody loadURDF performCollisionDetection removeBody "
@@ -37,7 +37,7 @@ CHANGING = frozenset(
     "setJointMotorControlMultiDof setJointMotorControlMultiDofArray setPhysicsEngineParameter setRealTimeSimulation "
     "setTimeStep stepSimulation".split()
 )
-"""Functions after which a world moves in another way."""
+"""Functions that change the motion of a world."""
 MAX_LINES = 20
 """Largest number of lines logged for one call; further ones are counted. PyBullet prints several for each link."""
 log = logging.getLogger("pybullet")
@@ -179,7 +179,7 @@ class Client:
             pybullet.disconnect(self.client_id)
 
     def become(self, other: Client) -> None:
-        """Becomes another connection, which only this object uses from then on; its own ends."""
+        """Takes over another connection and closes its own."""
         self.disconnect()
         values = {name: value for name, value in vars(other).items() if not callable(value)}
         kept = {"changes": self.changes, "advance": other.advance}
@@ -214,7 +214,7 @@ def _screen() -> Iterator[None]:
     if display is None:
         raise PhysicsError(
             "connect.connection_mode: a window needs a screen, and none answers at DISPLAY "
-            f"'{os.getenv('DISPLAY', '')}': write DIRECT, or run it under xvfb-run, with a screen that nobody sees"
+            f"'{os.getenv('DISPLAY', '')}': write DIRECT, or run it under xvfb-run, with a virtual screen"
         )
     try:
         yield

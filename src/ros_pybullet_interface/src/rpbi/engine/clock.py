@@ -10,8 +10,8 @@ SLOWEST_HZ = Fraction(1, 1_000_000)
 class Clock:
     """Counts ticks and gives each its stamp.
 
-    Stamps never repeat and never go back while the clock lives. Simulated stamps are exact: tick `n` is stamped
-    `(n + 1) * dt`, so the initial state has the stamp dt, since a stamp of 0 means "no time yet" in ROS. Ticks are the
+    Stamps never repeat and never decrease while the clock exists. Simulated stamps are exact: tick `n` is stamped `(n +
+    1) * dt`, so the initial state has the stamp dt, since a stamp of 0 means "no time yet" in ROS. Ticks are the
     world's: they begin at 0 again when it is reset, while the stamps go on.
 
     Args:
@@ -66,7 +66,7 @@ class Clock:
             self.stamp_ns = max(self.stamp_ns + 1, time.time_ns())
 
     def bump_stamp(self) -> None:
-        """Has what comes from now on another stamp than what was before, in any case; the coming ticks keep theirs."""
+        """Makes the next stamp differ from the last one; the stamps of coming ticks do not change."""
         self.stamp_ns += 1
 
 

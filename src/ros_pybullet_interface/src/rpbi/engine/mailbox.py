@@ -20,8 +20,8 @@ class ClosedError(RuntimeError):
 class Mailbox:
     """Latest-wins slots for streams, and a queue of calls with futures for requests.
 
-    Any thread may `put` and `request`; only the simulation thread calls `drain` and `run_requests`. Its lock is the
-    only one between them, and held only to swap a reference.
+    Any thread may `put` and `request`; only the simulation thread calls `drain` and `run_requests`. Threads share a
+    single lock, which is held only to swap a reference.
     """
 
     def __init__(self) -> None:
@@ -31,14 +31,14 @@ class Mailbox:
         self._closed = False
         self._busy: Callable[[], str] | None = None
         self.generation = 0
-        """Grows whenever all values that wait are dropped."""
+        """Incremented whenever all waiting values are dropped."""
 
     def put(
         self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, generation: int | None = None
     ) -> None:
         """Puts a value into a slot; one that still waits is replaced, or merged with it.
 
-        A value of another `generation` than the present one is dropped, and any value of a world that is busy.
+        A value of another `generation` than the present one is dropped; so is any value while the world is busy.
         """
         with self._lock:
             if self._busy is not None or generation not in (None, self.generation):
@@ -58,8 +58,8 @@ class Mailbox:
         return not self._slots
 
     def drain(self) -> Mapping[str, Any]:
-        """Empties all slots and returns what was in them, by slot name."""
-        if not self._slots:  # the usual case, and the one that must cost nothing
+        """Empties all slots and returns their values by slot name."""
+        if not self._slots:  # the usual case, which must be fast
             return NOTHING  # not the slots themselves: other threads may put something there while the caller reads
         with self._lock:
             taken, self._slots = self._slots, {}
@@ -72,7 +72,7 @@ class Mailbox:
             self.generation += 1
 
     def hold(self, busy: Callable[[], str] | None) -> None:
-        """Has the world busy with something that nothing may disturb; None ends that.
+        """Marks the world as busy: inputs are dropped and requests refused; None ends that.
 
         Args:
             busy: Returns the answer to requests meanwhile.
@@ -103,7 +103,7 @@ class Mailbox:
         for _ in range(len(self._requests)):
             call, future, even_if_busy = self._requests.popleft()
             if not future.set_running_or_notify_cancel():
-                continue  # whoever asked has given up waiting
+                continue  # the caller has given up waiting
             try:
                 if self._busy is not None and not even_if_busy:
                     raise InterfaceError(self._busy())

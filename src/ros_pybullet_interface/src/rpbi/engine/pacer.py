@@ -9,17 +9,17 @@ MAX_DEBT_S = 0.25
 """Largest lateness of a tick that is caught up with [s]; beyond it, all of it is dropped and counted as lost."""
 
 LEAST_SHARE = 0.8
-"""Smallest share of a processor that suffices; below it, the lack of it is reported as the cause."""
+"""Smallest share of a processor that suffices; below it, it is reported as the cause."""
 
 MAX_SLEEP_S = 0.005
-"""Longest sleep between two looks at requests [s]."""
+"""Longest sleep between two checks for requests [s]."""
 
 
 class Pacer:
     """Determines when the next tick is due by the wall clock, and counts late ticks.
 
-    Deadlines are absolute, so lateness does not add up: after a late tick the next ones follow at once until the debt
-    is paid; one beyond MAX_DEBT_S is dropped.
+    Deadlines are absolute, so lateness does not add up: after a late tick, the next ones follow at once until the delay
+    is recovered. A delay beyond MAX_DEBT_S is dropped.
 
     Args:
         dt_s: Length of a tick [s] of simulated time.
@@ -81,7 +81,7 @@ class Pacer:
         self._window_ticks += ticks
 
     def wait(self) -> None:
-        """Sleeps until the next tick is due, or until it is time to look at requests."""
+        """Sleeps until the next tick is due, or until it is time to check for requests."""
         if self._period_s:
             left_s = self._deadline_s - time.monotonic()
             if left_s > 0.0:
@@ -123,7 +123,7 @@ class Load(NamedTuple):
         return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 
     def reason(self, dt_s: float) -> str:
-        """Returns why a world that spent this is slower than it should be, and what to do about it.
+        """Returns the reason why the world is too slow, with advice.
 
         Args:
             dt_s: Simulated time of a tick [s].

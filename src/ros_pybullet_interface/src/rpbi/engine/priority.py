@@ -53,7 +53,7 @@ class RealTimePriority:
 
     @staticmethod
     def _schedule_normally(thread_id: int) -> None:
-        policy = os.SCHED_OTHER | os.SCHED_RESET_ON_FORK  # only root may take the flag back
+        policy = os.SCHED_OTHER | os.SCHED_RESET_ON_FORK  # only root may reset the flag
         os.sched_setscheduler(thread_id, policy, os.sched_param(0))
 
 
@@ -88,7 +88,7 @@ def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
     changed: set[int] = set()
     while new := _threads(process_id) - changed:
         for thread_id in new:
-            with contextlib.suppress(OSError):  # it may be gone, or this not allowed
+            with contextlib.suppress(OSError):  # it may have ended, or permission is missing
                 change(thread_id)
         changed |= new
 

@@ -33,7 +33,7 @@ class ActionPart(Protocol):
     size: int
 
     def reset(self) -> None:
-        """Begins where the world is, which was just reset."""
+        """Starts from the present state of the world, which was just reset."""
 
     def apply(self, values: Values) -> None:
         """Acts by numbers in [-1, 1]."""
@@ -71,9 +71,9 @@ class JointAction:
 
 
 class PoseAction:
-    """Moves the target of a controller that leads a link, by ways along x, y and z of the world and turns about them.
+    """Moves the target of a controller of a link, by translations along and rotations about x, y and z of the world.
 
-    It begins where the controlled point is. While the controller is not active, actions have no effect.
+    It starts at the controlled point. While the controller is not active, actions have no effect.
 
     Args:
         controller: The controller, as `ROBOT/CONTROLLER`; it has a `point` of the link, and its `target` is a pose.
@@ -103,7 +103,7 @@ class PoseAction:
         self._link, self._point = link_index(robot, link), Pose(config.point)
         self._low, self._high, self._step, self._turn = low, high, step, turn
         self.goal = Pose()
-        """Where the point is to be, in the world."""
+        """Target of the point, in the world."""
 
     def reset(self) -> None:
         """Begins at the present pose."""
@@ -129,7 +129,7 @@ class HandAction:
         axes: Axes along which it is moved, such as `xy`; along the others it stays where it began.
         low: Lower corner of the box that it stays in [m].
         high: Upper corner [m].
-        step: Largest way of an action along each axis [m].
+        step: Largest translation of an action along each axis [m].
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class HandAction:
         self._names = [joint.name for joint, moves in zip(driven, self._moves) if moves]
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in driven]).T
         self.goal = [0.0, 0.0, 0.0]
-        """Where the link is to be [m]."""
+        """Target of the link [m]."""
         self.size = len(axes)
 
     def reset(self) -> None:

@@ -1,4 +1,4 @@
-"""Calls of tasks, whose results are checked: a task of somebody else may fail, or return nonsense."""
+"""Calls of tasks with checked results: a task of another package may fail, or return invalid values."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ class CheckedTask:
 
     @property
     def watches(self) -> bool:
-        """Whether the task looks at every tick."""
+        """Whether the task evaluates every tick."""
         return type(self.task).after_tick is not WorldTask.after_tick
 
     @property
     def ends_otherwise(self) -> bool:
-        """Whether episodes end in other ways than with success."""
+        """Whether episodes can end without success."""
         return type(self.task).has_ended is not WorldTask.has_ended
 
     def after_tick(self) -> None:
-        """Has the task note what happened in a tick."""
+        """Calls the task after a tick."""
         self._call("after_tick", self.task.after_tick)
 
     def observation(self) -> Any:

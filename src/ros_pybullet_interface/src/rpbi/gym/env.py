@@ -44,7 +44,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         render_mode: `rgb_array` for images of the world's first camera, `human` for PyBullet's window.
 
     Attributes:
-        world: The world; nothing of it is hidden.
+        world: The world; with full access.
         task: The task.
 
     Raises:
@@ -90,7 +90,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         """Starts an episode; the same seed and actions lead to the same observations, to the last bit.
 
         Args:
-            seed: Seed of all that is random from now on; without one, what was random before goes on.
+            seed: Seed of all that is random from now on; without one, the random sequence continues.
             options: None are known.
 
         Returns:
@@ -126,7 +126,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         return observation, reward, has_ended, is_last, {"is_success": has_succeeded}
 
     def render(self) -> Image | None:
-        """Returns what the world's first camera sees, uint8, shape (height, width, 3).
+        """Returns the image of the world's first camera, uint8, shape (height, width, 3).
 
         With PyBullet's window it waits until the time of an action has passed since the last call, and returns nothing.
         """
@@ -188,10 +188,10 @@ def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) ->
 
 
 class DelayLine:
-    """Runs the ticks of an action, in which older actions begin to act and observations are made that are due later.
+    """Runs the ticks of an action, with delayed actions and delayed observations.
 
-    An observation that is d ticks old at the end of an action was made d ticks before that; those from before the
-    episode are the one of its start.
+    An observation with delay d is made d ticks before the end of an action; before the episode, it is that of its
+    start.
 
     Args:
         ticks: Ticks of an action.
@@ -214,7 +214,7 @@ class DelayLine:
 
         Args:
             action: The action.
-            act: Has an action begin to act.
+            act: Applies an action.
             step: Advances by a tick.
             observe: Returns the present observation.
         """

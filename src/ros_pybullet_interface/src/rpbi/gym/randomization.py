@@ -61,7 +61,7 @@ class PoseVariation(ConfigModel):
     yaw: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn about the vertical, either way.")
 
     def apply(self, world: World, random: np.random.Generator) -> None:
-        """Puts the body elsewhere."""
+        """Moves the body to a random pose."""
         pose = world.bodies[self.object].base_pose()
         offset, yaw = random.uniform(-1.0, 1.0, 3) * self.position, random.uniform(-self.yaw, self.yaw)
         turn = Pose((0.0, 0.0, 0.0), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
@@ -77,7 +77,7 @@ class JointVariation(ConfigModel):
     joints: ListOf[Text] = Field((), description="The joints; all that have motors by default.")
 
     def apply(self, world: World, random: np.random.Generator) -> None:
-        """Puts the joints elsewhere."""
+        """Moves the joints to random positions."""
         body = robot_of(world, self.robot)
         starts = body.joint_positions()
         chosen = [body.model[name] for name in self.joints] or body.model.driven
@@ -143,7 +143,7 @@ class Randomizer:
 
     Args:
         world: The world, before its first tick.
-        config: How.
+        config: The variation.
         file: Its file, for messages.
 
     Raises:

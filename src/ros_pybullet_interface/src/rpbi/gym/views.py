@@ -18,7 +18,7 @@ Image = npt.NDArray[Any]
 
 
 class Views:
-    """Draws what cameras of a world see, once somebody asks.
+    """Renders the cameras of a world on demand.
 
     Args:
         world: The world.

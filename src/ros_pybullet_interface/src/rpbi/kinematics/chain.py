@@ -16,7 +16,7 @@ from rpbi.urdf.joints import Joint
 
 
 class Target(NamedTuple):
-    """Where a link shall be.
+    """Target of a link.
 
     Attributes:
         position: x, y, z in the base [m].
@@ -66,7 +66,7 @@ class BulletChain:
         return Pose(state[4], state[5])
 
     def error(self, target: Target) -> np.ndarray:
-        """Returns the way to the target: 3 values [m], and 3 of a rotation vector [rad] if it has an orientation."""
+        """Returns the error to the target: 3 distances [m], and a rotation vector [rad] if it has an orientation."""
         position, quat = self.pose()
         way = [goal - here for goal, here in zip(target.position, position)]
         if target.quat_xyzw is not None:
@@ -74,7 +74,7 @@ class BulletChain:
         return np.array(way)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:
-        """Returns how far the link is from the target at m positions [rad or m]."""
+        """Returns the residual of the link at m positions [rad or m]."""
         self.set(q)
         way = self.error(target).tolist()
         return Residual(math.hypot(*way[:3]), math.hypot(*way[3:]))

@@ -126,10 +126,10 @@ class Kinematics:
 
     @contextmanager
     def _open(self) -> Iterator[None]:
-        """Lets one thread at the client, or raises PhysicsError if it was closed."""
+        """Locks the client for one thread, or raises PhysicsError if it was closed."""
         with self._lock:
             if not self._disconnect.alive:
-                raise PhysicsError("the robot has gone, and its kinematics with it")
+                raise PhysicsError("the robot was removed, and its kinematics with it")
             yield
 
     def _load_joints(self, flags: int) -> list[Joint]:
@@ -147,7 +147,7 @@ class Kinematics:
         return joints
 
     def _chain(self, link_name: str) -> BulletChain:
-        """Returns what moves a link.
+        """Returns the chain that moves a link.
 
         Raises:
             UnknownNameError: If there is no such link.

@@ -20,7 +20,7 @@ Its arguments are m start positions [rad or m], the joints to hold, and the larg
 positions.
 """
 BREAK_S = 5e-5
-"""Pause between stages, in which the simulation gets Python's lock [s]."""
+"""Pause between stages, which lets the simulation take Python's lock [s]."""
 FROZEN = 1e6
 """Damping that keeps a joint where it is."""
 DAMPING = 1e-3
@@ -67,7 +67,7 @@ class DampedLeastSquares:
 
 
 LARGEST_STEP = np.pi / 4
-"""Most that a joint moves in one step [rad or m], as in the paper."""
+"""Largest motion of a joint in one step [rad or m], as in the paper."""
 
 
 class SelectivelyDampedLeastSquares:
@@ -94,14 +94,14 @@ class SelectivelyDampedLeastSquares:
 
 
 def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Returns the m joints' step for an error; each singular direction is damped by what it asks of the joints."""
+    """Returns the m joints' step for an error; each singular direction is damped by the joint motion that it needs."""
     lengths = np.linalg.norm(jacobian, axis=0)  # how much the link moves with each joint
     step = np.zeros(jacobian.shape[1])
     left, singular_values, right = np.linalg.svd(jacobian, full_matrices=False)
     for u, sigma, v in zip(left.T, singular_values, right):
         if sigma < 1e-9:
             continue
-        moved = np.abs(v) @ lengths / sigma  # what all joints move for this direction, against the 1 that it gains
+        moved = np.abs(v) @ lengths / sigma  # motion of all joints for a unit step in this direction
         largest = min(1.0, 1.0 / moved) * LARGEST_STEP
         step += _clamped(v * (u @ error) / sigma, largest)
     return _clamped(step, LARGEST_STEP)
@@ -114,9 +114,9 @@ def _clamped(step: np.ndarray, largest: float) -> np.ndarray:
 
 POSTURE_STEPS = 60
 LARGEST_POSTURE_STEP = 0.2
-"""Most that a joint of weight 1 moves in one step [rad or m]."""
+"""Largest motion of a joint of weight 1 in one step [rad or m]."""
 DONE = 1e-3
-"""Size of the step of such a joint at which little is left to gain [rad or m]."""
+"""Step of such a joint below which the search ends [rad or m]."""
 POSTURE_DAMPING = 1e-6
 """Keeps the pseudo-inverse finite where the link cannot move in all directions."""
 
@@ -163,7 +163,7 @@ def _cost(q: np.ndarray, rest: np.ndarray, ranges: np.ndarray) -> float:
 def _step(
     jacobian: np.ndarray, error: np.ndarray, wish: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
-    """Returns the step that undoes the error and is nearest to the one wished for; joints stop at their limits."""
+    """Returns the step that corrects the error and is nearest to the desired one; joints stop at their limits."""
     step = np.zeros(len(wish))
     free = np.ones(len(wish), dtype=bool)
     for _ in range(len(wish)):
@@ -182,7 +182,7 @@ def _step(
 
 
 def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
-    """Minimises the distance of the link from a target that it need not reach.
+    """Minimises the distance of the link from a target that may be out of reach.
 
     By L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
 
@@ -190,7 +190,7 @@ def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, s
         m positions [rad or m], and the distance from the target: the norm of distance and angle, each divided by its
         tolerance.
     """
-    from scipy.optimize import minimize  # slow to load, and seldom asked for
+    from scipy.optimize import minimize  # slow to import, and seldom used
 
     weights = 1.0 / np.array([POSITION_TOLERANCE_M] * 3 + [ORIENTATION_TOLERANCE_RAD] * 3)
 

@@ -69,8 +69,8 @@ class Search:
     def run(self) -> tuple[np.ndarray, Residual]:
         """Returns the best m positions [rad or m] that were found, and how far off the target they are.
 
-        Those of a target out of reach are as near to it as the robot comes downhill from where it is, so that a target
-        that moves on does not throw the robot from one posture to another; unless another one is much nearer.
+        For a target out of reach, they are a local minimum of the distance near the present posture, so that a moving
+        target does not cause jumps between postures; unless another posture is much nearer.
         """
         q, residual = self._solution()
         if residual.size > 1.0 and self._current:
@@ -131,7 +131,7 @@ class Search:
         return q, self._chain.residual(self._target, q)
 
     def _starts(self) -> Iterator[tuple[Step, list[float]]]:
-        """Yields where to start: at the rest posture, where the robot is, and then at random, with the faster step."""
+        """Yields the starts: the rest posture, the present positions, and then random ones, each with its method."""
         if not self._current:
             return
         if len(self._rest):
@@ -142,7 +142,7 @@ class Search:
             yield (self._fast_step if i else self._asked_step), start
 
     def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:
-        """Yields each stage on the way from a start towards the target.
+        """Yields each stage of the search from a start towards the target.
 
         A joint at a limit is held there for one stage, so that the others compensate.
         """
@@ -165,12 +165,12 @@ class Search:
             frozen, last = stuck | stopped, residual.size
 
     def _of_chain(self, values: Sequence[float]) -> np.ndarray:
-        """Returns what a field of the problem has for the joints of the chain, if it has anything."""
+        """Returns the values of a field of the problem for the joints of the chain, if any."""
         return np.array(values, dtype=float)[self._chain.members] if len(values) else np.empty(0)
 
 
 def _damping(given: np.ndarray, count: int) -> np.ndarray:
-    """Returns how unwilling each joint is to move; the most willing one has 1."""
+    """Returns the damping of each joint, relative to the smallest."""
     if not given.any():
         return np.ones(count)
     given = np.maximum(given, LEAST_WEIGHT * given.max())

@@ -1,1 +1,1 @@
-"""Mesh files: what is wrong with them, and trying them where nothing can break."""
+"""Mesh files: checks, and trial loading in a separate process."""

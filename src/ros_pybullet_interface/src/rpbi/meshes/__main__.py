@@ -41,14 +41,14 @@ def main() -> None:
         except (pybullet.error, MemoryError) as error:
             message = str(error) or "out of memory"
         if _says(said, GETS_NOTHING):
-            message = "it gets nothing out of it"
+            message = "it reads nothing from it"
         os.write(int(report), " ".join(message.split()).encode() + b"\n")
 
 
 def _refuse_nonsense(file: str) -> None:
-    """Refuses an STL file with a number that is none, and an OBJ file that makes no sense.
+    """Refuses an STL file with non-finite numbers, and an invalid OBJ file.
 
-    With those, PyBullet crashes now and then, and so not always here.
+    PyBullet crashes with these only sometimes, so a trial may not show it.
     """
     if file.lower().endswith(".obj"):
         try:

@@ -27,14 +27,14 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
 
 
 def mesh_file_problem(path: str) -> str:
-    """Returns what is wrong with a mesh file that PyBullet would leave out without a word; empty if nothing is seen."""
+    """Returns the fault of a mesh file that PyBullet would omit without a message; empty if none is found."""
     if path.lower().endswith(".stl") and not _is_binary_stl(path):
         return "expected a whole binary STL file, got another kind or a part"
     return ""
 
 
 def check_obj(lines: Iterable[bytes]) -> None:
-    """Checks that the faces of an OBJ file name corners that it has; PyBullet reads whatever is in memory there.
+    """Checks that the faces of an OBJ file refer to existing corners; PyBullet would read invalid memory.
 
     Raises:
         ValueError: If one does not, or a corner is not at three finite numbers.
@@ -64,14 +64,14 @@ def _is_binary_stl(path: str) -> bool:
 
 
 def soft_mesh_problems(path: str) -> list[str]:
-    """Returns what is wrong with the mesh of a soft body, a file that exists: a sentence for each fault."""
+    """Returns a sentence for each fault in the mesh of a soft body, an existing file."""
     status = os.stat(path)
     return list(_soft_mesh_problems(path, status.st_size, status.st_mtime_ns))
 
 
 @lru_cache(maxsize=32)
 def _soft_mesh_problems(path: str, size: int, changed_ns: int) -> list[str]:
-    """Does the same; files that are the same need not be read again, least of all in the simulation's thread."""
+    """Does the same, cached: unchanged files are not read again, which matters in the simulation's thread."""
     kind = Path(path).suffix.lower()
     if kind not in SOFT_MESH_FORMATS:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]

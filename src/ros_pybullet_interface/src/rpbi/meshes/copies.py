@@ -1,4 +1,4 @@
-"""Files made from meshes, kept in the user's cache folder by what they were made from."""
+"""Files made from meshes, cached in the user's cache folder by a hash of their sources."""
 
 import errno
 import hashlib
@@ -20,12 +20,12 @@ MAX_FILES = 100
 
 
 def cache_folder() -> Path:
-    """Returns the user's folder for what is remembered of meshes, which may not exist yet."""
+    """Returns the user's cache folder for meshes, which may not exist yet."""
     return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "rpbi" / "meshes"
 
 
 def content_hash(file: str, *parameters: object) -> str:
-    """Returns a hash of all that PyBullet reads of a mesh, of its version, and of what else matters.
+    """Returns a hash of all files that PyBullet reads for a mesh, of PyBullet's version, and of further values.
 
     Raises:
         OSError: If one of its files is there, but is no ordinary file, or if it names too many.
@@ -60,7 +60,7 @@ def _named(data: bytes) -> Iterator[tuple[bytes, str]]:
 
 
 def kept(name: str, make: Callable[[Path], None]) -> Path:
-    """Returns a folder of the cache that is made whole or not at all; of several processes, the first one's stays.
+    """Returns a folder of the cache, created atomically; of several processes, the first one's result is kept.
 
     Args:
         name: Its name, with a hash of all that its content depends on.
@@ -85,7 +85,7 @@ def kept(name: str, make: Callable[[Path], None]) -> Path:
 
 
 def with_textures_that_exist(mesh: Path) -> Path:
-    """Returns an OBJ file whose materials name no texture that is missing, of which RViz would complain.
+    """Returns an OBJ file whose materials name only existing textures; RViz reports missing ones as errors.
 
     Returns:
         The mesh itself, or a copy in the cache, without the lines that name what is missing.

@@ -21,7 +21,7 @@ from custom_ros_tools.processes.child import start_child
 from .copies import cache_folder, content_hash
 
 TRIAL = 3
-"""Number of the present kind of trial; meshes that went well in another are tried again."""
+"""Version of the trial; meshes that passed another version are tried again."""
 MAX_BYTES = 2 * 2**30
 """Largest memory of a trial [bytes]; beyond it, its allocations fail."""
 MAX_CPU_S = 20
@@ -53,7 +53,7 @@ class Mesh(NamedTuple):
 
 
 _tried: set[tuple[Mesh, int, int]] = set()
-"""Meshes that went well, by size and time of the last change [ns]: files that are the same need not be read again."""
+"""Meshes that passed, by size and time of the last change [ns]: unchanged files are not read again."""
 
 
 def limit_resources(cpu_s: int) -> None:
@@ -65,7 +65,7 @@ def limit_resources(cpu_s: int) -> None:
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
-    """Returns what is wrong with those meshes that PyBullet cannot load."""
+    """Returns the faults of meshes that PyBullet cannot load."""
     faults: dict[Mesh, str] = {}
     unknown: dict[Mesh, Path] = {}
     for mesh in dict.fromkeys(meshes):
@@ -89,7 +89,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
 
 
 def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
-    """Yields for each mesh what is wrong with it, or an empty text."""
+    """Yields the fault of each mesh, or an empty text."""
     done = 0
     while done < len(meshes):
         batch = meshes[done : done + MAX_BATCH]
@@ -131,7 +131,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
 
 
 def _words(returncode: int) -> str:
-    """Returns what the end of the process means."""
+    """Returns the meaning of the process's exit code."""
     if returncode == -signal.SIGXCPU or returncode == -signal.SIGKILL:
         return f"PyBullet takes more than {MAX_CPU_S} s to load it"
     if returncode < 0:
@@ -150,4 +150,4 @@ def _remember(record: Path) -> None:
         record.parent.mkdir(parents=True, exist_ok=True)
         record.touch()
     except OSError as error:
-        log.info("meshes that went well cannot be remembered, and are tried again next time: %s", error)
+        log.info("meshes that passed cannot be cached, and are tried again next time: %s", error)

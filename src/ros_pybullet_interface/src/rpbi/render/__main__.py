@@ -21,7 +21,7 @@ def main() -> None:
     parser.add_argument("--sink", required=True, help="module:factory of the receiver of frames")
     parser.add_argument("--keep-priority", action="store_true", help="do not yield to the simulator")
     arguments, _ = parser.parse_known_args()
-    # Ctrl-C goes to the whole process group; the simulator decides when we end.
+    # Ctrl-C goes to the whole process group; the simulator decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = Channel(socket.socket(fileno=arguments.socket))
     logger = logging.getLogger("rpbi")

@@ -1,4 +1,4 @@
-"""Python objects over a socket, without ever waiting for the other side."""
+"""Python objects over a socket, without waiting for the other side."""
 
 import pickle
 import select

@@ -40,7 +40,7 @@ SILENT_AFTER_S = 5.0
 
 
 class RenderClient:
-    """Keeps a renderer process alive and fed, without waiting for it unless it is asked to.
+    """Runs a renderer process and sends it scenes, waiting for it only on request.
 
     All methods are for the simulation thread. At most one scene per camera is under way; as long as the
     renderer has not accepted it, newer ones replace each other here. The process starts with the first camera.
@@ -97,7 +97,7 @@ class RenderClient:
         return None if self._process is None else self._process.pid
 
     def poll(self) -> None:
-        """Starts the process, hears it, starts it again; call it at every pass of the loop."""
+        """Starts the process, receives its messages, and restarts it; call it at every pass of the loop."""
         if self._channel is None:
             if self._process is not None:
                 self._bury()
@@ -131,7 +131,7 @@ class RenderClient:
             self._channel.send(CameraRemoved(name))
 
     def knows_demand(self, name: str) -> bool:
-        """Returns whether the demand for a camera is known, which it is not before the process is up."""
+        """Returns whether the demand for a camera is known; only once the process is up."""
         return name in self._demands
 
     def has_shown(self, name: str, stamp_ns: int) -> bool:
@@ -151,12 +151,12 @@ class RenderClient:
             self._channel.wait(timeout_s)
 
     def send(self, sample: SceneSample) -> None:
-        """Has a scene drawn, or a newer one in its place if the renderer is not ready for it in time."""
+        """Queues a scene to be drawn; a newer one replaces it if the renderer is not ready in time."""
         self._waiting[sample.name] = DrawnScene(sample, dict(self._body_ids()))
         self._send_waiting(sample.name)
 
     def serve_late(self) -> None:
-        """Has the last scenes drawn again for viewers that have come since; for a world that stands still."""
+        """Draws the last scenes again for new viewers, while the world is stopped."""
         for name, scene in self._last.items():
             if self._demands.get(name, NO_DEMAND).seen > self._served.get(name, 0):
                 self._waiting.setdefault(name, scene)
@@ -201,7 +201,7 @@ class RenderClient:
             self._process = subprocess.Popen(
                 [sys.executable, *self._command, "--socket", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,  # PyBullet and its plugin are talkative
+                stdout=subprocess.DEVNULL,  # PyBullet and its plugin print a lot
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
@@ -211,7 +211,7 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Reports a process that is up and sends nothing any more, and that it sends again."""
+        """Reports a process that stops sending, and when it sends again."""
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s
@@ -225,7 +225,7 @@ class RenderClient:
             log.warning("camera: %s: no images for %g s", self.fault, SILENT_AFTER_S)
 
     def _bury(self) -> None:
-        """Reports the end of the process and decides when to start the next, and which kind."""
+        """Reports the end of the process, and decides when to restart it and with which renderer."""
         assert self._process is not None
         code = self._process.poll()
         if code is None:
@@ -245,7 +245,7 @@ class RenderClient:
         self.renderer = self.fault = ""
 
     def _forget(self) -> None:
-        """Forgets what the process knew."""
+        """Resets the data about the process."""
         self.wanted = frozenset()
         self._demands: dict[str, Demand] = {}
         self._unread = LoadLogReader(self._log)

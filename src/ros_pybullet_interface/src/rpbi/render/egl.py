@@ -50,7 +50,7 @@ class Egl:
             raise EglError("there is no current EGL context")
 
     def renderer(self) -> str:
-        """Returns what draws, as the driver calls it."""
+        """Returns the driver's name of the renderer."""
         text = self._gl("glGetString", c_char_p, c_uint)(_GL_RENDERER)
         return text.decode(errors="replace") if text else "unknown"
 

@@ -36,13 +36,13 @@ class Mirror:
 
     @property
     def transparent(self) -> tuple[TransparentShape, ...]:
-        """The shapes that can be seen through."""
+        """The transparent shapes."""
         return self._transparency.shapes
 
     def apply(self, entry: LogEntry) -> None:
-        """Does what was done to the world; what cannot be done is left out of the images."""
+        """Applies an entry of the load log; on failure, the body is missing in images."""
         if entry.what == "physics":
-            return  # nothing moves by itself here
+            return  # no physics here
         if entry.what == "world":
             self._bodies.clear()
             self._shown.clear()
@@ -55,7 +55,7 @@ class Mirror:
             elif entry.what == "add":
                 self._soft_shapes.still(self._bodies[entry.name])
         except Exception as error:
-            log.warning("images lack '%s': %s", entry.name, error)
+            log.warning("cannot render '%s': %s", entry.name, error)
         self._transparency.update({body.body_id for body in self._bodies.values()})
 
     def close(self) -> None:
@@ -74,12 +74,12 @@ class Mirror:
         return entry._replace(arguments=(kind, drawn))
 
     def show(self, states: Iterable[BodyState]) -> None:
-        """Puts all bodies where they were in the simulator."""
+        """Sets all bodies to their states in the simulator."""
         states = tuple(states)
         soft = [state for state in states if state.nodes and state.name in self._bodies]
         if any(self._shown.get(state.name) != state for state in soft):
             self._soft_shapes.show([(self._bodies[state.name], state.nodes) for state in soft])
-            self._shown = {state.name: state for state in soft}  # the step may have moved all others
+            self._shown = {state.name: state for state in soft}  # the step may have moved all other bodies
         for state in states:
             if not state.nodes:
                 self.pose(state)
@@ -112,7 +112,7 @@ class Mirror:
         return frame._replace(**images)
 
     def pose(self, state: BodyState) -> None:
-        """Puts a rigid body where it was in the simulator."""
+        """Sets a rigid body to its state in the simulator."""
         body = self._bodies.get(state.name)
         shown = self._shown.get(state.name)
         if body is None or shown == state:

@@ -41,7 +41,7 @@ STUCK_AFTER_S = 300.0
 
 
 class RenderProcess:
-    """Serves the simulator until that has gone; at a lower priority once it is up, if requested."""
+    """Serves the simulator until it ends; once up, at a lower priority if requested."""
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:
         self._channel = channel
@@ -94,7 +94,7 @@ class RenderProcess:
 
     def _add(self, camera: Camera) -> None:
         assert self._renderer is not None and self._sink is not None
-        if camera.synchronous:  # physics waits for it, so it has nobody to give way to
+        if camera.synchronous:  # physics waits for it, so it keeps its priority
             self._gives_way = False
             run_normally(os.getpid(), self._nice)
         try:
@@ -115,7 +115,7 @@ class RenderProcess:
             self._mirror.apply(entry)
 
     def _show(self, scene: DrawnScene) -> None:
-        """Draws a scene, as far as anybody looks at it."""
+        """Draws a scene for the streams that have viewers."""
         sample = scene.sample
         self._channel.send(SceneAccepted(sample.name))
         assert self._sink is not None

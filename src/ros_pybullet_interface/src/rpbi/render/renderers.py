@@ -19,7 +19,7 @@ from .frame import Camera
 log = logging.getLogger(__name__)
 
 Shapes = Sequence[TransparentShape]
-"""Shapes that can be seen through."""
+"""Transparent shapes."""
 _LINK_SHIFT = 24
 """Shift of the link in PyBullet's number of a body and a link: `body + ((link + 1) << 24)`."""
 
@@ -82,12 +82,12 @@ class TinyRenderer:
         self.pb = Client()
 
     def make_room(self, intrinsics: Intrinsics) -> None:
-        """Needs nothing."""
+        """Does nothing."""
 
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
-        """Draws what a camera sees; segmentation is free here.
+        """Draws the image of a camera; segmentation costs nothing extra here.
 
         It draws transparent shapes as if they were opaque, so they are blended with a second image without them. Glass
         behind glass does not show.
@@ -193,7 +193,7 @@ def _draw(pb: Client, intrinsics: Intrinsics, projection: Any, camera: Pose, **o
 
 
 def _check(renderer: Renderer, distance_m: float = 1.0) -> None:
-    """Draws a red wall that fills the view, and looks whether it is there."""
+    """Renders a red wall that fills the view, and checks the image."""
     pb = renderer.pb
     shape = pb.createVisualShape(pb.GEOM_BOX, halfExtents=[1.0, 1.0, 0.1], rgbaColor=[1.0, 0.0, 0.0, 1.0])
     wall = pb.createMultiBody(0.0, -1, shape, [0.0, 0.0, distance_m + 0.1])
@@ -204,7 +204,7 @@ def _check(renderer: Renderer, distance_m: float = 1.0) -> None:
     red, green, blue = drawing.rgba[..., :3].reshape(-1, 3).mean(axis=0)
     problem: str | None = None
     if not (drawing.body_ids == wall).all():
-        problem = "does not tell bodies apart"
+        problem = "does not distinguish bodies"
     elif not red > 2 * max(green, blue):
         problem = "shows wrong colours"
     if problem:

@@ -58,7 +58,7 @@ def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
 
 
 def limit_cpu_time(cpu_s: int) -> None:
-    """Has this process end by SIGXCPU when it has used so much more processor time [s]."""
+    """Limits the further processor time of this process [s]; beyond it, SIGXCPU ends the process."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -109,7 +109,7 @@ def _send(connection: Connection, call: Callable[[], Any], cpu_s: int | None) ->
         limit_cpu_time(cpu_s)
     try:
         answer = "", call()
-    except Exception as error:  # a recording may have anything in it
+    except Exception as error:  # a recording may contain invalid data
         answer = str(error) if isinstance(error, InterfaceError) else f"{type(error).__name__}: {error}", None
     connection.send(answer)
 

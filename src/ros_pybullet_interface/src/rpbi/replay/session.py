@@ -140,10 +140,10 @@ class Replay:
         self._left_out: list[str] = []
 
     def run(self, parts: Sequence[RecordedPart] | None = None) -> ReplayResult:
-        """Replays all that can be, each reset being a new start, up to the first difference.
+        """Replays the recording up to the first difference; each reset is a new start.
 
         Args:
-            parts: Parts of the recording in their order, all by default. A part that follows the one before goes on
+            parts: Parts of the recording in their order, all by default. A part that follows the previous one continues
                 from there; others begin at their recorded keyframes. Every part but the last of a life ends with a
                 keyframe that is compared with the recorded one: if all parts agree, wherever they were replayed, so
                 does the whole.
@@ -187,7 +187,7 @@ class Replay:
                 return None, False
             try:
                 done = self._advance(checkpoint, commands, done)
-            except Exception as error:  # a recording may have anything in it, which fails at once or in a later step
+            except Exception as error:  # a recording may contain invalid data, which fails at once or in a later step
                 at = f"tick {self._world.clock.tick}"
                 words = error if isinstance(error, (InterfaceError, ValueError)) else f"{type(error).__name__}: {error}"
                 self._left_out.append(f"from {at} on, before {checkpoint}: {words}")

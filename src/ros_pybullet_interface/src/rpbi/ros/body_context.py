@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class BodyContext(NamedTuple):
-    """A body and the way to it.
+    """A body, and access to it from other threads.
 
     Attributes:
         name: Name of the body.
@@ -33,7 +33,7 @@ class BodyContext(NamedTuple):
 
     @property
     def body(self) -> Any:
-        """The body as it is now, another object after each reset; a robot where only robots are served.
+        """The present body, which may be another object after each reset; a robot if only robots are served.
 
         Its PyBullet state is for the simulation thread alone.
 
@@ -42,14 +42,14 @@ class BodyContext(NamedTuple):
             InterfaceError: If it cannot be found out, since the simulation has ended.
         """
         body = self.world.bodies.get(self.name)
-        if body is None:  # it may just be on its way through a reset, which is over when the simulation thread answers
+        if body is None:  # a reset may be running; it is over when the simulation thread answers
             body = self.ask(lambda: self.world.bodies.get(self.name))
         if body is None:
             raise UnknownNameError("object", self.name, list(self.world.bodies))
         return body
 
     def ask_body(self, call: Callable[[], T], body: Any = None) -> T:
-        """Has the simulation thread make a call that uses the body; returns its result or raises its exception.
+        """Calls a function that uses the body in the simulation thread; returns its result or raises its exception.
 
         Args:
             call: The call.
@@ -69,5 +69,5 @@ class BodyContext(NamedTuple):
         return self.ask(checked)
 
     def act(self, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
-        """Has the simulation thread do something to the body that a replay can do again; see `World.act`."""
+        """Applies a replayable action to the body in the simulation thread; see `World.act`."""
         return self.ask_body(lambda: self.world.act(self.name, what, value, do))

@@ -1,4 +1,4 @@
-"""Rows of the tables of topics and services: by them the node opens its own, and reference pages list them."""
+"""Rows of the tables of topics and services, used by the node and by the reference pages."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from rpbi.bodies import Body
 from rpbi.samples import LinkPoseSample
 
 Owners = Callable[[Body], Sequence[str]]
-"""Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""
+"""Returns the values of `{name}` for the endpoints that a body has by a row; none if it has none."""
 
 
 class Answer(NamedTuple):
@@ -25,7 +25,7 @@ class Answer(NamedTuple):
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns the owners of what every body of a type has once."""
+    """Returns the owners function of an endpoint that every body of a type has once."""
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -122,7 +122,7 @@ def find_topic(name: str, owner: Any) -> Topic:
         owner: The sensor or body that names it as its `ros_topic`.
 
     Raises:
-        ConfigError: If there is no such thing; it names the class of the owner.
+        ConfigError: If it does not exist; the error names the class of the owner.
     """
     try:
         found = find(name)

@@ -17,7 +17,7 @@ FRAMES = {
     "rpbi/NAME/LINK": "URDF frames of links: all of a robot with `broadcast_link_states`, its root link with "
     "`broadcast_root_tf_hz`, all of a URDF object with `broadcast_hz`.",
 }
-"""Frames that the node puts on TF, with `NAME` for a body and `LINK` for one of its links: which bodies have them."""
+"""Frames that the node puts on TF, and the bodies that have them; `NAME` is a body and `LINK` one of its links."""
 
 
 def use_prefix(prefix: str | None) -> None:

@@ -26,7 +26,7 @@ from .tf_follower import TfFollower, refusal
 
 
 def _joint_target(message: JointState) -> JointCommand:
-    """Returns all that a message has; which of it counts is up to the robot's control mode."""
+    """Returns all quantities of a message; the robot's control mode decides which are used."""
     return JointCommand(
         message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec()
     )
@@ -123,7 +123,7 @@ class Inputs:
     def __init__(self, world: World) -> None:
         self._world = world
         self._warn = ThrottledWarning()
-        self._warn_seldom = ThrottledWarning(period_s=60.0)  # a controller made for another mode sends on and on
+        self._warn_seldom = ThrottledWarning(period_s=60.0)  # a controller for another mode may send continuously
         self._subscribers: dict[str, list[rospy.Subscriber]] = {}
         self._tf = TfFollower(world.put, lambda: world.clock.time_s)
 
@@ -143,7 +143,7 @@ class Inputs:
         self._tf.leave(name)
 
     def repeat_poses(self) -> None:
-        """Hands the last poses of TF frames to a world that has forgotten them; any thread may call it."""
+        """Sends the last poses of TF frames to the world again, after a reset; any thread may call it."""
         self._tf.repeat()
 
     def _subscribe(self, name: str, key: str, taken: Input) -> rospy.Subscriber:

@@ -112,10 +112,10 @@ def _log_warnings(warnings: Sequence[Problem]) -> None:
 
 
 class SimulatorNode:
-    """Builds the configured world and connects everything in it to ROS.
+    """Builds the configured world and connects it to ROS.
 
     Raises:
-        ConfigError: If the configuration is wrong; it has everything that is.
+        ConfigError: If the configuration is wrong; it has all problems.
         PhysicsError: If PyBullet cannot do what is asked.
     """
 
@@ -166,7 +166,7 @@ class SimulatorNode:
         """Simulates until ROS shuts down, which waits until everything here has ended in good order.
 
         Raises:
-            PhysicsError: If PyBullet has gone before, for instance because its window was closed.
+            PhysicsError: If PyBullet has ended, for instance because its window was closed.
         """
         ended = threading.Event()
         ended.set()
@@ -183,12 +183,12 @@ class SimulatorNode:
             has_gone = not self._world.is_connected
             send_at_once()  # such as the results of goals that it ends in the middle of
             self._cameras.close()
-            self._world.close()  # from here on, no object comes or goes
+            self._world.close()  # from here on, no object is added or removed
             # Topics that are just being opened or closed would lock rospy up. Who waits for them ends with the process.
             self._objects.end(LONGEST_END_S)
             ended.set()
         if has_gone:
-            raise PhysicsError("PyBullet has gone: its window was closed, or its server has ended")
+            raise PhysicsError("PyBullet has ended: its window was closed, or its server has ended")
 
 
 def main() -> None:

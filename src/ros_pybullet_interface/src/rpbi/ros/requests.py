@@ -1,4 +1,4 @@
-"""Requests to the simulation thread that never wait for ever."""
+"""Requests to the simulation thread with a limited wait."""
 
 import time
 from collections.abc import Callable
@@ -19,7 +19,7 @@ GIVE_UP_AFTER_S = 30.0
 
 
 class Requests:
-    """Has the simulation thread make calls and waits for their results."""
+    """Makes the simulation thread call functions, and waits for their results."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -40,7 +40,7 @@ class Requests:
         return self.wait_for(self._simulation.world.mailbox.request(call, even_if_busy))
 
     def wait_for(self, future: Future[T]) -> T:
-        """Waits for something that the simulation thread does sooner or later; returns or raises its outcome.
+        """Waits for a future of the simulation thread; returns its result or raises its error.
 
         Raises:
             InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.

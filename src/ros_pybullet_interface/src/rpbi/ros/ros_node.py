@@ -1,4 +1,4 @@
-"""rospy in one object, for scripts written in that manner."""
+"""rospy in one object, for scripts in the style of the authors' release."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from custom_ros_tools.tf import TfInterface
 class RosNode:
     """A node, its TF, and all that rospy has, under the same names: `Publisher`, `Rate`, `loginfo` and so on.
 
-    The simulator does not use it: it must never wait for ROS time, and this does.
+    The simulator does not use it: it waits for ROS time, which the simulator must not.
 
     Args:
         name: The node's name unless remapped.

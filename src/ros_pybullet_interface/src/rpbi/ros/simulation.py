@@ -21,7 +21,7 @@ from rpbi.world.saved.state import WorldState
 log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
-"""Shortest time between two looks at requests while stopped [s]."""
+"""Shortest time between two checks for requests while stopped [s]."""
 BURST_S = 0.005
 """Longest run of due ticks before the loop sends messages and looks at requests [s]."""
 
@@ -35,12 +35,12 @@ class StepRequest:
         self._steps = self.left = steps
 
     def finish(self, tick: int, stamp_ns: int) -> None:
-        """Ends the wait: all is done."""
+        """Ends the wait with success."""
         if self.done.set_running_or_notify_cancel():
             self.done.set_result((tick, stamp_ns))
 
     def fail(self, error: Exception) -> None:
-        """Ends the wait: no more ticks come."""
+        """Ends the wait with an error."""
         if self.done.set_running_or_notify_cancel():
             self.done.set_exception(error)
 
@@ -61,7 +61,7 @@ class RestoreRequest:
         self._ticks, self._end, self._tick = ticks, end, 0
 
     def advance(self, end_s: float) -> bool:
-        """Goes on until a time of the monotonic clock [s]; returns whether it is done."""
+        """Continues until a time of the monotonic clock [s]; returns whether it is done."""
         for tick in self._ticks:
             self._tick = tick
             if time.monotonic() > end_s:
@@ -118,7 +118,7 @@ class Simulation:
         return self._thread == threading.get_ident()
 
     def start(self) -> bool:
-        """Lets the world run.
+        """Starts the world.
 
         Returns:
             False if it runs already.
@@ -135,10 +135,10 @@ class Simulation:
         return True
 
     def stop(self) -> bool:
-        """Lets the world stand still, with all of its last tick published.
+        """Stops the world, with its last tick published completely.
 
         Returns:
-            False if it stands still already.
+            False if it is stopped already.
         """
         if self._request is not None:
             self._abort_request(InterfaceError(f"stopped {self._request}"))
@@ -245,7 +245,7 @@ class Simulation:
             restore.end(error)
 
     def _start_again(self) -> None:
-        """Publishes a world that is another one by now, with its inputs."""
+        """Publishes the restarted world, and sends it its inputs."""
         self._failure = None
         self.world.apply_inputs()
         self._pacer.restart()
@@ -280,7 +280,7 @@ class Simulation:
                 try:
                     part()
                 except Exception as error:
-                    if not self.world.is_connected:  # the loop is over, and that is why
+                    if not self.world.is_connected:  # the loop ends with this error
                         break
                     self._break_off(error)
             if self._request is None and self._restore is None:
@@ -327,7 +327,7 @@ class Simulation:
             flush_buffered_sockets()
             self._state.publish_hash()
         if is_last:
-            flush_buffered_sockets()  # before whoever asked for the tick gets an answer
+            flush_buffered_sockets()  # before the caller of the tick gets an answer
 
     def _advance_request(self, request: StepRequest) -> None:
         end_s = time.monotonic() + BURST_S
@@ -364,14 +364,14 @@ class Simulation:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
-        """Stands still, and publishes no more of a world that is broken; until somebody starts or steps it again."""
+        """Stops, and publishes nothing of a broken world until it is started or stepped again."""
         if str(error) == self._failure:
-            return  # it goes on saying the same
+            return  # repeats the same error
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
         self.running, self._failure = False, str(error)
         if self._request is not None:
             self._end_request().fail(error)
-        self.world.halt("the simulation broke off")
+        self.world.halt("the simulation was aborted")
         self._publishers.publish_last_time()
         self._status.publish(False)
 

@@ -96,7 +96,7 @@ class Followed:
         self.quiet_until_s = 0.0
 
     def due_s(self, came_s: float) -> float:
-        """Returns when to look at it, if it last came at a time."""
+        """Returns the time of the next look-up, after an arrival at a time."""
         if came_s <= self.looked_s:
             return self.looked_s + self.period_s
         is_early = came_s < self.news_s + EARLY * self.period_s
@@ -139,14 +139,14 @@ class TfFollower:
             threading.Thread(target=self._run, args=(self._tf,), name="tf follower", daemon=True).start()
 
     def leave(self, name: str) -> None:
-        """Follows nothing for a body or sensor any more."""
+        """Stops following for a body or sensor."""
         self._followed = tuple(followed for followed in self._followed if followed.name != name)
 
     def repeat(self) -> None:
-        """Puts all last poses again."""
+        """Sends all last poses again."""
         for followed in self._followed:
             if followed.last_pose is not None:
-                with contextlib.suppress(Exception):  # gone meanwhile, or refused as it was before
+                with contextlib.suppress(Exception):  # removed meanwhile, or refused as before
                     self._put(followed.slot, followed.last_pose)
 
     def _run(self, tf: WatchedTf) -> None:

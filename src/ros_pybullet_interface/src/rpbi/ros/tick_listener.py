@@ -1,4 +1,4 @@
-"""Waits for the messages of a tick, for programs that step a world and need what came of it."""
+"""Waits for the messages of a tick, for programs that step a world."""
 
 import threading
 import time
@@ -47,7 +47,7 @@ class TickListener:
             return dict(self._newest)
 
     def close(self) -> None:
-        """Listens no more."""
+        """Unsubscribes."""
         for subscriber in self._subscribers.values():
             subscriber.unregister()
 

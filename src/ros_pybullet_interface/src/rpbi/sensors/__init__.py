@@ -1,4 +1,4 @@
-"""The types of sensors; a new one is a class in a file of its own and a line here."""
+"""The types of sensors; to add one, write a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 from rpbi.config.sensors import SensorConfig

@@ -1,4 +1,4 @@
-"""Where a base is and how it moves."""
+"""Pose and velocity of a base."""
 
 import math
 

@@ -16,5 +16,5 @@ class ControllerStateSensor(Sensor):
         self._robot, self._controllers, self._name = robot, controllers, name
 
     def read(self, tick: int) -> ControllerStateSample:
-        """Asks the controller."""
+        """Reads the state from the controller."""
         return self._controllers.sample(self._robot, self._name)

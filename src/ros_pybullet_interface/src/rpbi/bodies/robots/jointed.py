@@ -1,4 +1,4 @@
-"""Base class of robots, simulated or only shown."""
+"""Base class of robots, simulated or visual."""
 
 import logging
 import math
@@ -31,7 +31,7 @@ DEFAULT_BASE_STATE_HZ = 50.0
 
 
 class JointedBody(Body):
-    """A body that comes from a URDF and stands at its start position.
+    """A body from a URDF, created at its start position.
 
     Raises:
         ConfigError: If the configuration does not fit the robot.
@@ -45,13 +45,13 @@ class JointedBody(Body):
     base_joints: ClassVar[int] = 0
     """Number of joints that `prepare_urdf` adds between the world and the root link."""
     prepare_urdf = staticmethod(for_pybullet)
-    """Returns what PyBullet reads of the configured URDF."""
+    """Returns the parts of the configured URDF that PyBullet reads."""
     fixes_base: ClassVar[bool] = False
     """Whether PyBullet fixes the base regardless of the configuration."""
 
     @classmethod
     def prepare(cls, config: RobotConfig, has_window: bool) -> None:
-        """Prepares what PyBullet gets in the place of the URDF."""
+        """Prepares the files that PyBullet reads instead of the URDF."""
         prepared_urdf(cls._load_arguments(config), cls.prepare_urdf, has_window)
 
     @classmethod
@@ -82,7 +82,7 @@ class JointedBody(Body):
             self._set_alpha(config.color_alpha)
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Link poses, or that of the root link alone, if they are to be broadcast, and the state of the base."""
+        """Link poses, or that of the root link alone, if configured, and the state of the base."""
         sensors: list[Sensor] = []
         if self.config.broadcast_link_states:
             sensors.append(LinkPoseSensor(self, self.config.broadcast_link_states_hz))
@@ -178,7 +178,7 @@ class JointedBody(Body):
             raise ConfigError([Problem(self.name, key, str(error))]) from None
 
     def _problems(self) -> list[Problem]:
-        """Returns what in the configuration does not fit the robot."""
+        """Returns the problems of the configuration for this robot."""
         configured = self.config.initial_joint_position
         if problems := self._unknown_joints({f"initial_joint_position.{name}": name for name in configured}):
             return problems
@@ -190,7 +190,7 @@ class JointedBody(Body):
         ]
 
     def _compare_start(self, follower: Joint, position: float) -> None:
-        """Warns if a joint that follows another is configured to start elsewhere than that one has it."""
+        """Warns if the configured start of a mimic joint contradicts that of the joint that it follows."""
         wanted = self._start_of(follower)
         if follower.name in self.config.initial_joint_position and abs(wanted - position) > START_TOLERANCE:
             leader = self.model.joints[self.model.couplings[follower.index].leader].name
@@ -200,7 +200,7 @@ class JointedBody(Body):
             )
 
     def _unknown_joints(self, names: Mapping[str, str]) -> list[Problem]:
-        """Returns a problem for each name, by the key that has it, that is no joint's."""
+        """Returns a problem for each unknown joint name, with the key that has it."""
         problems = []
         for key, name in names.items():
             try:
@@ -210,6 +210,6 @@ class JointedBody(Body):
         return problems
 
     def _set_alpha(self, alpha: float) -> None:
-        """Makes every visual shape as opaque as asked."""
+        """Sets the opacity of every visual shape."""
         for shape in self.pb.getVisualShapeData(self.body_id):
             self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))

@@ -14,7 +14,7 @@ from .robot_config import RobotConfig
 
 
 class MobileRobot(Robot):
-    """A robot whose base stays in a plane, the one that is x-y of its start pose, and drives there by velocity.
+    """A robot whose base drives by velocity in the x-y plane of its start pose.
 
     Joints between the world and the root link move it. They are not part of its joint states and targets.
     """
@@ -36,15 +36,15 @@ class MobileRobot(Robot):
         return data.get("planar_base") is not None
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `cmd_vel`, a Twist in the base frame, beside the inputs of every robot."""
+        """Returns `cmd_vel`, a Twist in the base frame, in addition to the inputs of every robot."""
         return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
 
     def restart(self) -> bool:
-        """Is made anew, since its base follows velocities."""
+        """Returns False: it is created anew, since its base follows velocities."""
         return False
 
     def before_step(self, tick: int) -> None:
-        """Drives the base, beside what every robot does."""
+        """Drives the base, in addition to the actions of every robot."""
         super().before_step(tick)
         self.planar_base.before_step(tick)
 

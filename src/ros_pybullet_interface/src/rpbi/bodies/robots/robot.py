@@ -63,7 +63,7 @@ class Robot(JointedBody):
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         self._robot_model: RobotDynamics | None = None
         super().__init__(pb, config)
-        assert config.setJointMotorControlArray is not None  # the model demands it
+        assert config.setJointMotorControlArray is not None  # required by the model
         mode = config.setJointMotorControlArray.controlMode
         self.motors = Motors(
             pb,
@@ -124,7 +124,7 @@ class Robot(JointedBody):
         return {**super().inputs(), "target": target, **self._controller_inputs()}
 
     def before_step(self, tick: int) -> None:
-        """Follows the motion, has controllers compute, lets targets expire and applies efforts."""
+        """Advances the motion and the controllers, expires targets and applies efforts."""
         self.drive.advance(tick)
         mode, driven = self.motors.mode, self.controllers.driven
         holding: Mapping[int, float] = {}
@@ -180,7 +180,7 @@ class Robot(JointedBody):
             self.halt(reason)
 
     def restart(self) -> bool:
-        """Holds its start position as in the beginning, unless it has controllers, a follower or filtered sensors."""
+        """Holds its start position again; returns False if it has controllers, a follower or filtered sensors."""
         if self.controllers.names or self.follower is not None or self.force_torque_sensors:
             return False
         self.halt("the world was reset")
@@ -190,7 +190,7 @@ class Robot(JointedBody):
         return True
 
     def resume(self) -> None:
-        """Has its motors do the same as before."""
+        """Restores the state of its motors."""
         self.motors.resume()
 
     def switch_mode(self, mode: int) -> None:
@@ -203,9 +203,9 @@ class Robot(JointedBody):
             self.motors.disable(self.controllers.driven)
 
     def set_joint_state(self, target: JointCommand) -> None:
-        """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
+        """Sets joint positions at once, which the motors then hold; a motion that runs is ended."""
         super().set_joint_state(target)
-        self.halt("its joints were put elsewhere")
+        self.halt("its joints were set to other positions")
         positions = self.model.resolve(target.names, target.position)
         self.drive.drop_targets(positions)
         self.motors.reset_setpoints(positions)
@@ -213,7 +213,7 @@ class Robot(JointedBody):
 
     def teleport(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
-        self.halt("the robot was put elsewhere")
+        self.halt("the robot was moved to another pose")
         super().teleport(pose)
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
@@ -302,7 +302,7 @@ class Robot(JointedBody):
                 self._warned_mimic = True
 
     def _gains(self) -> dict[int, dict[str, float]]:
-        """Returns PyBullet's gains by joint index; what does not fit was found before."""
+        """Returns PyBullet's gains by joint index; the configuration is already checked."""
         gains: dict[int, dict[str, float]] = {}
         for key, given in self._configured_gains().items():
             argument = key.removesuffix("s")
@@ -359,7 +359,7 @@ class Robot(JointedBody):
             if joint in joints[:index]:
                 problems.append(Problem(self.name, key, f"joint '{joint}' has a sensor already; one joint has one"))
             if not re.fullmatch(r"\w+", joint, re.ASCII):
-                message = f"topics are named after joint '{joint}', which only letters, digits and '_' allow"
+                message = f"topics are named after joint '{joint}', which may only have letters, digits and '_'"
                 problems.append(Problem(self.name, key, message))
             problems += self._unknown_joints({key: joint})
         return problems

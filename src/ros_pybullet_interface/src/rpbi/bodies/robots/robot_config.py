@@ -30,8 +30,8 @@ from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
 
 _NOT_VISUAL = {
     "controllers": "a visual robot has no motors to drive",
-    "joint_trajectory_controller": "a visual robot has no motors that could follow",
-    "contacts": "a visual robot touches nothing",
+    "joint_trajectory_controller": "a visual robot has no motors",
+    "contacts": "a visual robot has no contacts",
     "planar_base": "a visual robot has no physics; its base follows object_tf",
 }
 
@@ -49,7 +49,7 @@ class CoupledJoint(ConfigModel):
     @classmethod
     def _is_not_zero(cls, value: float) -> float:
         if value == 0.0:
-            raise ValueError("must not be 0: nothing would move it")
+            raise ValueError("must not be 0: the joint would never move")
         return value
 
     @property
@@ -66,7 +66,7 @@ class RobotConfig(BodyConfig):
         True, description="Whether moments of inertia are the URDF's, else PyBullet's guess from the collision shapes."
     )
     is_visual_robot: Switch = Field(
-        False, description="Whether it is only shown: it follows joint targets and TF, and nothing can touch it."
+        False, description="Whether it is only visible: it follows joint targets and TF, without contacts."
     )
     setJointMotorControlArray: SetJointMotorControlArray | None = Field(
         None, description="Its motors; required unless it is a visual robot."
@@ -95,8 +95,7 @@ class RobotConfig(BodyConfig):
     )
     target_buffer_s: NonNegative = Field(
         BUFFER_S,
-        description="Delay of position targets of a stream, in which late ones are still in time; 0 plays targets as "
-        "they come.",
+        description="Delay of position targets of a stream, for late ones; 0 plays targets on arrival.",
         json_schema_extra={"unit": "s"},
     )
     enforce_effort_limits: Switch = Field(True, description="Whether motors are held to the efforts of the URDF.")
@@ -134,10 +133,10 @@ class RobotConfig(BodyConfig):
         50.0, description="Accepted without effect: each violation is logged once."
     )
     start_ik_callback: Switch = Field(
-        False, description="Whether it moves to what inverse kinematics finds for problems on the topic `ik`."
+        False, description="Whether it moves to the solutions of inverse kinematics problems on the topic `ik`."
     )
     strict: Switch = Field(
-        False, description="Whether `ik` refuses targets out of reach, else the link goes as near as it comes."
+        False, description="Whether `ik` refuses targets out of reach; otherwise the link moves as near as possible."
     )
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
     color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
@@ -159,7 +158,7 @@ class RobotConfig(BodyConfig):
         for index, sensor in enumerate(self.enabled_joint_force_torque_sensors):
             if not (sensor.hz or self.joint_state_publisher_hz):
                 key = f"enabled_joint_force_torque_sensors[{index}].hz"
-                raise KeyedError(key, "missing; it would be that of the joint states, which are off")
+                raise KeyedError(key, "missing; the default is the rate of the joint states, which are off")
         if self.planar_base is not None:
             if self.resetBaseVelocity is not None:
                 raise KeyedError("resetBaseVelocity", "a planar base starts at rest; remove this or planar_base")

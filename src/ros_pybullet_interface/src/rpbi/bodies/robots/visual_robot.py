@@ -13,7 +13,7 @@ from .robot_config import RobotConfig
 
 
 class VisualRobot(JointedBody):
-    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing."""
+    """A robot without physics: it moves to its targets at once, and has no contacts."""
 
     has_physics = False
     fixes_base = True
@@ -31,7 +31,7 @@ class VisualRobot(JointedBody):
         self._limit_reports = LimitReports(self.name)
         for link in (-1, *self.joint_indices):
             pb.setCollisionFilterGroupMask(self.body_id, link, 0, 0)
-            # What has no mass does not fall; without inertia, though, spherical joints would not be finite.
+            # a body without mass does not fall; without inertia, spherical joints would become non-finite
             pb.changeDynamics(self.body_id, link, mass=0.0, localInertiaDiagonal=(1.0, 1.0, 1.0))
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The types of controllers that live in the tick; a new one is a class in a file of its own and a line here."""
+"""The types of controllers that live in the tick; to add one, write a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 

@@ -93,7 +93,7 @@ class CartesianImpedanceController(Controller):
         self._taken: Any = None
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of the spring, the damper and what balances gravity and motion."""
+        """Returns the efforts of the spring and the damper, with compensation of gravity and Coriolis forces."""
         self._update_target(targets.get("target"), tick)
         arm, config = self.arm, self.config
         q, velocity = arm.of_chosen(np.array((state.position, state.velocity)))
@@ -128,7 +128,7 @@ class CartesianImpedanceController(Controller):
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
-        """Returns how far it is from the target, and with what force and moment it pulls, in the world's axes."""
+        """Returns the errors to the target, and the force and moment towards it, in the world's axes."""
         wrench = self._wrench if self._axes is None else self._axes @ self._wrench
         numbers = (*self._error.tolist(), *wrench.tolist())
         names = (f"{what}/{axis}" for what in ("error", "turn", "force", "moment") for axis in "xyz")
@@ -140,7 +140,8 @@ class CartesianImpedanceController(Controller):
         return damping
 
     def _way(self, tick: int) -> Sequence[float]:
-        """Returns way [m] and turn [rad] from where the point is to where it is to be after a tick."""
+        """Returns the translation [m] and rotation [rad] from the present pose of the point to its target after a
+        tick."""
         x, y, z, *quat = self._stream.advance(tick + 1.0).values()
         pose = self._pose()
         return *minus((x, y, z), pose.position), *turn_between(pose.quat_xyzw, quat)

@@ -43,7 +43,7 @@ class RobotState(NamedTuple):
 
 
 class SetPoints(NamedTuple):
-    """Where the joints of a controller are to be after the tick, moved there by PyBullet's motors.
+    """Positions of a controller's joints after the tick, to which PyBullet's motors move them.
 
     Attributes:
         position: One for each of its joints [rad or m].
@@ -72,7 +72,7 @@ class ControlledRobot(NamedTuple):
     dt_s: float
 
     def of_chosen(self, rows: Array) -> Array:
-        """Returns what belongs to the controller's joints, of the last axis of something for all driven ones."""
+        """Returns the entries of the controller's joints, along the last axis of an array for all driven joints."""
         return rows if len(self.chosen) == len(self.model.joints) else rows[..., self.chosen]
 
 

@@ -18,7 +18,7 @@ class ForceControllerConfig(CartesianImpedanceConfig):
 
     type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(description="`force`, or a class with its keys.")
 
-    axis: Vec3 = Field((0.0, 0.0, -1.0), description="Where it pushes, in the world.")
+    axis: Vec3 = Field((0.0, 0.0, -1.0), description="Direction of the force, in the world.")
     force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="With what force.")
     approach_speed: Annotated[Positive, Unit("m/s")] = Field(0.05, description="Speed along the axis without contact.")
 
@@ -33,8 +33,8 @@ class ForceControllerConfig(CartesianImpedanceConfig):
 class ForceController(CartesianImpedanceController):
     """Pushes along an axis with a given force, and holds a point at a target pose across it.
 
-    A damper along the axis limits the speed as long as nothing is there; once something is, it does not move and the
-    force is the one asked for. The target's place along the axis does not count.
+    A damper along the axis limits the speed without contact; in contact, the point rests and the force is the
+    configured one. The target's position along the axis is ignored.
     """
 
     Config = ForceControllerConfig

@@ -102,7 +102,7 @@ class JointImpedance:
         self.restart()
 
     def restart(self) -> None:
-        """Forgets what acted on the joints."""
+        """Resets the estimate of external efforts."""
         self._disturbance = Disturbance(len(self._stiffness), self._dt_s)
 
     def efforts(

@@ -57,7 +57,7 @@ class JointImpedanceController(Controller):
         return value
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Holds what is measured."""
+        """Holds the measured positions."""
         held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
         self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), held, smooth=True)
         self._push = np.zeros(len(held))
@@ -66,7 +66,7 @@ class JointImpedanceController(Controller):
         self._goal = dict(held)
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of springs, dampers and what balances gravity and motion."""
+        """Returns the efforts of springs and dampers, with compensation of gravity and Coriolis forces."""
         self._update_target(targets.get("target"), tick)
         before = np.array(list(self._stream.set_points.values()))
         after = np.array(list(self._stream.advance(tick + 1.0).values()))
@@ -79,7 +79,7 @@ class JointImpedanceController(Controller):
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
-        """Returns how far each joint is from where it is to be [rad or m]."""
+        """Returns the position error of each joint [rad or m]."""
         return {f"error/{joint.name}": float(error) for joint, error in zip(self._joints, self._error)}
 
     def _update_target(self, target: JointCommand | None, tick: int) -> None:

@@ -1,4 +1,4 @@
-"""The controllers of one robot: switches them, runs them, and stops those that fail."""
+"""Manager of the controllers of one robot: switches them, runs them, and stops those that fail."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class _Managed:
             raise ValueError(
                 f"expected one number for each of its {len(self.indices)} joints, got shape {numbers.shape}"
             )
-        if not all(map(math.isfinite, numbers.tolist())):  # half the time of numpy's, for the joints of an arm
+        if not all(map(math.isfinite, numbers.tolist())):  # twice as fast as numpy for the joints of an arm
             raise ValueError(f"the output is not finite: {numbers.tolist()}")
         return SetPoints(numbers) if isinstance(wanted, SetPoints) else numbers
 
@@ -232,7 +232,7 @@ class ControllerManager:
             self._fail(managed, _cause(managed.controller, "compute", error))
             return
         took_s = (time.perf_counter_ns() - begin_ns) * 1e-9
-        if managed.slow and took_s > managed.robot.dt_s:  # by the processor's time, which costs more to ask for
+        if managed.slow and took_s > managed.robot.dt_s:  # by processor time, which is slower to read
             took_s = (time.thread_time_ns() - used_ns) * 1e-9
         managed.slow = managed.slow + 1 if took_s > managed.robot.dt_s else 0
         if managed.slow >= SLOW_TICKS:
@@ -273,7 +273,7 @@ class ControllerManager:
 
 
 def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.ndarray:
-    """Returns the places among the driven joints of those that are named, of all if none are.
+    """Returns the indices among the driven joints of the named ones; of all if none are named.
 
     Raises:
         UnknownNameError: If the robot has no such joint, or no motor can move it.

@@ -1,4 +1,4 @@
-"""Set points that accelerate hardly more than the targets themselves, however late these come."""
+"""Set points with bounded acceleration, even if targets come late."""
 
 from __future__ import annotations
 

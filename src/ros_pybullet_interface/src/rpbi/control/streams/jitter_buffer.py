@@ -26,7 +26,7 @@ REPLACED = 0.25
 MIN_MISFIT_RATIO = 2.0
 """Ratio of excess squared misfits above which a regular period replaces stamps, or the reverse."""
 MIN_MISFIT = 1e-10
-"""Squared misfit that decides nothing [rad^2 or m^2]."""
+"""Squared misfit below which candidates count as equal [rad^2 or m^2]."""
 MIN_LOSS_RATIO = 16.0
 """Ratio of squared misfits above which a gap counts as lost targets rather than as a late one."""
 MAX_LOST = 4
@@ -249,7 +249,7 @@ class JitterBuffer:
             self._seen[-1] = last[-1]._replace(step=periods)
 
     def _compare(self, times: Sequence[float], steps: Sequence[int]) -> None:
-        """Chooses between stamps, or arrivals, and a regular period."""
+        """Chooses between stamps (or arrivals) and a regular period."""
         last = list(self._seen)[-4:]
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):

@@ -1,4 +1,4 @@
-"""Ways between two targets: lines and cubics, and their moving averages."""
+"""Segments between two targets: lines and cubics, and their moving averages."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class StreamSegment(NamedTuple):
-    """The way of some joints from one target to the next: a cubic Hermite spline, or a line.
+    """The motion of some joints from one target to the next: a cubic Hermite spline, or a line.
 
     Attributes:
         start: Time of its beginning [ticks].
@@ -31,7 +31,7 @@ class StreamSegment(NamedTuple):
         return self.start + self.length
 
     def cut(self, tick: float) -> StreamSegment:
-        """Returns its part before a time, of length 0 if there is none."""
+        """Returns its part before a time; of length 0 if that is empty."""
         length = max(tick - self.start, 0.0)
         basis = _hermite(length / self.length)
         way = {index: self.covered(index, basis) for index in self.way}
@@ -40,7 +40,7 @@ class StreamSegment(NamedTuple):
         return self._replace(length=length, goal=goal, way=way, slopes=slopes)
 
     def covered(self, index: int, basis: tuple[float, float, float]) -> float:
-        """Returns the way of a joint for the values, or averages, of the basis functions of way and slopes."""
+        """Returns the displacement of a joint for the values, or averages, of the basis functions."""
         if self.slopes is None:
             return self.way[index] * (basis[0] + basis[1] + basis[2])
         first, last = self.slopes
@@ -94,7 +94,7 @@ def _hermite_integral(share: float) -> tuple[float, float, float]:
 
 
 def agree(way: Mapping[int, float], length: float, first: Mapping[int, float], last: Mapping[int, float]) -> bool:
-    """Returns whether velocities fit the way; many senders fill them with zeros."""
+    """Returns whether velocities fit the displacement; many senders fill them with zeros."""
     return all(
         abs(distance - length * (first[index] + last[index]) / 2.0)
         <= length * max(abs(first[index]), abs(last[index])) / 2.0 + 1e-9

@@ -49,7 +49,7 @@ class SenderClock:
         """The last stamp of a full window that ran as fast as the world's time [ns]."""
 
     def restart(self) -> None:
-        """Gives stamps another chance, since a new stream begins."""
+        """Allows stamps again, since a new stream begins."""
         self.is_right = self.is_right or None
 
     def ticks_between(self, first_ns: int, last_ns: int) -> float:

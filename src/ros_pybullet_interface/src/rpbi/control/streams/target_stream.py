@@ -1,10 +1,10 @@
 """Streams of position targets as smooth motions.
 
-Targets come some times a second, ticks many times. A motor closes each step within a few ticks, with all its effort. A
-target that follows another one soon is therefore a knot: the set points go there on a line that takes as long as the
-targets are apart, and a moving average over one period rounds the corners. For a regular stream that is a quadratic
-B-spline, which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period.
-The delay of the jitter buffer comes on top.
+Targets come at a lower rate than ticks. A motor would follow each step within a few ticks, with its full effort.
+Targets in quick succession are therefore knots: set points move along lines, each as long as the time between two
+targets, and a moving average over one period rounds the corners. For a regular stream that is a quadratic B-spline,
+which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period. The delay
+of the jitter buffer comes on top.
 
 A target that is too late even for the buffer must not stop the robot from full speed. The set points continue at the
 last velocity for a while, then slow down and come back to the last target. Where that plan changes its velocity at
@@ -57,14 +57,14 @@ class TargetStream:
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
         self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
-        """Velocities at the last targets by joint index [rad or m per tick]; none of a hurried way."""
+        """Velocities at the last targets by joint index [rad or m per tick]; none after a shortened segment."""
         self._period = 0.0
         self._window = self._lagging_window = self._wanted_window = 0.0
         self._motion = BoundedMotion(held, buffer.dt_s, buffer.has_delay, self._limited)
         self.set_points = held
         """Where the joints are to be now."""
         self.gap = 0.0
-        """Time for which it had stopped when the newest target came, since that came too late [ticks]."""
+        """Time for which the motion had stopped before the newest target, which came too late [ticks]."""
         self.rests = True
         """Whether there is nothing to do until the next target."""
 
@@ -112,7 +112,7 @@ class TargetStream:
     def _append(
         self, start: float, end: float, goal: Mapping[int, float], slopes: Mapping[int, float]
     ) -> StreamSegment:
-        """Appends the way to a target, in place of all that is beyond its start."""
+        """Appends the segment to a target, and drops all segments beyond its start."""
         segments = self._segments
         leaving, before = self._goal, self._slopes or None
         while segments and segments[-1].end > start + SAME_TIME:
@@ -242,13 +242,13 @@ class TargetStreams:
             self._waiting = coalesce(self._waiting, (command,))
 
     def drop(self, joints: Iterable[int]) -> None:
-        """Forgets the streams of joints that something else drives from now on; what else moves by them holds."""
+        """Drops the streams of joints that get another driver; other joints of these streams hold."""
         dropped = set(joints)
         for key in [key for key in self._streams if key & dropped]:
             self._motors.release(self._streams.pop(key).joints - dropped)
 
     def clear(self) -> None:
-        """Forgets all targets; the joints hold."""
+        """Drops all targets; the joints hold."""
         self._waiting = ()
         self.drop(frozenset().union(*self._streams))
 

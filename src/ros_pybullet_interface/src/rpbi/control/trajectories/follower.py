@@ -47,7 +47,7 @@ class TrajectoryFollower:
         self.joint_names = tuple(self._joints)
 
     def check(self, request: TrajectoryRequest, tolerances: GoalTolerances | None = None) -> CheckedRequest:
-        """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
+        """Checks a trajectory as far as possible without the state of the robot; any thread may call it.
 
         Args:
             tolerances: Tolerances; without them nothing is checked.
@@ -108,7 +108,7 @@ class TrajectoryFollower:
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
     def state(self, time_s: float, measured: JointMotion | None = None) -> TrajectoryStateSample:
-        """Returns where the joints are to be and where they are, at the world's time now [s]."""
+        """Returns desired and measured joint states at the present time of the world [s]."""
         running, measured = self._running, measured or self._drive.measured()
         return TrajectoryStateSample(
             self._drive.name,

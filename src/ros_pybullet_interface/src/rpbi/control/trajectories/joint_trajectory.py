@@ -41,8 +41,8 @@ class JointTrajectory(NamedTuple):
     def spliced_onto(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
         """Returns the present trajectory until a time, and this one from then on.
 
-        Points up to that time are left out: the joint moves straight to the next one. A continuous joint moves there
-        the short way.
+        Points up to that time are left out: the joint moves straight to the next one. A continuous joint takes the
+        shorter rotation.
 
         Args:
             start_s: The world's time at which the trajectory's times begin [s].
@@ -70,7 +70,7 @@ class JointTrajectory(NamedTuple):
         if speed > max(self.joint.max_velocity * CURVE_SPEED_SLACK, speed_now * ROUNDING):
             raise _too_fast(self.joint, speed, where)
         low, high = value_range(polynomial, duration_s)
-        start = polynomial[0]  # which may be beyond the limits, if something has pushed the joint there
+        start = polynomial[0]  # may be beyond the limits, if the joint was pushed there
         slack = CURVE_POSITION_SLACK
         if low < min(self.joint.lower, start) - slack or high > max(self.joint.upper, start) + slack:
             raise _swings_out(self.joint, low, high, where)
@@ -79,7 +79,7 @@ class JointTrajectory(NamedTuple):
 def validate_trajectory(
     request: TrajectoryRequest, joints: Mapping[str, Joint], may_be_partial: bool
 ) -> tuple[JointTrajectory, ...]:
-    """Checks a trajectory as far as it can be without knowing where the joints are; any thread may call it.
+    """Checks a trajectory as far as possible without the joint positions; any thread may call it.
 
     Raises:
         TrajectoryRefusedError: If it cannot be followed.
@@ -166,7 +166,7 @@ def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
 
 
 def _beyond(polynomials: Sequence[Polynomial], durations_s: Sequence[float], lower: float, upper: float) -> list[int]:
-    """Returns which of many polynomials may leave a range; to find out, each has to be looked at."""
+    """Returns which of many polynomials may leave a range; each of these needs an exact check."""
     low, high = value_bounds(polynomials, durations_s)
     return [int(number) for number in ((low < lower) | (high > upper)).nonzero()[0]]
 

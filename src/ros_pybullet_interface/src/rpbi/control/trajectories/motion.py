@@ -13,8 +13,8 @@ from .trajectory import DesiredState, Knot, Trajectory
 class TrajectoryMotion(Motion):
     """Follows a trajectory of each of some joints.
 
-    With tolerances it succeeds when the joints are at their goals, and is broken off when one is too far off: then the
-    joints stop where they are. Without tolerances it just ends.
+    With tolerances it succeeds when the joints are at their goals; if a joint is too far off, it is aborted and the
+    joints stop. Without tolerances it ends without a verdict.
 
     Args:
         trajectories: The joints' trajectories, each of one joint, by joint index, in the world's time.
@@ -45,7 +45,7 @@ class TrajectoryMotion(Motion):
         self.trajectories = dict(trajectories)
         self.from_s = from_s
         self.end_s = max(trajectory.end_s for trajectory in trajectories.values())
-        self.code = ErrorCode.INVALID_GOAL  # unless it ends in a way that has a number of its own
+        self.code = ErrorCode.INVALID_GOAL  # unless the outcome has its own code
         self.preempted = False
         self.desired: dict[int, DesiredState] = {}
         self._joints = joints
@@ -73,9 +73,9 @@ class TrajectoryMotion(Motion):
         return self._go_on(time_s)
 
     def preempt(self, reason: str) -> None:
-        """Ends because something else is wanted; the joints are left as they are."""
+        """Ends because of another request; the joints are left unchanged."""
         if not self._fault:
-            self.preempted, self.code = True, ErrorCode.SUCCESSFUL  # as in ros_controllers: nothing went wrong
+            self.preempted, self.code = True, ErrorCode.SUCCESSFUL  # as in ros_controllers: no error
         self.end(False, self._fault or reason)
 
     def halt(self, reason: str, measured: JointMotion) -> None:
@@ -88,7 +88,7 @@ class TrajectoryMotion(Motion):
         self.desired = {index: trajectory.sample(time_s) for index, trajectory in self.trajectories.items()}
 
     def _go_on(self, time_s: float) -> JointMotion:
-        """Returns set points with which the joints are at the end of the tick where they are to be then."""
+        """Returns set points with which the joints reach their desired positions at the end of the tick."""
         before, duration_s = self.desired, time_s - self._time_s
         self._sample(time_s)
         return {
@@ -122,7 +122,7 @@ class TrajectoryMotion(Motion):
         return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
 
     def _path_problem(self, measured: JointMotion) -> str:
-        """Returns what is too far off on the way, nothing if all is well."""
+        """Returns the violation of a path tolerance, or an empty text."""
         if self._tolerances is None or not self.from_s <= self._time_s < self.end_s:
             return ""
         return self._fault_in(self._tolerances.path, measured, "its trajectory")

@@ -27,7 +27,7 @@ class TrajectoryRefusedError(InterfaceError):
 
 
 class TrajectoryPoint(NamedTuple):
-    """Where n joints are to be at one time.
+    """Desired state of n joints at one time.
 
     Attributes:
         time_s: Time from the start of the trajectory [s].
@@ -55,7 +55,7 @@ class JointTolerance(NamedTuple):
 
 
 class TrajectoryRequest(NamedTuple):
-    """A trajectory that somebody wants followed.
+    """A trajectory to follow.
 
     Attributes:
         joint_names: n names, in any order.

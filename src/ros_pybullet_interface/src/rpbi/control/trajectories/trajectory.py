@@ -96,7 +96,7 @@ class Trajectory:
         return cls(segments or [_standing(last.time_s, last.position)], last.time_s, last.position)
 
     def sample(self, time_s: float) -> DesiredState:
-        """Returns where the joints are to be at a time [s].
+        """Returns the desired state of the joints at a time [s].
 
         Before the start that is the first knot's position, from the end on exactly the last one's, both at rest.
         """
@@ -194,7 +194,7 @@ def _segment(before: Knot, after: Knot) -> Segment:
 
 
 def _check(knots: Sequence[Knot]) -> None:
-    """Raises a ValueError that names the first knot that is not as it should be."""
+    """Raises a ValueError that names the first invalid knot."""
     if not knots:
         raise ValueError("a trajectory needs at least one knot")
     width = len(knots[0].position)
@@ -213,12 +213,12 @@ def _check(knots: Sequence[Knot]) -> None:
 
 
 class TrajectoryStateSample(NamedTuple):
-    """Where the joints of a follower of trajectories are to be, and where they are.
+    """Desired and measured state of the joints of a trajectory follower.
 
     Attributes:
         name: The robot.
         joint_names: n names.
-        desired: Where they are to be; the positions that motors hold while there is no trajectory.
+        desired: Desired state; without a trajectory, the positions that motors hold.
         position: n positions [rad or m], measured.
         velocity: n velocities [rad/s or m/s], measured.
         time_from_start_s: Time since the trajectory began [s], 0 while there is none.

@@ -1,4 +1,4 @@
-"""The tasks of environments; a new one is a class in a file of its own and a line here."""
+"""The tasks of environments; to add one, write a class in its own file and a line here."""
 
 from __future__ import annotations
 

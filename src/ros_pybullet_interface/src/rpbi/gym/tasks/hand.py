@@ -21,7 +21,7 @@ class HandConfig(WorldTaskConfig):
     link: Text = Field(description="Its hand: the link that actions move.")
     low: Position = Field(description="Lower corner of the box that hand and objects stay in, in the world.")
     high: Position = Field(description="Upper corner.")
-    step: PositiveMetres = Field(0.01, description="Largest way of an action along each axis.")
+    step: PositiveMetres = Field(0.01, description="Largest translation of an action along each axis.")
 
 
 class HandTask(WorldTask):
@@ -32,7 +32,7 @@ class HandTask(WorldTask):
         self._link = link_index(robot_of(world, config.robot), config.link)
 
     def hand_action(self, axes: str = "xyz") -> HandAction:
-        """Returns ways of the hand along some axes."""
+        """Returns translations of the hand along some axes."""
         config = self.config
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 
@@ -42,11 +42,11 @@ class HandTask(WorldTask):
         yield ObservationPart("hand", self.config.low, self.config.high, self.hand)
 
     def hand(self) -> Vector:
-        """Returns where the hand is in the world [m]."""
+        """Returns the position of the hand in the world [m]."""
         return self.world.bodies[self.config.robot].link_pose(self._link).position
 
     def position_of(self, name: str) -> Vector:
-        """Returns where the base of a body is [m]."""
+        """Returns the position of a body's base [m]."""
         return self.world.bodies[name].base_pose().position
 
     def touches(self, name: str) -> Sequence[tuple[str, float]]:

@@ -32,11 +32,11 @@ class LiftTask(HandTask):
 
     def __init__(self, world: World, config: LiftConfig) -> None:
         super().__init__(world, config)
-        world.dynamics(config.object)  # which has to be there
+        world.dynamics(config.object)  # checks that it exists
         self._start_height = 0.0
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns ways of the hand, and the motion of the fingers: 1 opens, -1 closes them."""
+        """Returns translations of the hand, and the motion of the fingers: 1 opens, -1 closes them."""
         config = self.config
         return [self.hand_action(), GripperAction(self.world, config.robot, config.fingers, config.finger_step)]
 

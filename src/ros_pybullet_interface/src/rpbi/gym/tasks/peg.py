@@ -36,16 +36,16 @@ class PegTask(HandTask):
     def __init__(self, world: World, config: PegConfig) -> None:
         super().__init__(world, config)
         for name in config.walls:
-            world.dynamics(name)  # which has to be there
+            world.dynamics(name)  # checks that it exists
         self.hole: Vector = config.hole
         """Middle of the hole's opening [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns ways of the hand."""
+        """Returns translations of the hand."""
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the way from the tip to the hole's opening [m]."""
+        """Adds the vector from the tip to the hole's opening [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 

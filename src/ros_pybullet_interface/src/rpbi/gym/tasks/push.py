@@ -32,12 +32,12 @@ class PushTask(HandTask):
 
     def __init__(self, world: World, config: PushConfig) -> None:
         super().__init__(world, config)
-        world.dynamics(config.object)  # which has to be there
+        world.dynamics(config.object)  # checks that it exists
         self.goal: tuple[float, float] = (0.0, 0.0)
         """The goal of the body in the plane [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns ways of the hand in the plane; its height stays as it is."""
+        """Returns translations of the hand in the plane; its height stays as it is."""
         return [self.hand_action("xy")]
 
     def parts(self) -> Iterator[ObservationPart]:

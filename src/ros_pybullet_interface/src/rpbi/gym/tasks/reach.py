@@ -46,7 +46,7 @@ class ReachTask(WorldTask):
         return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the way from the link to the goal [m]."""
+        """Adds the vector from the link to the goal [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
 
@@ -57,7 +57,7 @@ class ReachTask(WorldTask):
         super().reset(random)
 
     def position(self) -> Vector:
-        """Returns where the link is [m]."""
+        """Returns the position of the link [m]."""
         position: Vector = self.world.bodies[self.config.robot].link_pose(self._link).position
         return position
 

@@ -37,7 +37,7 @@ class WipeTask(HandTask):
 
     def __init__(self, world: World, config: WipeConfig) -> None:
         super().__init__(world, config)
-        world.dynamics(config.surface)  # which has to be there
+        world.dynamics(config.surface)  # checks that it exists
         low, high = np.array(config.spot_low[:2]), np.array(config.spot_high[:2])
         steps = (np.arange(config.cells) + 0.5) / config.cells
         x, y = np.meshgrid(*(low + np.outer(steps, high - low)).T)
@@ -48,7 +48,7 @@ class WipeTask(HandTask):
         self._rewarded = 0.0
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns ways of the hand."""
+        """Returns translations of the hand."""
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
@@ -59,7 +59,7 @@ class WipeTask(HandTask):
         yield ObservationPart("wiped", (0.0,) * count, (1.0,) * count, lambda: self.is_wiped.astype(float).tolist())
 
     def reset(self, random: np.random.Generator) -> None:
-        """Has all cells dirty."""
+        """Marks all cells as not wiped."""
         self.is_wiped[:] = False
         self._rewarded = 0.0
         super().reset(random)

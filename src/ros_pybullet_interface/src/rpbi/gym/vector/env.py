@@ -192,7 +192,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
     def _ask_all(self, name: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
         """Returns the answers of all processes, which work at the same time; raises the first error."""
         requests = [request(name, *each) for each in arguments or [()] * self.workers]
-        for process, each in zip(self._processes, requests):  # one right after the other, so that none begins late
+        for process, each in zip(self._processes, requests):  # all requests first, so that no process starts late
             process.send(each)
         answers = [process.answer() for process in self._processes]
         for is_good, answer in answers:
@@ -217,7 +217,7 @@ class _Process:
         self._connection: Connection = ours
 
     def stay_on(self, processor: int) -> None:
-        """Has it run on one processor from now on."""
+        """Restricts it to one processor."""
         with suppress(ProcessLookupError):  # `answer` reports that it has ended
             os.sched_setaffinity(self._process.pid, {processor})
 
@@ -229,7 +229,7 @@ class _Process:
     def send_file(self, file: int) -> None:
         """Sends a file descriptor."""
         send_handle(self._connection, file, self._process.pid)
-        os.set_blocking(self._connection.fileno(), True)  # a default time-out of sockets has changed it
+        os.set_blocking(self._connection.fileno(), True)  # a default timeout of sockets may have changed it
 
     def answer(self) -> tuple[bool, Any]:
         """Returns whether a request succeeded, and its result or error."""

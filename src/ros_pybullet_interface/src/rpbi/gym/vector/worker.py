@@ -63,7 +63,7 @@ class Slot:
         return self.env.reset(seed=seed, options=options)
 
     def step(self, action: Any) -> StepResult:
-        """Takes a step, or resets.
+        """Takes a step or resets.
 
         Raises:
             ValueError: If the episode has ended and nobody has reset it.
@@ -104,7 +104,7 @@ class Worker:
         return each, dict(env.metadata), env.render_mode
 
     def share(self, shared: SharedArrays) -> None:
-        """Has results written to shared memory from now on."""
+        """Writes results to shared memory from now on."""
         self._shared = shared
 
     def reset(self, seeds: Sequence[int | None], mask: Sequence[bool], options: Info | None) -> list[Info | None]:
@@ -164,7 +164,7 @@ def main() -> None:
             if name == "make":
                 worker, answer = Worker(*arguments), None
                 gc.collect()
-                gc.freeze()  # else a collection goes through all worlds, while the other processes wait
+                gc.freeze()  # otherwise a garbage collection walks all worlds while other processes wait
             elif name == "share":
                 file = recv_handle(connection)
                 os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it

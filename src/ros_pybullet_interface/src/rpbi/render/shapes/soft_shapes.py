@@ -7,7 +7,7 @@ from rpbi.bodies import Body
 from rpbi.engine.client import Client
 
 SHORTEST_STEP_S = 1e-9
-"""Length of a step in which nothing moves to speak of [s]."""
+"""Length of a step with negligible motion [s]."""
 
 
 class SoftShapes:
@@ -26,14 +26,14 @@ class SoftShapes:
             pb.setTimeStep(SHORTEST_STEP_S)
 
     def still(self, body: Body) -> None:
-        """Sees to it that a new body neither pushes nor pulls others in a step."""
+        """Disables collisions and forces of a new body."""
         if self._pb.is_deformable:
             body.detach()
             for link in (-1, *body.joint_indices):
                 self._pb.setCollisionFilterGroupMask(body.body_id, link, 0, 0)
 
     def show(self, nodes: Sequence[tuple[Body, Sequence[Vector]]]) -> None:
-        """Puts corners of soft bodies somewhere; rigid bodies must be put where they belong after it.
+        """Sets corners of soft bodies; rigid bodies must be placed afterwards.
 
         Args:
             nodes: Soft bodies and the places of all of their simulated corners [m].

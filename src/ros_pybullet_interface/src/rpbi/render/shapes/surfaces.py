@@ -12,7 +12,7 @@ TOLERANCE_M = 2e-4
 """Largest distance of a polygon's edges inside its circle [m], unless that needs more than `MAX_CORNERS`."""
 MIN_CORNERS, MAX_CORNERS = 24, 160
 PLANE_HALF_WIDTH_M = 100.0
-"""Half the edge of the square that stands for a plane without end."""
+"""Half the edge of the square that represents an infinite plane."""
 
 
 class SurfaceMesh(NamedTuple):
@@ -93,7 +93,7 @@ def _square(outward: Array) -> SurfaceMesh:
 
 
 def _corners(radius: float) -> int:
-    """Returns how many corners a circle needs to look round, a multiple of 4; small things are often many."""
+    """Returns the number of corners of a circle, a multiple of 4; fewer for small circles."""
     needed = np.pi / np.arccos(1.0 - min(TOLERANCE_M / radius, 1.0))
     return int(np.clip(4 * np.ceil(needed / 4), MIN_CORNERS, MAX_CORNERS))
 

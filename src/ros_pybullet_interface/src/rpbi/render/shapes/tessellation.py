@@ -23,7 +23,7 @@ _DEFAULT_RADIUS_M, _DEFAULT_LENGTH_M, _DEFAULT_HALF_EXTENTS_M = 0.5, 1.0, (1.0, 
 """PyBullet's own defaults."""
 
 _SPECK = surfaces.mesh(1e-6 * np.eye(3), np.array([[0, 1, 2]]))
-"""Stands for what cannot be seen at all: EGL would draw it into depth and segmentation."""
+"""Replaces invisible shapes, which EGL would draw into depth and segmentation."""
 
 
 class FineShapes:

@@ -1,4 +1,4 @@
-"""Which shapes of a renderer's client can be seen through."""
+"""Transparent shapes of a renderer's client."""
 
 from collections import Counter
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Where scenes go: to the renderer process, which publishes the images."""
+"""Sends scenes to the renderer process, which publishes the images."""
 
 import contextlib
 import os
@@ -28,14 +28,14 @@ LONGEST_WAIT_S = 20.0
 
 
 class ScenePublisher:
-    """Feeds the renderer process, and has cameras read only while somebody looks at their images."""
+    """Feeds the renderer process, and reads cameras only while their images have subscribers."""
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._sensors: Mapping[str, RgbdSensor] = {}
         self._synchronous: tuple[RgbdSensor, ...] = ()
         self._awaited: list[SceneSample] = []
-        # A window without a graphics card takes all that there is, and would leave such a renderer hardly anything
+        # a window without a graphics card would leave a renderer of low priority hardly any processor time
         priority = ["--keep-priority"] if world.window else []
         self._renderer = RenderClient(
             (),
@@ -46,7 +46,7 @@ class ScenePublisher:
         )
 
     def poll(self) -> None:
-        """Sees to the process; called at every pass of the loop."""
+        """Maintains the process; called at every pass of the loop."""
         if self._sensors is not self._world.cameras:
             self._update_cameras(self._world.cameras)
         self._renderer.poll()
@@ -70,7 +70,7 @@ class ScenePublisher:
                 self._wait_for(partial(_is_placed_or_unwanted, sensor), name, missing)
 
     def publish(self, sample: SceneSample, stamp_ns: int) -> None:
-        """Has a scene drawn and published."""
+        """Renders and publishes a scene."""
         self._renderer.send(sample)
         if self._sensors[sample.name].config.synchronous:
             self._awaited.append(sample)
@@ -97,11 +97,11 @@ class ScenePublisher:
         self._renderer.serve_late()
 
     def restart(self) -> None:
-        """Drops what it keeps of scenes: the world was reset."""
+        """Drops stored scenes after a reset."""
         self._renderer.forget_scenes()
 
     def forget(self, name: str) -> None:
-        """Leaves a body that has gone out of the scenes that are still to be drawn."""
+        """Removes a removed body from scenes that are still to be drawn."""
         self._renderer.forget_body(name)
 
     def facts(self) -> dict[str, str]:
@@ -116,7 +116,7 @@ class ScenePublisher:
         """Ends the process at normal priority, since it has to unregister from the ROS master first."""
         if self._renderer.process_id is not None:
             nice = os.getpriority(os.PRIO_PROCESS, 0)
-            run_normally(self._renderer.process_id, nice)  # on a busy machine its end might take long otherwise
+            run_normally(self._renderer.process_id, nice)  # otherwise its end might take long on a busy machine
         if not self._renderer.stop():
             _unregister(camera_node(rospy.get_name()))
 
@@ -135,7 +135,7 @@ class ScenePublisher:
         """Waits for something of a synchronous camera, or until the node shuts down."""
         end_s = time.monotonic() + LONGEST_WAIT_S
         while not (condition() or rospy.core.is_shutdown_requested()):
-            flush_buffered_sockets()  # what it waits for may come of what others hear of earlier ticks
+            flush_buffered_sockets()  # what it waits for may depend on messages of earlier ticks
             self.poll()
             self._world.apply_inputs()
             if needs_renderer and not self._renderer.is_up:

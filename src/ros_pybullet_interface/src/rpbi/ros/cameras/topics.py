@@ -102,7 +102,7 @@ def compressed_message(frame: Frame, header: Header) -> CompressedImage | None:
     """Returns the colour image of a frame as JPEG, None if the frame has none."""
     if frame.colour is None:
         return None
-    from PIL import Image as Picture  # slow to load, and seldom asked for
+    from PIL import Image as Picture  # slow to import, and seldom used
 
     data = io.BytesIO()
     Picture.fromarray(frame.colour).save(data, "JPEG", quality=JPEG_QUALITY)

@@ -41,11 +41,11 @@ def _joint_target(message: JointState) -> JointCommand:
 
 
 POSE_TARGET = Topic(
-    "rpbi/{name}/target", PoseStamped, _pose_target, "Where the point that the controller holds is to be, in the world."
+    "rpbi/{name}/target", PoseStamped, _pose_target, "Target of the point that the controller holds, in the world."
 )
 JOINT_TARGET = Topic(
     "rpbi/{name}/target",
     JointState,
     _joint_target,
-    "Where the controller's joints are to be [rad or m]; efforts [N m or N], if any, are added.",
+    "Targets of the controller's joints [rad or m]; efforts [N m or N], if any, are added.",
 )

@@ -13,7 +13,7 @@ QUEUE_SIZE = 1000
 
 
 class StateTopic(rospy.SubscribeListener):
-    """A topic whose last message can be sent to subscribers that come while the world stands still.
+    """A topic whose last message can be sent to new subscribers while the world is stopped.
 
     A stopped world in simulated time has nothing new, and publishing again would repeat stamps; a late subscriber is
     therefore served alone. One thread at a time publishes and serves. Up to `queue_size` messages are buffered for each
@@ -67,12 +67,12 @@ class FastTopic(StateTopic):
         self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
 
     def wrap_connections(self) -> None:
-        """Sees to it that sending never waits for anybody, not for those either that have just come."""
+        """Ensures that sending never waits for a subscriber, including new ones."""
         if self._sending is not None:
             self._sending.wrap_connections()
 
     def publish(self, message: Any) -> None:
-        """Has a message sent to all subscribers by the next flush."""
+        """Buffers a message for all subscribers until the next flush."""
         self.wrap_connections()
         super().publish(message)
 

@@ -21,7 +21,7 @@ class AttachmentPublisher:
         self._publisher = rospy.Publisher(ATTACHMENTS.name, Attachments, queue_size=10, latch=True)
 
     def poll(self) -> None:
-        """Publishes what has changed, if anything has."""
+        """Publishes changes, if any."""
         attachments = self._world.attachments
         if self._published == attachments.changes:
             return

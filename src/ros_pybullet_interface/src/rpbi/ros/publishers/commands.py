@@ -58,7 +58,7 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends what is new, and to newcomers what is old."""
+        """Sends new commands, and earlier ones to new subscribers."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())
@@ -77,7 +77,7 @@ class CommandPublisher:
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
     def catch_up(self) -> None:
-        """Sends all that is new."""
+        """Sends all new commands."""
         self.spin()
         while self._all.next != self._world.commands.count:
             self.spin()
@@ -100,6 +100,6 @@ def _message(command: WorldCommand) -> WorldCommandMessage:
     try:
         data = to_text(command.value)
     except TypeError as error:
-        log.warning("%s: a command cannot be recorded, so no replay will be right: %s", command.name, error)
+        log.warning("%s: a command cannot be recorded, so replays will differ: %s", command.name, error)
         data = ""
     return WorldCommandMessage(command.tick, command.name, command.what, data)

@@ -76,12 +76,12 @@ class SamplePublishers:
             publisher.serve_late()
 
     def restart(self) -> None:
-        """Drops what is kept of all samples: the world was reset."""
+        """Drops all stored samples after a reset."""
         for publisher in self._all:
             publisher.restart()
 
     def forget(self, name: str) -> list[FastTopic]:
-        """Drops what is kept of a body that has gone, and of its sensors; for the simulation thread.
+        """Drops the stored samples of a removed body and its sensors; for the simulation thread.
 
         Returns:
             The topics that are left to close, by another thread, since the ROS master may be slow to answer.
@@ -105,7 +105,7 @@ class TickPublisher:
         self._clock = ClockPublisher(world) if world.clock.simulated else None
         self._idle_ticks = idle_ticks
         self._idle_tick = 0
-        """The tick at which the world would be, had it not stood still."""
+        """The tick of the world if it had not been stopped."""
 
     def set_factor(self, real_time_factor: float) -> None:
         """Publishes the time as often as a pace allows."""
@@ -124,12 +124,12 @@ class TickPublisher:
             self._clock.publish_tick()
 
     def publish_all(self, samples: list[Any]) -> None:
-        """Publishes the last tick before standing still: all of it, whatever is due."""
+        """Publishes the last tick before a stop completely, regardless of rates."""
         self.publish_last_time()
         self._publishers.publish(samples + self._world.read_rest(), self._world.clock.stamp_ns)
 
     def publish_last_time(self) -> None:
-        """Publishes the time of the last tick before standing still, and nothing of a world that may be broken."""
+        """Publishes only the time of the last tick before a stop, since the world may be broken."""
         self._idle_tick = self._world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()
@@ -140,7 +140,7 @@ class TickPublisher:
             self._clock.repeat()
 
     def publish_idle(self) -> None:
-        """Publishes a world that stands still to late subscribers, without repeating a stamp."""
+        """Publishes a stopped world to late subscribers, without repeating a stamp."""
         if self._clock is not None:
             self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)
             self._publishers.serve_late()
@@ -150,6 +150,6 @@ class TickPublisher:
             self._publishers.publish(self._world.read_idle(self._idle_tick, since), self._world.clock.stamp_ns)
 
     def restart(self) -> None:
-        """Drops what is kept of a world before its reset, and publishes how it is now."""
+        """Drops data from before a reset, and publishes the present state."""
         self._publishers.restart()
         self.publish_all([])

@@ -28,7 +28,7 @@ CLOCK = Topic(
     "/clock", ClockMessage, meaning="The world's time, if `/use_sim_time` is true; every tick, or `clock_hz`."
 )
 STATUS = Topic(
-    "rpbi/status", Int64, meaning="1 while the world runs, 0 while it stands still; `status_hz`.", key="status_hz"
+    "rpbi/status", Int64, meaning="1 while the world runs, 0 while it is stopped; `status_hz`.", key="status_hz"
 )
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, meaning="Real-time factor, overruns, lost time, renderer; 1 Hz.")
 
@@ -53,11 +53,11 @@ SLOW_CALL_S = 0.0005
 
 
 def _warn_of_rivals() -> None:
-    """Warns if another node publishes the time too: ROS time would jump between the two."""
+    """Warns if another node publishes /clock, too: ROS time would jump between the two."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
     rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
-        log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
+        log.warning("/clock is published by %s too: another node already publishes /clock", ", ".join(rivals))
 
 
 def clock_message(stamp_ns: int) -> ClockMessage:

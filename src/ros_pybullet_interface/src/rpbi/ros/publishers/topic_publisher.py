@@ -1,4 +1,4 @@
-"""Where samples go: those of a sensor to a topic of its own, poses of links to TF."""
+"""Publishers of samples: a topic for each sensor, and TF for poses of links."""
 
 from collections.abc import Callable
 from functools import partial
@@ -44,7 +44,7 @@ class TopicPublisher:
         """
         key = type(sample), sample.name
         self._last[key] = sample, stamp_ns
-        route = self._routes.get(key)  # there is none as long as the body is new
+        route = self._routes.get(key)  # no such stream as long as the body is new
         if route is not None and route[0].has_subscribers:
             topic, to_message = route
             try:
@@ -61,11 +61,11 @@ class TopicPublisher:
                     topic.serve_late(partial(to_message, *self._last[key]))
 
     def restart(self) -> None:
-        """Drops what it keeps of all samples; the topics stay."""
+        """Drops all stored samples; the topics stay open."""
         self._last.clear()
 
     def forget(self, key: SampleKey) -> FastTopic | None:
-        """Drops what it keeps of a sensor; returns its topic, which is left to close."""
+        """Drops the stored samples of a sensor; returns its topic, which the caller closes."""
         self._last.pop(key, None)
         topic, _ = self._routes.get(key, (None, None))
         self._routes = {other: route for other, route in self._routes.items() if other != key}

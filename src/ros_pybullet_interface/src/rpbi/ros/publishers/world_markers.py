@@ -97,7 +97,7 @@ class WorldMarkers:
         self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
         self._look: Iterator[None] | None = None
-        """The look at all shapes that is under way."""
+        """The running check of all shapes."""
         self._markers: dict[_Key, Marker] = {}
         self._sent: dict[_Key, Marker] = {}
         self._loose: list[tuple[_Key, Body, BodyShape]] = []
@@ -107,7 +107,7 @@ class WorldMarkers:
         self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
 
     def poll(self) -> None:
-        """Publishes what has changed, if it is time to look."""
+        """Publishes changes, if a check is due."""
         if self._look is None and not self._rate.is_due():
             return
         present = (len(self._world.log), *self._world.bodies.values())

@@ -21,7 +21,7 @@ from rpbi.ros.body_context import BodyContext
 from rpbi.ros.headers import to_ros_time
 
 NEAR_M, NEAR_RAD = 0.01, 0.02
-"""A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
+"""Tolerances of a moved link: joints within 0.01 rad of their goals may add up to this error."""
 _warn = ThrottledWarning()
 
 
@@ -121,7 +121,7 @@ def _judged(context: BodyContext, solution: PybulletSolution) -> tuple[bool, str
     """Returns whether a solution is a success, and a message."""
     if solution.success or context.body.config.strict:
         return solution.success, solution.message
-    return True, f"as near as it comes: {solution.message}"
+    return True, f"as near as possible: {solution.message}"
 
 
 def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:

@@ -37,7 +37,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
 def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
     """Moves all joints to where they started, in `duration` [s]; answers at the end.
 
-    The state in the request is not looked at.
+    The state in the request is ignored.
     """
     return Answer(*_move(context, context.body.start_positions(), request.duration))
 
@@ -100,7 +100,7 @@ def set_motor_gains(context: BodyContext, request: SetMotorGainsRequest) -> Answ
 
 
 def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answer:
-    """Puts the joints that are named somewhere at once, within their limits.
+    """Sets the named joints to positions at once, within their limits.
 
     Raises:
         UnknownNameError: If the robot lacks one of the joints.

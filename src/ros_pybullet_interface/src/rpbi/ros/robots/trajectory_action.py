@@ -112,7 +112,7 @@ _open_actions: set[TrajectoryAction] = set()
 
 @cache
 def _answer_before_shutdown() -> None:
-    """Has ROS wait for the answers to all goals, which end with the world, before it shuts down."""
+    """Makes ROS wait for the answers to all goals, which end with the world, before it shuts down."""
 
     def answer() -> None:
         for action in list(_open_actions):
@@ -192,8 +192,8 @@ class TrajectoryAction:
                 goal, error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL, error
             )
             return
-        except Exception as error:  # nothing that a goal brings along may leave the client without an answer
-            log.exception("a goal failed in a way that is not foreseen")
+        except Exception as error:  # the client must get an answer for any error in a goal
+            log.exception("a goal failed with an unexpected error")
             self._reject(goal, ErrorCode.INVALID_GOAL, error)
             return
         goal.set_accepted()

@@ -20,7 +20,7 @@ def followers(body: Body) -> Sequence[str]:
 
 
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
-    """Follows a trajectory without looking at how well; a goal of the action is cancelled."""
+    """Follows a trajectory without tolerances; a goal of the action is cancelled."""
     follower, clock = context.body.follower, context.world.clock
     request = trajectory_request(message)
     checked = follower.check(request)

@@ -96,7 +96,7 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
 
     def start() -> Zeroing:
         if not context.simulation.running:
-            raise InterfaceError("the simulation is stopped: start it, else there are no samples to average")
+            raise InterfaceError("the simulation is stopped: start it to get samples to average")
         refuse_if_off()
         zeroing: Zeroing = sensor.zero(SAMPLES)
         return zeroing
@@ -148,7 +148,7 @@ BODY_TOPICS = (
         f"rpbi/{{name}}/{CONTROLLER}/command",
         JointTrajectory,
         follow_command,
-        "The robot follows the trajectory, without looking at how well.",
+        "The robot follows the trajectory, without tolerances.",
         owners=followers,
     ),
 )

@@ -109,26 +109,26 @@ class NodeContext(NamedTuple):
 
 
 def _start(node: NodeContext, _: Any) -> Answer:
-    """Lets the world run; `success` is false if it does so already."""
+    """Starts the world; `success` is false if it runs already."""
     has_started = node.ask(node.simulation.start)
     return Answer(has_started, "started" if has_started else "already running")
 
 
 def _stop(node: NodeContext, _: Any) -> Answer:
-    """Lets the world stand still; `success` is false if it does so already."""
+    """Stops the world; `success` is false if it is stopped already."""
     has_stopped = node.ask(node.simulation.stop, even_if_busy=True)
     return Answer(has_stopped, "stopped" if has_stopped else "already stopped")
 
 
 def _step(node: NodeContext, _: Any) -> Answer:
-    """Advances by a tick, if the world stands still; the message is `tick N, stamp S` [s]."""
+    """Advances by a tick, if the world is stopped; the message is `tick N, stamp S` [s]."""
     tick, stamp_ns = node.ask(node.simulation.step)
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
     return Answer(True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
 
 
 def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances by many ticks, a million at most, as fast as possible, if the world stands still."""
+    """Advances by many ticks, a million at most, as fast as possible, if the world is stopped."""
     try:
         if request.steps > MAX_STEPS:
             raise InterfaceError(f"steps: expected at most {MAX_STEPS}, got {request.steps}; ask again for more")
@@ -157,7 +157,7 @@ def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tupl
 
 
 def _reset(node: NodeContext, _: Any) -> Answer:
-    """Makes the world what it was at its start, to the last bit; stamps go on."""
+    """Restores the initial state of the world, to the last bit; stamps continue."""
     node.objects.reset()
     return Answer(True, "the world is as configured")
 
@@ -184,8 +184,8 @@ def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
         node.objects.add(kind, config, file)
     except InterfaceError:
         raise
-    except Exception as error:  # nothing that an object brings along may leave the caller without an answer
-        log.exception("adding an object failed in a way that is not foreseen")
+    except Exception as error:  # the caller must get an answer for any error in an object
+        log.exception("adding an object failed with an unexpected error")
         return Answer(False, f"{type(error).__name__}: {error}")
     return Answer(True, f"added '{config.name}'")
 
@@ -256,7 +256,7 @@ def _get_dynamics(node: NodeContext, request: GetObjectDynamicsRequest) -> tuple
 
 
 def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequest) -> Answer:
-    """Changes what differs from what the service before returns."""
+    """Changes the values that differ from those of `get_dynamics`."""
     world, asked = node.simulation.world, request.object_dynamics
     wanted = LinkDynamics(*(getattr(asked, field) for field in LinkDynamics._fields))
 

@@ -1,4 +1,4 @@
-"""Objects that come and go while the node runs, in the world and in ROS."""
+"""Objects that are added and removed while the node runs, in the world and in ROS."""
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -113,7 +113,7 @@ class ObjectLifecycle:
                 raise error
 
     def end(self, timeout_s: float) -> None:
-        """Waits until nobody is coming or going, and lets nobody from then on."""
+        """Waits for running additions and removals, and refuses further ones."""
         self._lock.acquire(timeout=timeout_s)
 
     def _prepare(self, kind: str, config: Any, file: str) -> None:
@@ -122,7 +122,10 @@ class ObjectLifecycle:
         except ConfigError as error:
             raise ConfigError([Problem(file, each.key, each.message) for each in error.problems]) from None
         body_type = BODY_TYPES.find(kind)
-        with plugin_errors(body_type, f"preparing '{config.name}'"), suppress(ConfigError):  # which making it reports
+        with (
+            plugin_errors(body_type, f"preparing '{config.name}'"),
+            suppress(ConfigError),
+        ):  # reported when it is created
             body_type.prepare(config, self._world.window is not None)
 
     def _add_body(self, kind: str, config: Any, file: str) -> None:
@@ -136,7 +139,7 @@ class ObjectLifecycle:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Waits until nobody else adds, removes or resets; refuses at once while a state is restored."""
+        """Waits for other additions, removals and resets; raises at once while a state is restored."""
         self._ask(lambda: None)
         with self._lock:
             yield

@@ -1,4 +1,4 @@
-"""The service `rpbi/predict`: what would happen, while the world goes on."""
+"""The service `rpbi/predict`: future motion, while the world continues."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Predictor:
         shadow = self._shadow
 
         def news() -> tuple[bool, list[RecordedCommand], int, str, int]:
-            world.apply_inputs()  # those that have arrived act before the next step
+            world.apply_inputs()  # received inputs act before the next step
             follows = world.resets == self._resets and world.commands.first <= shadow.commands
             new = list(world.commands.records(shadow.commands)) if follows else []
             return follows, new, world.clock.tick, world.state_hash(), world.clock.stamp_ns
@@ -133,7 +133,7 @@ class Predictor:
 
 
 def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.Time, list[PredictionMessage]]:
-    """Predicts what would happen from the present state with each of some candidates; the world goes on."""
+    """Predicts the motion from the present state with each of some candidates; the world continues."""
     job = _job(node, request)
     candidates = [[planned_input(each) for each in candidate.inputs] for candidate in request.candidates]
     tick, stamp_ns, predictions = node.predictor.predict(candidates, job)

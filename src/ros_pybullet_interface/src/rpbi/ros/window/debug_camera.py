@@ -1,4 +1,4 @@
-"""Where PyBullet's window looks from: published, returned and changed."""
+"""Camera of PyBullet's window: published, returned and changed."""
 
 from typing import Any
 
@@ -18,11 +18,11 @@ HZ = 30.0
 
 
 class DebugCamera:
-    """Publishes where the window looks from while somebody listens.
+    """Publishes the camera of the window while it has subscribers.
 
     Args:
         window: The window; without it, nothing is published, and nothing can be changed.
-        configured: Where a window would look from at first.
+        configured: The initial camera of a window.
     """
 
     def __init__(self, window: Window | None, configured: ResetDebugVisualizerCamera) -> None:
@@ -31,7 +31,7 @@ class DebugCamera:
         self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
     def poll(self) -> None:
-        """Publishes it if it is time to."""
+        """Publishes it if it is due."""
         if self._window is None or self._publisher is None or not self._rate.is_due():
             return
         if self._publisher.get_num_connections():
@@ -44,12 +44,12 @@ class DebugCamera:
         subscribe(RESET, self)
 
     def get(self, _: Any) -> CameraMessage:
-        """Returns where the window looks from; without a window, what is configured."""
+        """Returns the camera of the window; without a window, the configured one."""
         window = self._window
         return _message(self._configured if window is None else self._ask(window.camera))
 
     def reset(self, message: CameraMessage) -> None:
-        """Has the window look from somewhere else.
+        """Moves the camera of the window.
 
         Raises:
             InterfaceError: If there is no window.

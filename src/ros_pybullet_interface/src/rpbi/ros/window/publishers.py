@@ -100,7 +100,7 @@ class GuiEvents:
 
 
 class VisualizerImage:
-    """Draws and publishes images while somebody looks at them.
+    """Draws and publishes images while they have subscribers.
 
     Args:
         window: The window.
@@ -118,7 +118,7 @@ class VisualizerImage:
         self._numbers = rospy.Publisher(NUMBERS.name, Int64MultiArray, queue_size=2)
 
     def poll(self) -> None:
-        """Draws an image if it is time to and somebody looks."""
+        """Draws an image if it is due and has subscribers."""
         if not self._rate.is_due():
             return
         start_s = time.monotonic()

@@ -35,7 +35,7 @@ class WindowTopics:
             self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
 
     def serve(self, ask: Requests) -> None:
-        """Opens what needs the simulation thread to answer."""
+        """Opens the services that the simulation thread answers."""
         self._camera.serve(ask)
 
 

@@ -1,1 +1,1 @@
-"""Where bodies touch each other: as it is, as means, and as arrows."""
+"""Contact points between bodies: of one tick, as means, and as arrows."""

@@ -28,7 +28,7 @@ class ContactArrowsSensor(Sensor):
 
     def read(self, tick: int) -> ContactArrowsSample:
         """Reads the contacts and scales their forces; where there is none there is no arrow."""
-        assert self._reader is not None  # the world sees to it
+        assert self._reader is not None  # ensured by the world
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))
             for point in self._reader.sample(self._body, tick).points

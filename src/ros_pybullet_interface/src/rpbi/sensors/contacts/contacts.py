@@ -1,4 +1,4 @@
-"""Where bodies touch each other, and what they feel there."""
+"""Contact points between bodies, and their forces."""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
@@ -30,7 +30,7 @@ class ContactReader:
         self._are_finite = True
 
     def invalidate(self) -> None:
-        """Has PyBullet asked again: the world has moved on or has other bodies."""
+        """Discards the contacts, since the world has advanced or has other bodies."""
         self._touches = None
 
     def sample(self, body: SensedBody, tick: int) -> ContactsSample:
@@ -121,5 +121,5 @@ class ContactsSensor(Sensor):
         Raises:
             PhysicsError: If a number in them is not finite any more.
         """
-        assert self._reader is not None  # the world sees to it
+        assert self._reader is not None  # ensured by the world
         return self._reader.sample(self._body, tick)

@@ -22,7 +22,7 @@ class MeanContactsSensor(ContactsSensor):
         self._latest: ContactsSample | None = None
 
     def after_step(self, tick: int) -> None:
-        """Keeps the contacts of the tick, if anybody is to get their mean."""
+        """Stores the contacts of the tick, if their mean has subscribers."""
         if self.wanted and self.hz:
             self._ticks.append(super().read(tick))
         else:

@@ -61,7 +61,7 @@ class Remote:
             self._connection.send((name, arguments))
             if handle is not None:
                 send_handle(self._connection, handle, 0)
-                os.set_blocking(self._connection.fileno(), True)  # a default time-out of sockets has changed it
+                os.set_blocking(self._connection.fileno(), True)  # a default timeout of sockets may have changed it
         except OSError as error:
             raise self._ended(error) from None
         return self.answer()
