@@ -201,7 +201,7 @@ def names_of_tests(tree: ast.Module) -> list[str]:
 
 
 def wordy_test_names(src: Path) -> list[str]:
-    """Files whose names of tests are too long to be read at once, or leave the subject to the word "what"."""
+    """Files with names of tests that are too long to be read at once, or have "what" as their subject."""
     tests = [*src.parent.glob("tests/**/*.py"), *src.glob("*/src/*/conformance.py")]
     rule = f"at most {MAX_WORDS} words and no 'what' in the name of a test"
     found = {path: names_of_tests(ast.parse(path.read_text())) for path in sorted(tests)}
@@ -213,7 +213,7 @@ def wordy_test_names(src: Path) -> list[str]:
 
 
 def mutants_without_a_test(src: Path) -> list[str]:
-    """Changes of the guard that no test could catch, since the one that they name has gone or has another name."""
+    """Changes of the guard whose test was removed or renamed, so that nothing can catch them."""
     tests = [*src.parent.glob("tests/*/safe_robot/*.py"), *src.glob("safe_robot/src/*/conformance.py")]
     there = " ".join(path.read_text() for path in tests)
     return [
