@@ -1,4 +1,4 @@
-"""Tells catkin which Python packages live in src/; run by catkin, not by hand."""
+"""Lists the Python packages in src/ for catkin, which runs this file."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup

@@ -10,7 +10,7 @@ import numpy as np
 from robot_model.geometry import minus, rotation_between
 from rpbi.gym.actions import PoseAction
 from rpbi.gym.env import WorldEnv
-from rpbi_examples.scenes.scene import Put
+from rpbi_examples.scenes.scene import InputValue
 
 
 def act_at_random(env: WorldEnv, steps: int) -> Any:
@@ -31,13 +31,13 @@ def imitate(env: WorldEnv, seed: int) -> Iterator[Any]:
     env.reset(seed=seed)
     twin = type(task.scene)(np.random.default_rng(seed))
     twin.prepare()
-    twin.take_deeds()
+    twin.take_changes()
     twin.look(task.scene.seen)
     acts = twin.act()
     goals: dict[str, Any] = {}
     while True:
         next(acts, None)
-        for slot, value in (deed for deed in twin.take_deeds() if isinstance(deed, Put)):
+        for slot, value in (change for change in twin.take_changes() if isinstance(change, InputValue)):
             goals[slot] = {**goals.get(slot, {}), **value} if isinstance(value, dict) else value
         action = [_towards(part, goals.get(part._slot)) for part in task._actions]
         found = env.step(np.concatenate(action, dtype=np.float32))

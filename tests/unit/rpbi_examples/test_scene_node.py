@@ -21,7 +21,7 @@ class FaultyStage(Stage):
     def begin(self, scene):
         self.episodes += 1
 
-    def do(self, deed):
+    def do(self, change):
         pass
 
     def cycle(self):

@@ -20,7 +20,7 @@ MIN_SPAN_RAD = 0.2
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
-    """Compares how often topics came in a time [s of ROS time] with how often they should.
+    """Compares measured with expected rates of topics over a duration [s of ROS time].
 
     Returns:
         One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
@@ -35,11 +35,11 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
 
 
 def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
-    """Compares positions with the targets that held at the time.
+    """Compares positions with the targets that were active at the same time.
 
     Args:
         states: Joint states with columns `position/JOINT`, index time [s].
-        targets: Targets alike.
+        targets: Targets, in the same form.
 
     Returns:
         One row a joint with the columns `rms` and `max` [rad or m].
@@ -53,7 +53,7 @@ def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
 
 
 def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None:
-    """Draws positions and targets of the joints that have any."""
+    """Draws positions and targets of the joints that have targets."""
     columns = [column for column in targets.columns if column.startswith("position/")]
     start_s = states.index[0]
     figure, axes = plt.subplots(len(columns), sharex=True, figsize=(9, 1.3 * len(columns) + 1), squeeze=False)
@@ -89,14 +89,14 @@ def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
         contacts: A row a contact with `other_body` and `normal_force`, and one for each time without any.
         other_body: The other body.
     """
-    if "other_body" not in contacts:  # nothing has touched at all
+    if "other_body" not in contacts:  # no contact in the whole recording
         return pd.Series(0.0, contacts.index)
     forces = contacts["normal_force"].where(contacts["other_body"] == other_body)
     return forces.groupby(level=0).sum()
 
 
 def force_figures(push: pd.Series) -> dict[str, float]:
-    """Returns the mean force while it touches and the largest one [N], both 0 if it never does."""
+    """Returns the mean force during contact and the largest force [N]; both are 0 without contact."""
     touching = push[push > 0.0]
     if touching.empty:
         return {"push_mean_n": 0.0, "push_max_n": 0.0}
@@ -104,7 +104,7 @@ def force_figures(push: pd.Series) -> dict[str, float]:
 
 
 def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
-    """Draws the force of the arm on the box beside the friction that it overcomes [N], and what its wrist feels.
+    """Draws the arm's force on the box, the friction that it overcomes, and the force at the wrist [N].
 
     Args:
         push: Force of the arm on the box [N], by time [s].
@@ -135,7 +135,7 @@ def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
 
 
 def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> None:
-    """Draws a depth image of shape (height, width) [m]; what sees nothing stays white."""
+    """Draws a depth image of shape (height, width) [m]; pixels without depth are white."""
     figure, axis = plt.subplots(figsize=(7.2, 4.9))
     image = axis.imshow(np.where(depth_m < 0.999 * far_m, depth_m, np.nan), cmap="viridis_r")
     figure.colorbar(image, ax=axis, label="depth along the optical axis [m]")
@@ -151,7 +151,7 @@ def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]
 
 
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], world: str) -> list[str]:
-    """Returns what was slow because the machine is slow or busy, with the cause and a remedy.
+    """Returns a line for each rate that a slow or busy machine reduced, with cause and remedy.
 
     Images share a line. `world` is the main YAML file.
     """

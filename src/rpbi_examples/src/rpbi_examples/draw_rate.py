@@ -20,7 +20,7 @@ TIMEOUT_S = 120.0
 def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> float:
     """Measures how often the world's camera can be drawn, at the priority of an ordinary program.
 
-    A process of its own does it, since some drivers end it.
+    It is measured in a separate process, since some drivers crash.
 
     Args:
         world: Main YAML file.

@@ -25,11 +25,11 @@ WIPING_PERIOD_S = 4.0
 POINTING_DOWN = (0.0, 1.0, 0.0, 0.0)
 """Orientation of the hands as x, y, z, w: their z axis down."""
 ORBIT_RADIUS = 2.0
-"""Distance from the vertical axis that it circles [m]."""
+"""Distance of the camera from the vertical axis of its orbit [m]."""
 ORBIT_HEIGHT = 1.5
 """Height above the ground [m]."""
 TARGET_HEIGHT = 0.4
-"""Height of what it looks at, on that axis [m]."""
+"""Height of the point on that axis at which the camera looks [m]."""
 ORBIT_SPEED = math.pi / 8.0
 """Rate of turn [rad/s]."""
 ROUTE_GAIN = 1.5
@@ -39,7 +39,7 @@ REACHED_M = 0.03
 REACHED_RAD = 0.03
 """... and this angle [rad]."""
 TO_MIDDLE_S = 3.0
-"""Time that all joints take together to reach the middle of their swings [s]."""
+"""Time in which all joints together reach the middle of their swings [s]."""
 SWING_PERIOD_S = 4.0
 """Time that one joint swings [s]."""
 SWING_RAMP_S = 0.6
@@ -47,7 +47,7 @@ SWING_RAMP_S = 0.6
 SWING_AMPLITUDE = 1.0
 """Amplitude of a swing [rad or m]; smaller where its limits require it."""
 SWING_MARGIN = 0.95
-"""Share of the way to a limit that is used."""
+"""Usable share of the distance to a limit."""
 RAISED_DEG = {"jRightShoulder_rotx": -10.0, "jRightShoulder_roty": -60.0, "jRightElbow_rotz": 75.0}
 """Joints of a human model that raise the right hand."""
 RAISE_S = 2.0
@@ -55,15 +55,15 @@ RAISE_S = 2.0
 WAVE_JOINT, WAVE_AMPLITUDE, WAVE_PERIOD_S = "jRightElbow_rotz", math.radians(30.0), 1.5
 """Joint that waves, its motion to either side [rad], and the time of one wave [s]."""
 FINGERS_OPEN, FINGERS_CLOSED = 0.04, 0.0
-"""Position of a finger [m]; on the way to closed there is the box."""
+"""Position of a finger, open and closed [m]; the box stops it before it is closed."""
 GRASP_HEIGHT, CARRY_HEIGHT = 0.025, 0.2
-"""Height of the point between the fingertips [m] where a box is taken and put, and where it is carried."""
+"""Height of the point between the fingertips [m]: to grasp and release a box, and to carry it."""
 
 
 class FigureEight(StartParameters):
     """A lemniscate of Gerono in the x-y plane of its frame."""
 
-    start_on_init: bool = Field(True, description="Whether it moves from the start on.")
+    start_on_init: bool = Field(True, description="Whether it moves from the start.")
     hz: Hz = Field(50.0, description="Rate at which its frame is broadcast.")
     tf_ns: str = Field("", description="Prefix of the names of its frames, such as rpbi.")
     width: NonNegative = Field(0.4, description="From end to end, along y [m].")
@@ -71,7 +71,7 @@ class FigureEight(StartParameters):
     period_s: Seconds = Field(10.0, description="Time of one round [s].")
 
     def position(self, time_s: float) -> Vector:
-        """Returns where it is at a time [s], in its x-y plane [m]."""
+        """Returns its position at a time [s], in its x-y plane [m]."""
         angle = 2.0 * math.pi * time_s / self.period_s
         return self.height * math.sin(angle) * math.cos(angle), self.width / 2.0 * math.sin(angle), 0.0
 
@@ -81,7 +81,7 @@ class FigureEight(StartParameters):
 
 
 def hand_position(time_s: float, side: float, distance: float = 2.0 * CIRCLE_CENTRE[1]) -> Vector:
-    """Returns where the left (`side` 1) or right hand (-1) is to be [m] at a time since the start [s].
+    """Returns the target position of the left (`side` 1) or right hand (-1) [m] at a time since the start [s].
 
     Args:
         distance: Distance between the centres of both circles [m].
@@ -92,7 +92,7 @@ def hand_position(time_s: float, side: float, distance: float = 2.0 * CIRCLE_CEN
 
 
 def wiped(time_s: float) -> float:
-    """Returns how far a wiping hand is from the middle of its line [m] at a time since the start [s]."""
+    """Returns the distance of a wiping hand from the middle of its line [m] at a time since the start [s]."""
     return WIPED_M / 2.0 * math.sin(2.0 * math.pi * time_s / WIPING_PERIOD_S)
 
 
@@ -103,7 +103,7 @@ def camera_pose(time_s: float) -> tuple[Vector, Array]:
     """
     angle = ORBIT_SPEED * time_s
     position = ORBIT_RADIUS * math.cos(angle), ORBIT_RADIUS * math.sin(angle), ORBIT_HEIGHT
-    yaw = angle + math.pi / 2.0  # to the camera's right is where the circle goes, seen from its centre backwards
+    yaw = angle + math.pi / 2.0  # the camera's right is its direction of motion along the circle
     tilt = -math.pi / 2.0 - math.atan2(ORBIT_HEIGHT - TARGET_HEIGHT, ORBIT_RADIUS)
     # first about x by `tilt`, so that z points forward and down, then about the vertical by `yaw`
     return position, quat_of((tilt, 0.0, yaw))
@@ -121,7 +121,7 @@ SQUARE = tuple(
     PlanarPose(0.8 * x, 0.8 * y, math.pi / 2.0 * turns)
     for x, y, turns in ((-1, -1, 0), (1, -1, 0), (1, 1, 1), (-1, 1, 1), (-1, 1, 2), (-1, -1, 3))
 )
-"""Ahead along the first side, turning along the second, sideways along the third, turning along the last again."""
+"""Forwards along the first side, turning along the second, sideways along the third, turning along the last."""
 
 
 class Route:
@@ -143,7 +143,7 @@ class Route:
 
 
 def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
-    """Returns the way [m] and the shorter turn [rad] from a pose to another."""
+    """Returns the distance [m] and the shorter turn [rad] from one pose to another."""
     return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
 
 
@@ -166,7 +166,7 @@ class GraspStep(NamedTuple):
 
 
 def pick_and_place(box: PlanarPose, goal: PlanarPose) -> tuple[GraspStep, ...]:
-    """Returns the steps that bring a box to a place, each of which moves either the hand or the fingers.
+    """Returns the steps that carry a box to a place; each step moves either the hand or the fingers.
 
     Args:
         box: Position of its centre; its orientation by multiples of 90 deg does not matter.
@@ -189,10 +189,10 @@ class Swing:
     """Positions of all joints over time.
 
     Args:
-        start: Where the n joints are at time 0 [rad or m].
+        start: Positions of the n joints at time 0 [rad or m].
         lower: Their lower limits; -inf where there is none.
         upper: Their upper limits.
-        middle: Centres of the swings; 0 if left out, as near as limits allow.
+        middle: Centres of the swings, clipped to the limits; 0 if left out.
         amplitude: Motion to either side [rad or m]; less where limits require it.
     """
 
@@ -230,7 +230,7 @@ class Wave:
 
     Args:
         names: Names of the n joints.
-        start: Where they are at time 0 [rad].
+        start: Their positions at time 0 [rad].
     """
 
     def __init__(self, names: Sequence[str], start: Sequence[float]) -> None:

@@ -36,8 +36,8 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
 )
 """Heading, table and page of each kind of plug-in."""
 HEAD = """\
-The names below are valid as a `type` in YAML, or as a parameter of a node. Wherever one of them is valid, the class of
-a package of your own is valid too, as `my_package.my_module:MyClass`; see [extending.md](extending.md)."""
+The names below are valid as a `type` in YAML, or as a parameter of a node. A class of your own package is valid in the
+same places, as `my_package.my_module:MyClass`; see [extending.md](extending.md)."""
 
 
 def plugins_page() -> str:

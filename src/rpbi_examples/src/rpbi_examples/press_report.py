@@ -1,4 +1,4 @@
-"""One press and release of an arm on a box: its figure, its table, and whether the force is what it should be."""
+"""One press and release of an arm on a box: its figure, its table, and the error of its force."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 TOUCHED_M = 0.001
-"""From this depth on the tool counts as touching [m]."""
+"""Least depth at which the tool counts as touching [m]."""
 RELEASED_S = 0.5
 """Time without contact after which a press is over [s]."""
 MIN_PRESS_S = 0.3
 """Presses that are shorter are not judged [s]."""
 MAX_GAP_S = 0.05
-"""Without a sample for longer, the simulator stood still, and that time of a press does not count [s]."""
+"""Longest time between samples [s]; a longer gap means that the simulator was paused, and does not count."""
 MIN_SHARE = 0.5
-"""A press is not judged if less of its time counts."""
+"""Least share of the time of a press that has to count."""
 
 
 class PressSample(NamedTuple):
@@ -43,10 +43,10 @@ class PressSample(NamedTuple):
 
 
 class PressReport(NamedTuple):
-    """Result of a whole press, from the first touch to the last.
+    """Result of a whole press, from first to last contact.
 
-    Means are over time. Those of force and stiffness times depth are the same for any motion: what damping and inertia
-    of box and arm add while it goes in is taken back while it comes out.
+    Means are over time. The mean force equals the mean of stiffness times depth for any motion: the effects of damping
+    and inertia while pressing and releasing cancel out.
 
     Attributes:
         duration_s: Time in which the tool touched [s].
@@ -55,7 +55,7 @@ class PressReport(NamedTuple):
         predicted_n: Stiffness times mean depth [N].
         scatter_n: Force on the tool less stiffness times depth, as root of the mean square [N].
         felt_n: Mean force on the handle [N].
-        expected_n: The same by force on the tool and scale [N].
+        expected_n: Force on the tool times the scale [N].
         peak_n: Largest force on the handle [N].
     """
 
@@ -70,7 +70,7 @@ class PressReport(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Error of the mean force on the tool, as a share of the force that stiffness and depth predict."""
+        """Error of the mean force on the tool, as a share of the force predicted from stiffness and depth."""
         return abs(self.measured_n - self.predicted_n) / self.predicted_n
 
     @property
@@ -88,7 +88,7 @@ class PressReport(NamedTuple):
 
 
 class Press:
-    """Collects what happens until the tool has been pressed and released.
+    """Collects samples until the tool has been pressed and released.
 
     Args:
         stiffness: Stiffness of the box [N/m].
@@ -114,7 +114,7 @@ class Press:
         return self._has_touched and self.samples[-1].time_s - self._released_s > RELEASED_S
 
     def report(self) -> PressReport | None:
-        """Returns how it went; None if the tool was pressed for less than 0.3 s, or the simulator stood still."""
+        """Returns the result; None if the press was shorter than 0.3 s, or the simulator was paused."""
         times_s, depths_m, measured_n, felt_n = np.array(
             [(each.time_s, self._depth_m(each), each.measured_n, each.felt_n) for each in self.samples]
         ).T
@@ -179,7 +179,7 @@ class Press:
 
     def write_figure(self, path: Path) -> None:
         """Writes the figure as PNG."""
-        from matplotlib.figure import Figure  # importing it lasts half a second, for which no other caller has to wait
+        from matplotlib.figure import Figure  # importing it takes half a second; other callers need not wait for it
 
         figure = Figure(figsize=(7.0, 5.0), dpi=120, layout="tight")
         self.draw(figure)

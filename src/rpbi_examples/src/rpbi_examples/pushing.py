@@ -24,7 +24,7 @@ PLACES = ((-0.6, 0.2), (-0.6, -0.2))
 HALF_SIDES_M = (0.10, 0.08)
 """Half of the box's sides along its own x and y [m]."""
 NEAR_M = 0.05
-"""Least improvement by one more push for which a box is still pushed [m]."""
+"""Least improvement that justifies one more push [m]."""
 CLEARANCE_M = 0.04
 """Distance of the ball from the box before and after a push [m]."""
 GAP_M = 0.001
@@ -34,7 +34,7 @@ PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
 PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
 """Mean speed of the ball [m/s]."""
 JOINT_SPEED = 0.8
-"""Mean speed of the joint that has farthest to go [rad/s], on the way from any posture."""
+"""Mean speed of the joint with the largest motion [rad/s], on the way from an arbitrary posture."""
 MIN_DURATION_S = 0.5
 """Least time for a straight line [s]."""
 SPACING_M = 0.02
@@ -59,7 +59,7 @@ class Push(NamedTuple):
     end: tuple[float, float]
 
     def beside(self, way_m: float) -> tuple[float, float]:
-        """Returns the point so far before the start, or from the start on if it is negative [m]."""
+        """Returns the point at a distance before the start; a negative distance is along the push [m]."""
         length = math.dist(self.start, self.end)
         x, y = ((begin - end) / length * way_m for begin, end in zip(self.start, self.end))
         return self.start[0] + x, self.start[1] + y
@@ -125,7 +125,7 @@ class Pusher:
         """Returns the moves from some joint positions [rad]: up, over, down, to the box, the push, back and up.
 
         Raises:
-            ValueError: If something on the way is out of reach.
+            ValueError: If a point of the path is out of reach.
         """
         here = self._solver.chain.pose(positions).position
         before, after = push.beside(CLEARANCE_M), push.beside(CLEARANCE_M - math.dist(push.start, push.end))

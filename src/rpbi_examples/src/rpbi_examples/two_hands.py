@@ -14,13 +14,13 @@ from .motions import CIRCLE_CENTRE, POINTING_DOWN, hand_position
 
 LINK = "lbr_iiwa_link_7"
 APPROACH_S = 3.0
-"""Time for the way to the circles [s]."""
+"""Time of the motion to the circles [s]."""
 RAMP_S = 1.0
-"""Time in which the hands reach their speed there [s]."""
+"""Time in which the hands reach their speed on the circles [s]."""
 
 
 class MirroredHands:
-    """Joint positions with which the hands of two arms draw mirrored circles, from where the arms are at first.
+    """Joint positions with which the hands of two arms draw mirrored circles, beginning at the present positions.
 
     Args:
         urdf: File with both arms, whose links and joints begin with the name of the arm.
@@ -51,7 +51,7 @@ class MirroredHands:
         """Returns the n positions at a time since the start [s].
 
         Raises:
-            InterfaceError: If a hand is to be where it cannot be.
+            InterfaceError: If a target of a hand is out of reach.
         """
         if time_s < APPROACH_S:
             return self._approach.sample(time_s).position
@@ -59,7 +59,7 @@ class MirroredHands:
         return self._on_circles(time_s - RAMP_S / 2.0 if time_s > RAMP_S else time_s**2 / (2.0 * RAMP_S))
 
     def _on_circles(self, time_s: float) -> tuple[float, ...]:
-        """Returns the n positions on the circles; near the same posture, so that each round is like the one before."""
+        """Returns the n positions on the circles; near the same posture, so that all rounds are equal."""
         positions = dict(self._posture)
         for side, solver in self._solvers.items():
             position = hand_position(time_s, side, self._distance)

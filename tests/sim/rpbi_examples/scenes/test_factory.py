@@ -8,7 +8,7 @@ from robot_model.geometry import Pose
 from rpbi_examples.scenes import factory
 from rpbi_examples.scenes.cell.line import PARTS, grasp_yaw, is_in_box, on_belt
 from rpbi_examples.scenes.cell.two_arms import DOWN, TwoArms
-from rpbi_examples.scenes.scene import Put, Seen, run_scene
+from rpbi_examples.scenes.scene import InputValue, Seen, run_scene
 from rpbi_examples.scenes.task import EnvStage, make_env
 
 LEFT_OUT, RIGHT_OUT = Pose((0.3, 0.25, 1.04), DOWN), Pose((0.3, -0.25, 1.04), DOWN)
@@ -43,10 +43,10 @@ class Stand:
 
     def __init__(self, joints):
         self.seen = Seen(joints={"nextage": joints})
-        self.deeds = []
+        self.changes = []
 
     def put(self, slot, value):
-        self.deeds.append(Put(slot, value))
+        self.changes.append(InputValue(slot, value))
 
 
 @pytest.mark.parametrize("least_m, is_sent", [(0.05, False), (-1.0, True)])
@@ -60,9 +60,9 @@ def test_arm_waits_instead_of_approaching_the_other_too_closely(env, least_m, is
     arms = TwoArms(scene, "nextage", factory.URDF, "CHEST_JOINT0_Link", links, factory.CHEST, fingers, least_m)
     assert arms.send("left", LEFT_OUT) and arms.send("right", RIGHT_OUT)
     assert arms.send("left", Pose((0.45, 0.04, 1.0), DOWN))
-    sent = len(scene.deeds)
+    sent = len(scene.changes)
     assert arms.send("right", Pose((0.45, -0.04, 1.0), DOWN)) is is_sent
-    assert (len(scene.deeds) > sent) is is_sent
+    assert (len(scene.changes) > sent) is is_sent
     assert arms.send("right", RIGHT_OUT), "the way out is always free"
 
 

@@ -152,8 +152,8 @@ def test_failing_world_gives_a_failed_row_and_is_replaced(tmp_path, monkeypatch,
 def test_a_deed_that_the_world_refuses_is_named(env):
     env.reset(seed=5)
     env.task.scene.put("kuka_lwr/target", {"lwr_arm_0_joint": math.nan})
-    with pytest.raises(InterfaceError, match="^Put kuka_lwr/target: .*finite"):
-        do(env.world, *env.task.scene.take_deeds())
+    with pytest.raises(InterfaceError, match="^InputValue kuka_lwr/target: .*finite"):
+        do(env.world, *env.task.scene.take_changes())
 
 
 def test_a_good_score_leaves_no_pictures_of_failures(tmp_path):

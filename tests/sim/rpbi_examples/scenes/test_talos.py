@@ -58,8 +58,8 @@ def test_success_is_judged_over_the_whole_episode(noise, monkeypatch):
     act = scene.act()
     for _ in range(60):
         next(act)
-        for deed in scene.take_deeds():
-            stage.do(deed)
+        for change in scene.take_changes():
+            stage.do(change)
         stage.cycle()
     monkeypatch.setattr(scene, "_has_stayed", True)
     assert scene.has_succeeded(), "it stands"

@@ -22,9 +22,11 @@ from .tasks import AccelerationTask, Approach, Gain, capture, pull, spring
 
 LINEAR, ANGULAR, UP = slice(0, 3), slice(3, 6), slice(2, 3)
 CAPTURE_WEIGHT = 100.0
-"""Weight of the capture point, the largest of all: a robot that falls reaches nothing."""
+"""Weight of the capture point; the largest, since balance matters most."""
 HEIGHT, UPRIGHT, POSTURE = Gain(50.0, 20.0), Gain(60.0, 5.0), Gain(30.0, 0.02)
-"""Gains of the centre of mass's height, the torso and the posture, whose weight is low: it serves the others."""
+"""Gains of the centre of mass's height, the torso and the posture. The posture has a low weight: it only resolves
+redundancy.
+"""
 HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
 """Weights of the hand's position and orientation."""
 
@@ -35,26 +37,22 @@ class BalanceConfig(ControllerConfig):
     urdf_filename: ExistingFile = Field(description="The robot's URDF; `{package}/path` is resolved.")
     hand: Text = Field(description="The link that reaches.")
     point: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
-        (0.0, 0.0, 0.0), description="The point of it that comes to the target, in its frame."
+        (0.0, 0.0, 0.0), description="The point of this link that is moved to the target, in the link's frame."
     )
     torso: Text = Field(description="The link that stays upright.")
     soles: ListOf[Text] = Field(
         min_length=1, description="Links whose frames are in the middle of the soles: x forward, z up."
     )
-    half_length: Annotated[NonNegative, Unit("m")] = Field(
-        0.09, description="Half of the length of a sole that is used."
-    )
-    half_width: Annotated[NonNegative, Unit("m")] = Field(
-        0.055, description="Half of the width of a sole that is used."
-    )
-    friction: NonNegative = Field(0.5, description="Coefficient of friction that is relied on.")
-    period_ticks: int = Field(2, ge=1, description="Ticks from one solution to the next; efforts stay in between.")
-    capture_gain: NonNegative = Field(3.0, description="How far the centre of pressure goes beyond the capture point.")
+    half_length: Annotated[NonNegative, Unit("m")] = Field(0.09, description="Half of the usable length of a sole.")
+    half_width: Annotated[NonNegative, Unit("m")] = Field(0.055, description="Half of the usable width of a sole.")
+    friction: NonNegative = Field(0.5, description="Assumed coefficient of friction.")
+    period_ticks: int = Field(2, ge=1, description="Ticks between two solutions; efforts are constant in between.")
+    capture_gain: NonNegative = Field(3.0, description="Lead of the centre of pressure over the capture point's error.")
     hand_stiffness: Annotated[NonNegative, Unit("1/s^2")] = Field(150.0, description="Stiffness of the hand, by mass.")
     noise_seed: Annotated[int, Field(ge=0)] | None = optional(
-        "Seed of noise and delay with which the pose of the base is measured; without it, the true one is used."
+        "Seed of the noise of the measured base pose, which is also delayed. Default: the true pose."
     )
-    hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's way.")
+    hand_speed: Annotated[NonNegative, Unit("m/s")] = Field(0.5, description="Largest speed of the hand's motion.")
 
 
 class Balance(Controller):
@@ -81,7 +79,7 @@ class Balance(Controller):
         return check_pose(value.pose if isinstance(value, PoseTarget) else value)
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Stands as it is measured."""
+        """Starts from the measured posture."""
         seed, period_s = self.config.noise_seed, self.config.period_ticks * self.arm.dt_s
         self._estimate = None if seed is None else BaseEstimate(state.base, period_s, seed)
         self._robot.update(state)
@@ -148,7 +146,7 @@ class Balance(Controller):
 
 
 def _yaw_only(rotation: Array) -> Array:
-    """Returns the upright orientation that faces where another one does."""
+    """Returns the upright orientation with the same yaw."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))

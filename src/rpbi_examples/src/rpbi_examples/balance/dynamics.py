@@ -52,8 +52,7 @@ class FloatingRobot:
         upper: Greatest ones.
         centre: The centre of mass in the world, shape (3,) [m].
 
-    Raises:
-        ValueError: If there are other joints than these.
+    Raises: ValueError: If the URDF has other joints.
     """
 
     def __init__(self, urdf_filename: str, joints: Sequence[str]) -> None:
@@ -107,7 +106,7 @@ class FloatingRobot:
         self.bias = pin.nonLinearEffects(model, data, q, v) + model.damping * v
         pin.computeJointJacobians(model, data, q)
         self._jacobian_of_centre = pin.jacobianCenterOfMass(model, data, q)
-        pin.centerOfMass(model, data, q, v, self._still)  # leaves the drift of all frames behind
+        pin.centerOfMass(model, data, q, v, self._still)  # also computes the drift of all frames
         pin.updateFramePlacements(model, data)
         self.centre = data.com[0].copy()
 

@@ -1,4 +1,4 @@
-"""Finds the largest push after which Talos stands, by direction: `python -m rpbi_examples.balance.largest_push`.
+"""Finds the largest push that Talos withstands in each direction: `python -m rpbi_examples.balance.largest_push`.
 
 The scene `talos` decides: both feet are where they were, the torso is upright, and the hand is back and stays.
 """
@@ -19,9 +19,9 @@ from rpbi_examples.scenes.talos import IMPULSE, Talos
 from rpbi_examples.scenes.task import EnvStage, SceneTask, make_env
 
 DIRECTIONS = ("forward", "forward left", "left", "back left", "back", "back right", "right", "forward right")
-"""Where pushes go to, each 45 degrees farther to the left."""
+"""Directions of pushes, in steps of 45 degrees to the left."""
 MOST, STEP = 80.0, 2.5
-"""Largest impulse that is tried, and how exactly the largest one is found [N s]."""
+"""Upper bound of the impulses, and resolution of the result [N s]."""
 
 
 def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
@@ -29,8 +29,8 @@ def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
 
     Args:
         env: Environment of the scene.
-        seed: Seed of everything but the push.
-        angle: Where the push goes to, from where the robot faces, to its left [rad].
+        seed: Seed of the episode, except for the push.
+        angle: Direction of the push, from the robot's forward direction to its left [rad].
         impulse: Impulse of the push [N s].
     """
     assert isinstance(env.task, SceneTask)
@@ -43,7 +43,7 @@ def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
 
 
 def largest_push(env: WorldEnv, seed: int, angle: float) -> float:
-    """Returns the largest impulse after which it stands [N s], to `STEP`, by bisection; see `stands`."""
+    """Returns the largest impulse that the robot withstands [N s], by bisection to `STEP`; see `stands`."""
     good, bad = 0, round(MOST / STEP)
     while bad - good > 1:
         middle = (good + bad) // 2

@@ -20,21 +20,21 @@ except ImportError as error:
 
 UNBOUNDED = 1e30
 EQUAL, SOFT = 5, 8
-"""Marks of daqp: of an equation, and of a bound that gives way where there is no other solution."""
+"""Flags of daqp: an equality, and a soft bound, which may be violated if there is no other solution."""
 LIMIT_RATE = 15.0
 """Rate at which a joint may approach its limit [1/s]."""
 WRENCH_COST = np.array((1e-5, 1e-5, 1e-6, 1e-3, 1e-3, 1e-3))
 """Costs of the squares of contact forces [1/N^2] and torques [1/(N m)^2]: small, so that both feet share the load."""
 FOOT_DAMPING = 20.0
-"""Rate at which a foot that moves comes to rest [1/s]."""
+"""Rate at which a moving foot is brought to rest [1/s]."""
 
 
 class WholeBodyProgram:
     """Finds accelerations a of base and joints and wrenches w of the feet.
 
-    It minimises the weighted squares of what tasks lack, so that M a + b = S' t + J' w with efforts t of the joints
+    It minimises the weighted squared errors of the tasks, subject to M a + b = S' t + J' w with efforts t of the joints
     within their limits, feet that do not move, J a = -J' v, and wrenches that soles can take, C w <= 0. The efforts
-    follow from a and w, and are no unknowns. Every call starts anew, so that it depends on nothing but its arguments.
+    follow from a and w, and are no unknowns. There is no warm start: a solution depends on the arguments only.
 
     Args:
         robot: The robot.
@@ -88,7 +88,7 @@ class WholeBodyProgram:
         return efforts
 
     def _within_limits(self) -> tuple[Array, Array]:
-        """Returns bounds of the joints' accelerations: those of critically damped springs that pull to their limits."""
+        """Returns bounds of the joints' accelerations: those of critically damped springs at the position limits."""
         robot = self._robot
         damping = 2.0 * LIMIT_RATE * robot.velocities[FREE:]
         least, most = (LIMIT_RATE**2 * (limit - robot.positions) - damping for limit in (robot.lower, robot.upper))

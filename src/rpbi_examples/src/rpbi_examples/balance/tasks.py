@@ -1,4 +1,4 @@
-"""Tasks of a whole-body controller: accelerations that are wanted of parts of the robot, and the way of a hand."""
+"""Tasks of a whole-body controller: desired accelerations of parts of the robot, and the motion of a hand."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .dynamics import FrameMotion, rotation_of, turn_between, turned
 GRAVITY = 9.81
 """[m/s^2]."""
 RATE = 6.0
-"""Rate at which the rest of a way is covered [1/s]."""
+"""Rate at which the remaining distance is reduced [1/s]."""
 TURN_SPEED = 1.5
 """Largest rotational speed [rad/s]."""
 LEASH_M, LEASH_RAD = 0.05, 0.3
-"""Largest lead of the target of the hand, in position and orientation."""
+"""Largest lead of the moving target over the hand, in position and orientation."""
 
 
 class AccelerationTask(NamedTuple):
-    """An acceleration that is wanted: `jacobian @ a = wanted`, as far as more important ones let it.
+    """A desired acceleration: `jacobian @ a = wanted`, as nearly as tasks with larger weights permit.
 
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
@@ -53,7 +53,7 @@ def spring(motion: FrameMotion, rows: slice, error: Array, gain: Gain, feed: Arr
     Args:
         motion: The motion.
         rows: The part of it.
-        error: Way to the goal [m or rad].
+        error: Difference from the motion to the goal [m or rad].
         gain: Of the spring.
         feed: Velocity of the goal [m/s or rad/s].
     """
@@ -62,7 +62,7 @@ def spring(motion: FrameMotion, rows: slice, error: Array, gain: Gain, feed: Arr
 
 
 def pull(error: Array, velocity: Array, gain: Gain) -> Array:
-    """Returns the acceleration of a critically damped spring by the way to its goal, and the velocity that it lacks."""
+    """Returns the acceleration of a critically damped spring from the errors of position and velocity."""
     acceleration: Array = gain.stiffness * error + 2.0 * np.sqrt(gain.stiffness) * velocity
     return acceleration
 
@@ -79,9 +79,9 @@ def capture(
     Args:
         motion: How the centre of mass moves.
         centre: Where it is, shape (3,) [m].
-        goal: Where it is to be above, shape (2,) [m].
+        goal: Point on the floor below its desired position, shape (2,) [m].
         height: Its height over the floor [m].
-        gain: How far p goes beyond, over the error.
+        gain: Lead of p beyond the capture point, divided by the error.
         weight: See `AccelerationTask`.
     """
     w = np.sqrt(GRAVITY / height)
@@ -91,10 +91,10 @@ def capture(
 
 
 class Approach:
-    """A point and an orientation that come to their target without haste.
+    """A moving pose that approaches its target at limited speed.
 
-    A critically damped spring pulls the point, no harder than at the length that leads to the largest speed. Both wait
-    for the hand, so that a target out of reach does not pull the robot over.
+    A critically damped spring pulls the point; its force saturates at the length that leads to the largest speed. The
+    pose waits for the hand, so that a target out of reach does not make the robot fall.
 
     Args:
         position: Where it begins, shape (3,) [m].
@@ -114,7 +114,7 @@ class Approach:
         self._period_s, self._speed = period_s, speed
 
     def advance(self, target: Pose, position: Array, turn: Array) -> None:
-        """Comes nearer to a target by a period.
+        """Moves towards a target for one period.
 
         Args:
             target: The target in the world.

@@ -12,16 +12,16 @@ TARGET_HZ = 50
 SETTLING_S = 0.5
 """Time for which the cuff is held at the end of its path [s]."""
 MAX_LEAD_M = 0.02
-"""Largest distance of the cuff's next place from its present one [m]; it waits until the cuff is that near."""
+"""Largest distance of the cuff's target from the cuff [m]; the target waits until the cuff is within it."""
 MAX_TURN_RATE = 1.5
 """Largest angular speed of the cuff [rad/s]."""
 
 
 class Dressing:
-    """Leads the cuff along a person's arm, wherever that is at the moment.
+    """Moves the cuff along a person's arm and follows the arm's motion.
 
-    The nearer a force on the arm is to its limit the slower is the cuff; above the limit it goes back. It waits for a
-    hand that does not follow, so that the hand has never far to go when it can again.
+    The cuff slows down as a force on the arm approaches its limit, and moves back above it. It waits for a hand that
+    does not follow, so that the hand does not move far at once afterwards.
 
     Args:
         speed: Speed of the cuff without contact [m/s].
@@ -35,16 +35,16 @@ class Dressing:
 
     @property
     def has_begun(self) -> bool:
-        """Whether the cuff is led already."""
+        """Whether the motion of the cuff has begun."""
         return self._left_m is not None
 
     @property
     def is_done(self) -> bool:
-        """Whether the cuff is led no further, and has had time to get there."""
+        """Whether the cuff's path has ended and the cuff has had time to arrive."""
         return self._rested_s >= SETTLING_S
 
     def target(self, arm: ArmPosition, cuff: Array, force_share: float, dt: float) -> HandTarget:
-        """Returns where the robot's hand is to be.
+        """Returns the target of the robot's hand.
 
         Args:
             arm: Where the person's arm is.

@@ -10,7 +10,7 @@ from operator_node.avatar.segment_forces import LIMITS, REGIONS, SegmentForce
 
 ARM_SEGMENTS = tuple(REGIONS)
 MEAN_S = 0.1
-"""Contact forces of soft bodies are rough: their mean over this time counts [s]."""
+"""Contact forces of soft bodies are noisy: their mean over this time is used [s]."""
 
 
 def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Sequence[float]) -> dict[str, SegmentForce]:
@@ -46,7 +46,7 @@ class ArmForce:
     """Forces on the arm over the last tenth of a second, as shares of their limits.
 
     There are three: a single contact may reach the transient limit of its body region, the mean over a segment the
-    quasi-static one, and the mean over the whole arm a limit that is chosen for comfort.
+    quasi-static one, and the mean over the whole arm a limit chosen for comfort.
 
     Args:
         limit_n: Largest sum over the arm [N].

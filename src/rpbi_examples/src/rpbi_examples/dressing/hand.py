@@ -1,4 +1,4 @@
-"""The robot's hand that holds the cuff: where it is to be, where it is, and by which joint positions."""
+"""The robot's hand that holds the cuff: its target, its pose and its joint positions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROBOT, BASE_LINK, HAND_LINK = "franka_panda/panda.urdf", "panda_link0", "panda_g
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
 """Base of the robot in the world, as in `panda.yaml`."""
 MAX_TURN_RAD = 0.3
-"""Joints that would have to turn farther for the next target stay where they are."""
+"""Largest rotation of a joint to the next target; beyond it, the joints keep their positions."""
 
 
 class HandTarget(NamedTuple):
@@ -37,11 +37,11 @@ class HandTarget(NamedTuple):
 
 
 def holding(cuff: Array, ahead: Array) -> HandTarget:
-    """Returns where the hand is that holds the cuff at its right side, level.
+    """Returns the pose of a hand that holds the cuff at its right side, level.
 
     Args:
         cuff: Middle of the cuff (3) [m].
-        ahead: Where it is drawn to, as unit vector (3).
+        ahead: Direction in which it is drawn, as unit vector (3).
     """
     to_arm = np.cross((0.0, 0.0, 1.0), -ahead)
     to_arm /= np.linalg.norm(to_arm)
@@ -64,10 +64,10 @@ class HandSolver:
         self.joint_names = self._solver.joint_names
 
     def cuff(self, positions: Sequence[float]) -> Array:
-        """Returns where the middle of the cuff is in the world (3) [m].
+        """Returns the position of the middle of the cuff in the world (3) [m].
 
         Args:
-            positions: Where the joints are [rad].
+            positions: Positions of the joints [rad].
         """
         in_hand = Pose((0.0, 0.0, RADIUS_M))
         return np.array((ROBOT_BASE @ self._solver.chain.pose(positions) @ in_hand).position)
@@ -76,8 +76,8 @@ class HandSolver:
         """Returns positions of the joints [rad], or None if there are none nearby.
 
         Args:
-            target: Where the hand is to be.
-            positions: Where the joints are now [rad].
+            target: Target pose of the hand.
+            positions: Present positions of the joints [rad].
         """
         in_base = ROBOT_BASE.inverse() @ Pose(target.position, target.quat_xyzw)
         solution = self._solver.solve(IKProblem(in_base, start=dict(zip(self.joint_names, positions))))

@@ -12,9 +12,9 @@ from .force import ArmForce
 from .way import ArmPosition, Array
 
 AROUND, RINGS = 14, 12
-"""Corners of each ring of the sleeve, and rings."""
+"""Number of corners of each ring of the sleeve, and number of rings."""
 ENOUGH_M = 0.05
-"""Distance past the elbow that counts as past [m]."""
+"""Distance past the elbow from which the sleeve counts as on [m]."""
 
 
 class Outcome(NamedTuple):
@@ -63,14 +63,13 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 def rings_of(corners: ArrayLike) -> Array:
     """Returns the rings of the sleeve but the last (11 x 14 x 3) [m], from the corners of its triangles.
 
-    Raises:
-        ValueError: If it is another mesh, or a corner is not finite.
+    Raises: ValueError: If the number of triangles differs, or a corner is not finite.
     """
     triangles, expected = np.asarray(corners, dtype=float), 2 * AROUND * (RINGS - 1)
     if triangles.size != 9 * expected:
         raise ValueError(f"expected the {expected} triangles of the sleeve, got {triangles.size / 9:g}")
     if not np.isfinite(triangles).all():
-        raise ValueError("expected finite corners of the sleeve, got some that are not")
+        raise ValueError("expected finite corners of the sleeve, got non-finite ones")
     return triangles.reshape(-1, 3, 3)[::2, 0].reshape(RINGS - 1, AROUND, 3)
 
 

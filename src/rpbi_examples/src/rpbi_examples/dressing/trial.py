@@ -1,4 +1,4 @@
-"""The telepresence example without ROS: a person of chance holds out an arm and is dressed."""
+"""The telepresence example without ROS: a random person holds out an arm and is dressed."""
 
 from __future__ import annotations
 
@@ -53,11 +53,9 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
 
 
 class Trial:
-    """A person who holds out an arm in the example's world, and the controller that dresses them.
+    """A trial: a person holds out an arm in the example's world, and a controller dresses them.
 
-    Args:
-        world: The example's, or one with more in it.
-        person: Whose segments the avatar follows.
+    Args: world: World of the example, possibly with additions. person: Person whose segments the avatar follows.
         dressing: The controller.
         force_limit_n: Largest sum of forces on the arm [N].
 
@@ -93,11 +91,11 @@ class Trial:
 
     @property
     def is_over(self) -> bool:
-        """Whether the cuff is led no further, or it has taken too long."""
+        """Whether the motion of the cuff has ended, or timed out."""
         return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:
-        """Goes on by the time of one target."""
+        """Advances by the period of one target."""
         dt = 1.0 / TARGET_HZ
         pose = self._engagement.step(self._retargeting.pose(self._person.frame(self.time_s)), dt)
         self._world.put("human/pose", Pose(tuple(pose.position.tolist()), tuple(pose.quat_xyzw.tolist())))
@@ -119,7 +117,7 @@ class Trial:
         self._number += 1
 
     def outcome(self) -> Outcome:
-        """Returns what has become of it."""
+        """Returns the result."""
         return outcome(rings_of(self._corners), self._arm(), self.force)
 
     def _arm(self) -> ArmPosition:
@@ -131,13 +129,13 @@ class Trial:
 
 
 def _joint_positions(robot: Any) -> dict[str, float]:
-    """Returns the positions of the joints that move by name [rad or m]."""
+    """Returns the positions of movable joints by name [rad or m]."""
     return dict(zip((joint.name for joint in robot.model.moving), robot.joint_positions().values()))
 
 
 def main() -> int:
     """Runs the command; returns 1 if a person is not dressed."""
-    parser = argparse.ArgumentParser(description="Dresses people of chance, as fast as it goes and without ROS.")
+    parser = argparse.ArgumentParser(description="Dresses random people, as fast as possible and without ROS.")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
     parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")
     parser.add_argument("--speed", type=float, default=SPEED, help="of the sleeve [m/s]")

@@ -1,4 +1,4 @@
-"""The way of the cuff along a person's arm."""
+"""The path of the cuff along a person's arm."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CUFF = (0.86, -0.26, 1.43)
 AHEAD_AT_START = (-1.0, 0.0, 0.0)
 """Initial direction in which the cuff is drawn, as unit vector."""
 HAND_M, BEFORE_HAND_M = 0.19, 0.05
-"""Length of a hand, and how far before it the cuff is in line with the forearm [m]."""
+"""Length of a hand, and distance before the hand at which the cuff is in line with the forearm [m]."""
 PAST_ELBOW_M = 0.10
 """Distance past the elbow to which the cuff is drawn [m]."""
 BLEND_M = 0.05
@@ -35,13 +35,12 @@ class ArmPosition(NamedTuple):
 
 
 class Way:
-    """From where the cuff is at the start to before the hand, over the hand, along the forearm and past the elbow.
+    """Path of the cuff: from its start to before the hand, over the hand, along the forearm and past the elbow.
 
     Args:
         arm: Where the person's arm is.
 
-    Attributes:
-        length: Length of the way [m].
+    Attributes: length: Length of the path [m].
     """
 
     def __init__(self, arm: ArmPosition) -> None:
@@ -52,11 +51,13 @@ class Way:
         self.length = sum(math.dist(a, b) for a, b in pairwise(self._corners))
 
     def place(self, done: float) -> Array:
-        """Returns where the middle of the cuff is so far along the way (3) [m]."""
+        """Returns the middle of the cuff at a distance along the path (3) [m]."""
         return _along(self._corners, done)
 
     def ahead(self, done: float) -> Array:
-        """Returns where the cuff is drawn to there, as unit vector (3): along the forearm from the start."""
+        """Returns the direction of the cuff at a distance along the path, as unit vector (3): along the forearm from
+        the start.
+        """
         start = math.dist(*self._corners[:2])
         to = self.place(min(max(done, start) + BLEND_M, self.length))
         return _unit(to - self.place(max(done - BLEND_M, start)))
@@ -73,7 +74,7 @@ def _unit(vector: Array) -> Array:
 
 
 def _along(corners: Sequence[Array], distance: float) -> Array:
-    """Returns the point so far along a line with corners."""
+    """Returns the point at a distance along a polyline."""
     for a, b in pairwise(corners):
         length = math.dist(a, b)
         if distance <= length:

@@ -9,7 +9,7 @@ ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in TASKS}
 """Folder of each environment's files by its id."""
 
 SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0": name for name in SCENES}
-"""Scene of each environment that is one, by its id; see docs/examples.md."""
+"""Scenes that are also environments, by id of the environment; see docs/examples.md."""
 
 for _id, _folder in ENVIRONMENTS.items():
     register(_id, f"{FOLDER}/{_folder}/world.yaml", f"{FOLDER}/{_folder}/task.yaml")

@@ -20,7 +20,7 @@ class CrossEntropy:
         elite: Share of those drawn that count as the best.
         floor: Smallest standard deviation.
         random: Source of the parameters.
-        rate: Share of the way to the best that mean and deviation are moved.
+        rate: Step of mean and deviation towards those of the best, as a share of the difference.
     """
 
     def __init__(

@@ -28,7 +28,7 @@ UNIT_M = 0.1
 TESTS = 32
 """Number of test episodes, a multiple of the number of environments."""
 FIRST_TEST_SEED = 1_000_000
-"""Seeds of episodes from which nothing is learned."""
+"""Seeds of test episodes, which are not used to learn."""
 
 
 class Progress(NamedTuple):
@@ -48,7 +48,7 @@ class Progress(NamedTuple):
 
 
 def features(observations: dict[str, npt.NDArray[np.float32]]) -> Array:
-    """Returns the ways from the tool to the goals, shape (n, 3)."""
+    """Returns the vectors from the tool to the goals, shape (n, 3)."""
     return observations["way"].astype(np.float64) / UNIT_M
 
 
@@ -101,7 +101,7 @@ def draw(progress: list[Progress], file: Path) -> None:
     score.plot(actions, [each.score for each in progress], "o-", ms=3, color="tab:blue")
     score.set(ylabel="return", title=f"{ENVIRONMENT}: test episodes of the mean policy")
     success.plot(actions, [100 * each.success for each in progress], "o-", ms=3, color="tab:green")
-    success.set(xlabel="actions that were learned from [thousands]", ylabel="success [%]", ylim=(-3, 103))
+    success.set(xlabel="actions used to learn [thousands]", ylabel="success [%]", ylim=(-3, 103))
     for axes in (score, success):
         axes.grid(alpha=0.3)
     figure.savefig(file, dpi=110)

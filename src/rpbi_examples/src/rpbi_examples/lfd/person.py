@@ -1,4 +1,4 @@
-"""A person who pushes a box to a goal by four arrow keys, looking at box and tip."""
+"""A simulated person who pushes a box to a goal by four arrow keys and sees box and tip."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ HALF_SIDE_M, TIP_RADIUS_M = 0.1, 0.015
 CLEARANCE_M = 0.035
 """Distance of the tip from the box on the way around it [m]."""
 ALIGNED_M, PASSED_M = 0.003, 0.015
-"""Distance at which a leg ends: of the last one before a push, and of others [m]."""
+"""Distance from its end at which a leg is complete: for the last leg before a push, and for others [m]."""
 CLOSE_M, CLOSE_RAD = 0.02, math.radians(5.0)
 """Distance and angle of the box from its goal at which the person is content."""
 TURNED_RAD = math.radians(8.0)
-"""Turn of the box during a push at which the person stops, to push another point [rad]."""
+"""Rotation of the box during a push at which the person stops and pushes another point [rad]."""
 REACTION_S = 0.08
-"""Time from a look until the tip stops [s]."""
+"""Time from an observation until the tip stops [s]."""
 TURN_ARM_M2 = 0.006
 """Product of the distance of a push from the box's middle and of its length that turns the box by 1 rad [m2]."""
 MAX_ASIDE_M = 0.05
@@ -31,19 +31,19 @@ MAX_ASIDE_M = 0.05
 STILL_SPEED, STILL_S = 0.005, 0.2
 """Speed below which the tip stands still [m/s], and time for which it has to [s]."""
 HERE_M, MIN_PUSH_M = 0.02, 0.02
-"""Length by which a push from the side where the tip is counts for more, and the least one for a turn [m]."""
+"""Bonus length of a push from the present side of the tip, and least length of a push that turns the box [m]."""
 PUSHED_M, PRESS_SHARE = 0.006, 0.75
-"""Distance from the goal at which a push is over [m], and share of the way that is left for which a key is held."""
+"""Distance from the goal at which a push is over [m], and share of the remaining distance for which a key is held."""
 MAX_PUSHES, MAX_PRESSES = 10, 8
-"""Pushes after which the person gives up, and presses of a key for one leg of the way."""
+"""Number of pushes after which the person gives up, and number of key presses for one leg."""
 MAX_AIM_ERROR_M = 0.002
-"""Largest error of where the person pushes, to either side [m]."""
+"""Largest sideways error of the point at which the person pushes [m]."""
 LOST_M = 0.5
 """Distance of the box from its goal at which the person gives up [m]."""
 
 
 class Direction(Enum):
-    """The arrow keys, and where they move the tip: to the right, and away from the person."""
+    """The arrow keys, and the direction in which each moves the tip: right is x, away from the person is y."""
 
     RIGHT = (1, 0)
     UP = (0, 1)
@@ -57,7 +57,7 @@ class Direction(Enum):
 
     @property
     def sign(self) -> int:
-        """Whether the coordinate grows or shrinks."""
+        """Sign of the motion along the coordinate."""
         return sum(self.value)
 
     @classmethod
@@ -67,11 +67,11 @@ class Direction(Enum):
 
 
 ROUND = (Direction.RIGHT, Direction.UP, Direction.LEFT, Direction.DOWN)
-"""The sides of the box, in turn."""
+"""The sides of the box, in order around it."""
 
 
 class _Leg(NamedTuple):
-    """Part of the way around the box: one coordinate up to a value [m], this exactly."""
+    """Part of the path around the box: motion along one coordinate to a value [m]."""
 
     axis: int
     value: float
@@ -81,11 +81,11 @@ class _Leg(NamedTuple):
 class Person:
     """Decides which arrow key is held; places are in the person's frame, x to the right and y away.
 
-    A push is along x or y, from the middle of the side behind, or beside it so that the box turns back. The person
-    goes around the box along its sides, and looks again at box and tip when all stands still.
+    A push is along x or y. It begins at the middle of the rear side, or off the middle to turn the box back. The person
+    goes around the box along its sides, and observes box and tip again when both are at rest.
 
     Args:
-        goal: Where the box shall be.
+        goal: Goal pose of the box.
         speed: Speed of the tip while a key is held [m/s].
         random: Source of small errors of the aim.
     """
@@ -148,7 +148,7 @@ class Person:
         return push, time_s + max(PRESS_SHARE * way, PUSHED_M) / self._speed
 
     def _is_pushed(self, tip: Place, velocity: list[float], box: PlanarPose) -> bool:
-        """Returns whether the push is over: the box is where it shall be, turns too far, or was missed."""
+        """Returns whether the push is over: the box is at its goal, has turned too far, or was missed."""
         assert self._push is not None
         axis, sign = self._push.axis, self._push.sign
         left = sign * (self._goal[axis] - box[axis] - velocity[axis] * REACTION_S)
@@ -156,7 +156,7 @@ class Person:
         return is_past or left <= PUSHED_M or abs(box.yaw - self._goal.yaw) > self._max_turn_rad
 
     def _choose(self, tip: Place, box: PlanarPose) -> None:
-        """Chooses the next push, and the way to its start; is done if there is none."""
+        """Chooses the next push, and the path to its start; without a useful push, the person is done."""
         left = (self._goal.x - box.x, self._goal.y - box.y)
         turn = box.yaw - self._goal.yaw
         is_close = math.hypot(*left) < CLOSE_M and abs(turn) < CLOSE_RAD
@@ -181,7 +181,9 @@ class Person:
 
     @staticmethod
     def _way_to(push: Direction, aside: float, side: Direction, box: PlanarPose) -> list[_Leg]:
-        """Returns the way to where a push starts, `aside` of the middle to its left [m], from a side of the box."""
+        """Returns the path from a side of the box to the start of a push, which is `aside` to the left of the middle
+        [m].
+        """
         away = _half_width(box.yaw) + TIP_RADIUS_M + CLEARANCE_M
         begin, end = ROUND.index(side), (ROUND.index(push) + 2) % 4
         steps = (end - begin + 1) % 4 - 1  # -1, 0, 1 or 2 sides further round

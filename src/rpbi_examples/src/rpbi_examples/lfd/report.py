@@ -24,7 +24,7 @@ from .skill import PushPlan, ShownPush
 NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 """Distance and angle up to which the box counts as at its goal [m, rad]."""
 SHOWN_SHARE = 2.0 / 3.0
-"""Share of them up to which a demonstration counts as good, since an execution adds some millimetres and degrees."""
+"""Share of these limits within which a demonstration counts as good: an execution adds errors of its own."""
 TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
@@ -41,7 +41,7 @@ class BoxError(NamedTuple):
 
     @classmethod
     def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
-        """Returns those of a pose in the frame of the goal; a box that lies on its side is turned."""
+        """Returns the error of a pose in the frame of the goal; a box on its side has an angle, too."""
         return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
 
     @property
@@ -84,7 +84,7 @@ class Run(NamedTuple):
         return ShownPush(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
 
     def summary(self) -> dict[str, Any]:
-        """Returns what summary.json has of it."""
+        """Returns its entry in summary.json."""
         return {
             "episode": self.episode,
             "seconds": round(float(self.table.index[-1] - self.table.index[0]), 2),
@@ -108,7 +108,7 @@ def write_summary(path: Path, facts: dict[str, Any], shown: Sequence[Run], execu
 
 
 def write_tables(table: pd.DataFrame, path: Path) -> None:
-    """Writes a table twice, with the endings `.parquet` and `.csv`.
+    """Writes a table twice, as `.parquet` and as `.csv`.
 
     Raises:
         OSError: If one cannot be written.
@@ -137,7 +137,7 @@ def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[
 
 
 def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -> None:
-    """Draws the way from the operator's signal to the executed plan, step by step."""
+    """Draws the pipeline from the operator's signal to the executed plan, step by step."""
     assert executed.plan is not None
     plan, seconds = executed.plan, shown.table.index - shown.table.index[0]
     grid = figure.subplots(2, 3)
@@ -173,7 +173,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
 
 
 def _push_begins(shown: Run, plan: PushPlan) -> float:
-    """Returns the time of the demonstration at which the tip first was where the plan's push begins [s]."""
+    """Returns the first time at which the demonstrated tip was at the start of the plan's push [s]."""
     place, _ = plan.at(plan.push_s)
     tip = shown.table[["tip/x", "tip/y"]].to_numpy()
     return float((shown.table.index - shown.table.index[0])[int(np.argmin(np.linalg.norm(tip - place, axis=1)))])
@@ -214,7 +214,7 @@ def _outline(box: PlanarPose) -> Array:
 
 
 def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
-    """Draws an arrow between the middles of two neighbours, once the layout has placed them."""
+    """Draws an arrow between two neighbouring plots, once the layout has placed them."""
     one, other = begin.get_position(), end.get_position()
     x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
     if abs(one.y0 - other.y0) > 0.1:

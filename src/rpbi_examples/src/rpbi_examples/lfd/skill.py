@@ -1,4 +1,4 @@
-"""The skill that is learned: to get behind a box from anywhere, and to push it as was shown."""
+"""The learned skill: approach a box from any start, and push it as demonstrated."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from motion_primitives import Demonstration, MotionPlan, make_primitive
 
 NAMES = ("x", "y")
 MOVED_M = 0.002
-"""Distance from the first and the last place within which the tip counts as standing [m]."""
+"""Distance from the first and the last place within which the tip counts as at rest [m]."""
 GAP_M = 0.025
 """Distance of the tip from its first contact where the approach ends and the push begins [m]."""
 MIN_BASES, MAX_BASES, BASES_PER_S = 30, 1000, 20.0
-"""Number of basis functions of a primitive: limits, and for each second, since a push with its corners is long."""
+"""Number of basis functions of a primitive: lower and upper limit, and number per second of demonstration."""
 ALPHA_PER_S = 25.0
-"""Damping of a primitive for each second, so that it follows the demonstration as closely however long that is."""
+"""Damping of a primitive per second of demonstration, so that the accuracy does not depend on its duration."""
 
 
 class ShownPush(NamedTuple):
@@ -36,7 +36,7 @@ class ShownPush(NamedTuple):
     contact_s: float | None
 
     def moving(self) -> ShownPush:
-        """Returns it without the time before the tip moves and after it has moved."""
+        """Returns the demonstration without the rest before and after the motion."""
         off = [np.linalg.norm(self.places - self.places[index], axis=1) > MOVED_M for index in (0, -1)]
         if not off[0].any():
             raise InterfaceError("the tip has not moved: there is nothing to learn")
@@ -66,7 +66,7 @@ class PushPlan(NamedTuple):
         return float(self.times[-1])
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns place [m] and velocity [m/s] at a time [s]; after the end, it is there at rest."""
+        """Returns place [m] and velocity [m/s] at a time [s]; after the end, the last place at rest."""
         place, velocity = (
             np.array([np.interp(time_s, self.times, column) for column in rows.T])
             for rows in (self.places, self.velocities)
@@ -94,17 +94,17 @@ def learn_dmp(times: Array, places: Array) -> LearnedMotion:
 
 
 class PushSkill:
-    """Two primitives, of the demonstration before the tip reaches the box and from there on.
+    """Two primitives: one of the demonstration before the tip reaches the box, one of the rest.
 
-    A push only does the same again if it touches the box where it was shown. The approach therefore has any start, and
-    ends just before the demonstrated contact; the push begins there, whatever the start was.
+    A push has the same effect only if it touches the box at the demonstrated point. The approach therefore begins
+    anywhere and ends just before the demonstrated contact, where the push begins.
 
     Args:
         shown: The demonstration.
         learn: Learns each of the two.
 
     Raises:
-        InterfaceError: If the demonstration does not suffice.
+        InterfaceError: If the demonstration has no contact, or no approach.
     """
 
     def __init__(self, shown: ShownPush, learn: Learn = learn_dmp) -> None:

@@ -1,4 +1,4 @@
-"""Moves an arm that picks a box, carries it from place to place and puts it down, by topics and services only."""
+"""Moves an arm that picks up a box, carries it to another place and puts it down, by topics and services only."""
 
 import math
 from itertools import cycle
@@ -44,7 +44,7 @@ def _run() -> None:
 
 
 def _box(tf: TfInterface) -> PlanarPose:
-    """Returns where the box is, by TF."""
+    """Returns the pose of the box from TF."""
     position, quat = TfInterface.msg_to_pos_quat(tf.wait_for_tf_msg("rpbi/world", "rpbi/box"))
     return PlanarPose(position[0], position[1], 2.0 * math.atan2(quat[2], quat[3]))
 

@@ -1,4 +1,4 @@
-"""Starts arm and haptic device, shows what happens, and reports one press and release."""
+"""Starts arm and haptic device, shows forces and heights, and reports one press and release."""
 
 import contextlib
 import os
@@ -31,13 +31,13 @@ WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/tar
 SAMPLE_HZ = 100.0
 PLOT_S = 0.25
 MAX_BUFFERED = 1000
-"""Largest number of forces and poses that wait on a busy machine until all data of a moment have arrived."""
+"""Largest number of forces and poses that are kept until all data of the same time have arrived."""
 WINDOW_S = 20.0
 """Time span shown in the window [s]."""
 MAX_FAREWELL_S = 15.0
-"""Time-out of an interrupt by roslaunch [s]."""
+"""Time after which roslaunch kills a node that it has interrupted [s]."""
 LEFT_S = 2.0
-"""Time after the end of the scripted hand at which its press is over in any case [s]."""
+"""Time after the end of the scripted motion at which the press counts as over [s]."""
 MAX_ERROR = 0.05
 """Largest error of the mean force of a press, as a share of the force that stiffness and depth predict."""
 
@@ -63,7 +63,7 @@ class Watch:
         self._over = threading.Event()
         self._failure = ""
         self._tf = TfInterface()
-        # what it reads while it touches nothing is the weight of the tool
+        # without contact it measures the weight of the tool
         get_srv_handler(SENSOR, Empty)()
         self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
         rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)
@@ -122,7 +122,7 @@ class Watch:
             self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
-        """Adds the samples that are complete by now: on a busy machine some data arrive late."""
+        """Adds the samples that are now complete; on a busy machine some data arrive late."""
         buffer = self._tf.tf_buffer
         while self._measured and not self._over.is_set():
             stamp, measured_n = self._measured[0]
@@ -131,7 +131,7 @@ class Watch:
                     break
                 tool_z = buffer.lookup_transform(WORLD, TOOL, stamp).transform.translation.z
                 target_z = buffer.lookup_transform(WORLD, TARGET, rospy.Time(0)).transform.translation.z
-            except tf2_ros.TransformException:  # it is from before TF began
+            except tf2_ros.TransformException:  # older than the first TF message
                 self._measured.popleft()
                 continue
             self._measured.popleft()
@@ -176,19 +176,18 @@ class Watch:
 
 
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
-    """Returns the value that was the newest one at a time; 0 if there was none."""
+    """Returns the newest value at a time; 0 if there was none."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
 
 
 def interrupt_roslaunch() -> bool:
     """Interrupts the roslaunch that started this process, which then ends all of its nodes, without an error.
 
-    Returns:
-        Whether there is one.
+    Returns: Whether roslaunch started this process.
     """
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():
-        with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has gone
+        with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has ended
             roslaunch: Any = xmlrpc.client.ServerProxy(uri)
             if roslaunch.get_pid()[2] == parent:
                 os.kill(parent, signal.SIGINT)

@@ -51,7 +51,7 @@ def _run() -> None:
 
 
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
-    """Switches setup, solver and perhaps the target on, when the arm is where the target is."""
+    """Switches on setup, solver and, if requested, the target once the arm is at the target."""
     problem = IKProblem(has_target=True, target=_pose(target), start=_home())
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
     call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
@@ -62,7 +62,7 @@ def _track(robot: str, solver: str, target: np.ndarray) -> None:
 
 
 def _draw_a_round(robot: str, start: np.ndarray) -> None:
-    """Plans the way to the figure and once around it, and has the robot's trajectory controller follow."""
+    """Plans a trajectory to the figure and once around it, and sends it to the robot's trajectory controller."""
     figure = FigureEight()
     times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)
     problem = IKProblem(start=_home())

@@ -18,8 +18,8 @@ HZ = 50.0
 def wait_until_ready() -> None:
     """Waits for a message on the topic that `~ready` names, if it is given.
 
-    With a real robot, these are the commands of its driver. The guard accepts only a first target that is where the
-    robot stands, so the simulated arm has to stand there too until the guard runs.
+    With a real robot, these are the commands of its driver. The guard accepts a first target only at the robot's
+    position. The simulated arm must not move before the guard runs.
     """
     topic = str(rospy.get_param("~ready", ""))
     if topic:
@@ -28,13 +28,13 @@ def wait_until_ready() -> None:
 
 
 class JointTargets:
-    """Sends targets to all joints of a robot that move, as long as the world runs; see also `wait_until_ready`.
+    """Sends targets to all movable joints of a robot while the world runs; see also `wait_until_ready`.
 
     Targets of several robots go out together on `joint_states/target`, where names of joints begin with `NAME_`.
 
     Attributes:
         names: Names of the n joints in the targets.
-        positions: Where the joints were at the start, n [rad or m].
+        positions: Positions of the joints at the start, n [rad or m].
         limits: Lower and upper limit of each, infinite where there is none.
     """
 
@@ -59,7 +59,7 @@ class JointTargets:
         self._rate = rospy.Rate(HZ)
 
     def send(self, positions: Sequence[float]) -> None:
-        """Sends positions [rad or m] with a stamp later than the one before, and returns when the next ones are due.
+        """Sends positions [rad or m] with a later stamp than before, and returns when the next ones are due.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.
@@ -73,7 +73,7 @@ class JointTargets:
         self._sleep()
 
     def _sleep(self) -> None:
-        """Waits for the next period; unlike rospy's, it also ends with ROS where time is wall time."""
+        """Waits for the next period; unlike rospy's sleep, it also ends when ROS shuts down in wall time."""
         self._rate.sleep()
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException("ROS shuts down")

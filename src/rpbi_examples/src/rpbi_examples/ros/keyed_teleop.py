@@ -1,4 +1,5 @@
-"""`run_teleop.py` and `run_example.py`: programs that move the tip of an arm to a frame, and then have it follow.
+"""`run_teleop.py` and `run_example.py`: programs that move the tip of an arm to a frame, and then make it follow the
+frame.
 
 Names of topics, services, frames and parameters are those of the authors' release.
 """
@@ -24,9 +25,9 @@ START_S, APPROACH_S = 2.0, 5.0
 NEAR_M = 0.03
 """Largest distance of the tip from the origin when teleoperation is switched on [m]."""
 ITERATIONS, RESIDUAL = 1000, 1e-7
-"""Effort of the inverse kinematics: by default it stops before the orientation is reached."""
+"""Iterations and tolerance of the inverse kinematics: with the defaults it stops before the orientation is reached."""
 PYBULLET = "pybullet"
-"""Solver that has no node of its own: the simulator solves what is on the robot's topic `ik`."""
+"""Solver without a node of its own: the simulator solves the targets on the robot's topic `ik`."""
 
 
 def run_teleop() -> None:

@@ -26,7 +26,7 @@ def figure_eight() -> None:
 
 
 class _FigureEightNode:
-    """Broadcasts the frame; it stands where it is while the node is switched off.
+    """Broadcasts the frame, which stops while the node is switched off.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -64,11 +64,11 @@ def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, Arra
     try:
         while not rospy.is_shutdown():
             now = rospy.Time.now()
-            if now > last:  # TF warns about a repeated stamp
+            if now > last:  # TF warns of a repeated stamp
                 message = tf.pack_tf_msg(parent, child, *pose((now - start).to_sec()))
                 message.header.stamp = last = now
                 tf.tf_broadcaster.sendTransform(message)
             rate.sleep()
     except rospy.ROSException:
-        if not rospy.core.is_shutdown_requested():  # Ctrl-C, asleep or on the way to a topic that is closed already
+        if not rospy.core.is_shutdown_requested():  # Ctrl-C during a sleep, or while the topic closes
             raise

@@ -1,4 +1,4 @@
-"""Nodes that move the robots of the examples by topics and services of the simulator."""
+"""Nodes that move the robots of the examples, by topics and services of the simulator."""
 
 import math
 import sys
@@ -28,7 +28,7 @@ SETTLING_S = 0.5
 def basic_robot_example() -> None:
     """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other.
 
-    They swing by `~amplitude` (1 rad or m) about 0, or with `~about_start` about where they are at first.
+    They swing by `~amplitude` (1 rad or m) about 0, or with `~about_start` about their first positions.
     """
     run_node("basic_robot_example", _swing)
 
@@ -117,7 +117,7 @@ def _draw() -> None:
     reached: set[str] = set()
     for name in names:
         rospy.Subscriber(f"rpbi/{name}/joint_states/target", JointState, lambda _, name=name: reached.add(name))
-    while len(reached) < len(names):  # a guard takes only a first target that is where the arms are
+    while len(reached) < len(names):  # a guard accepts a first target only at the present positions
         arms.send(arms.positions)
     time_s = 0.0
     while True:
@@ -133,7 +133,7 @@ def _wipe() -> None:
             touched.set()
 
     contacts = rospy.Subscriber("rpbi/kuka_lwr/contacts", Contacts, look, queue_size=1)
-    while not touched.wait(0.1):  # wait_for_message in a loop may stay without a connection
+    while not touched.wait(0.1):  # repeated wait_for_message may never get a connection
         if rospy.is_shutdown():
             return
     contacts.unregister()

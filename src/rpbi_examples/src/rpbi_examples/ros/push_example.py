@@ -1,4 +1,4 @@
-"""Moves an arm that pushes a box to and fro; the position of the box is looked up in TF."""
+"""Moves an arm that pushes a box back and forth; the position of the box is looked up in TF."""
 
 import math
 from itertools import cycle
@@ -14,7 +14,7 @@ from .joint_targets import HZ, JointTargets
 
 ROBOT = "kuka_lwr"
 REST_S = 0.5
-"""Time for which the arm stands still at first, and between two looks for a box that is out of reach [s]."""
+"""Time for which the arm rests at first, and between two checks of a box that is out of reach [s]."""
 
 
 def main() -> None:

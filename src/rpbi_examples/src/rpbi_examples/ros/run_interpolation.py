@@ -1,4 +1,4 @@
-"""Sends an arm's tip through three coloured balls, reports how near it passes, and draws its motion."""
+"""Sends an arm's tip through three coloured balls, reports its distances from the balls, and draws its motion."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from custom_ros_tools.transforms import Array
 BASE, TIP, TARGET = "rpbi/kuka_lwr/lwr_arm_0_link", "rpbi/kuka_lwr/end_effector_ball", "interpol_target"
 HZ = 50.0
 DRAWN = 5
-"""Every so many samples of the target, one is drawn in RViz."""
+"""Number of samples of the target from one marker in RViz to the next."""
 AFTER_S = 1.0
 """Time for which the motion is drawn after its end [s]."""
 TF_PATIENCE_S = 60.0
 
 
 class Visit(NamedTuple):
-    """A ball that the tip visits: its colour, when [s], and where, in the frame of the arm's foot [m]."""
+    """A ball that the tip visits: its colour, the time [s], and its position in the frame of the arm's base [m]."""
 
     colour: str
     time_s: float
@@ -43,7 +43,7 @@ VISITS = (
 
 
 class RunInterpolation:
-    """Publishes waypoints from the tip's present pose through the balls, and watches."""
+    """Publishes waypoints from the tip's present pose through the balls, and measures the motion."""
 
     def __init__(self) -> None:
         self._tf = TfInterface()
@@ -56,7 +56,7 @@ class RunInterpolation:
         """Time since the start [s], and the positions of target and tip [m]."""
 
     def run(self) -> None:
-        """Plans, and watches until ROS shuts down.
+        """Plans, and measures the motion until ROS shuts down.
 
         Raises:
             InterfaceError: If TF has no tip, or the picture cannot be written.
@@ -98,7 +98,7 @@ class RunInterpolation:
         name = rospy.get_param("~plot", "")
         if not name or not self._rows:
             return
-        import matplotlib  # half a second that only a picture needs
+        import matplotlib  # importing it takes half a second, only needed for a picture
 
         matplotlib.use("Agg")
         from matplotlib import pyplot as plt

@@ -1,4 +1,4 @@
-"""Simulators that run on a ROS master already when a launch file is to be run."""
+"""Simulators that already run on the ROS master of a new launch."""
 
 import time
 from collections.abc import Iterable, Set
@@ -14,11 +14,11 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TIMEOUT_S, TimedTransport
 
 MAX_END_S = 60.0
-"""Longest time for the end of a simulator and its launch [s]; beyond it an error is reported."""
+"""Longest time that a simulator and its launch may need to end [s]; then an error is reported."""
 _CALLER = "/rpbi_launch"
 _PACKAGE = "ros_pybullet_interface"
 _LIST = "rpbi/list_objects"
-"""A service that every simulator has, and nobody else."""
+"""A service that every simulator has, and no other node."""
 _POLL_S = 0.1
 
 
@@ -34,7 +34,7 @@ class RunningNode(NamedTuple):
     uri: str
 
     def stop(self, master: str) -> None:
-        """Stops it, and waits until it has ended with the `roslaunch` on this machine that it belongs to, if any.
+        """Stops the node, and waits until it has ended, with its `roslaunch` if that runs on this machine.
 
         Args:
             master: Address of its ROS master, which may end with that `roslaunch`.
@@ -44,7 +44,7 @@ class RunningNode(NamedTuple):
         """
         launch = self._launch_process(master)
         end_s = time.monotonic() + MAX_END_S
-        with suppress(*MASTER_FAILURES):  # it may end before it has answered
+        with suppress(*MASTER_FAILURES):  # it may end before it answers
             _proxy(self.uri).shutdown(_CALLER, "replaced by another simulator")
         while _answers(self.uri) or (launch is not None and _is_running(launch)):
             if time.monotonic() > end_s:
@@ -63,7 +63,7 @@ class RunningNode(NamedTuple):
                 # named NAMESPACE/NAME-NUMBER
                 if any(f"/{process.rpartition('-')[0]}" == self.name for process, _ in active):
                     return int(_proxy(uri).get_pid()[2])
-            except MASTER_FAILURES:  # it was killed, and is registered still
+            except MASTER_FAILURES:  # it was killed, but is still registered
                 continue
         return None
 
@@ -96,7 +96,7 @@ def simulator_namespace(nodes: Set[str], master: str) -> str | None:
 
 
 def clocks(master: str) -> list[RunningNode]:
-    """Returns the nodes that publish the time by which nodes on a master live."""
+    """Returns the nodes that publish the clock of a master."""
     publishers, _, _ = _state(master)
     return _running({node for topic, nodes in publishers for node in nodes if topic == "/clock"}, master)
 
@@ -110,7 +110,7 @@ def _state(master: str) -> list[list[tuple[str, list[str]]]]:
 
 
 def _running(names: Iterable[str], master: str) -> list[RunningNode]:
-    """Returns those nodes that answer, by name."""
+    """Returns the nodes that answer, by name."""
     nodes = [RunningNode(name, _proxy(master).lookupNode(_CALLER, name)[2]) for name in sorted(names)]
     return [node for node in nodes if node.uri and _answers(node.uri)]
 

@@ -1,4 +1,4 @@
-"""An arm draws a sleeve over that of a person who is in the world by their avatar."""
+"""A robot draws a sleeve over the arm of a person, whose avatar is in the world."""
 
 import json
 import math
@@ -111,7 +111,7 @@ class TelepresenceNode:
         self._show(arm, force_n)
 
     def _arm(self) -> ArmPosition | None:
-        """Returns where the arm is, None if that is not known or too old."""
+        """Returns the position of the arm; None if it is unknown or too old."""
         places = []
         for name in JOINTS_OF_ARM:
             message = self._tf.get_tf_msg("rpbi/world", f"rpbi/human/{name}")
@@ -162,7 +162,7 @@ class TelepresenceNode:
         self._positions = tuple(positions)
 
     def _on_world_state(self, message: SimulationState) -> None:
-        """Slows the robot down with its world, which wall time does not show."""
+        """Slows the robot down when the world is slower than wall time."""
         self._world_pace = min(message.real_time_factor, 1.0)
 
     def _on_surface(self, message: Marker) -> None:

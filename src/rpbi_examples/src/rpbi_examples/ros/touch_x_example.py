@@ -33,7 +33,7 @@ PARAMETERS = {
     "energy_allowance_j": 0.05,
     "energy_refill_w": 0.05,
 }
-"""Private parameters, unless they are given."""
+"""Defaults of private parameters."""
 
 
 class TouchXExample(HapticNode):
@@ -67,7 +67,7 @@ class TouchXExample(HapticNode):
         corrected_n = measured_n - sum(self._samples_n) / SAMPLES
         self._reading.publish(Float64(corrected_n))
         force = WrenchStamped(header=message.header)
-        force.header.stamp = rospy.Time()  # its age is looked at here, by the wall clock
+        force.header.stamp = rospy.Time()  # its age is checked here, by the wall clock
         force.wrench.force.z = -corrected_n
         with self._lock:
             self._newest = force, time.monotonic()

@@ -22,9 +22,10 @@ CONFIG = "-d"
 
 
 def main() -> None:
-    """Becomes RViz, with the arguments of this program; its configuration gets the displays of the running world.
+    """Replaces itself by RViz, with the same arguments and a configuration that has the displays of the running world.
 
-    Without a simulator that is configured by a file, or if that is wrong, which the simulator reports, there are none.
+    There are no such displays without a simulator that was configured by a file, or if that file is wrong, which the
+    simulator reports.
     """
     arguments = sys.argv[1:]
     place = arguments.index(CONFIG) + 1
@@ -44,7 +45,7 @@ def main() -> None:
 
 def _world() -> LoadedWorld:
     """Returns the world that the simulator of this namespace is configured with."""
-    logging.getLogger("rpbi").setLevel(logging.ERROR)  # the simulator logs its warnings
+    logging.getLogger("rpbi").setLevel(logging.ERROR)  # warnings are logged by the simulator
     given = rospy.get_param("ros_pybullet_interface")
     file = given["config_file"]
     if not file.startswith(("{", "package://")):

@@ -1,4 +1,6 @@
-"""Scenes: tasks that robots do in a world, with a score. A new one is a class in a file of its own and a line here."""
+"""Scenes: tasks that robots carry out in a world, with a score. A new scene is a class in its own file and a line
+here.
+"""
 
 from __future__ import annotations
 

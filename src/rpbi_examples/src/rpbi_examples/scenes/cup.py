@@ -10,11 +10,11 @@ import numpy as np
 from robot_model.geometry import ZERO, Pose, Vector, minus, norm, rotated
 
 from .parts.arm import about_z
-from .parts.polar import PolarArm, Spot
+from .parts.polar import CylindricalPosition, PolarArm
 from .scene import Scene, SceneFailedError, Watched
 
 TABLE_M = 0.5
-"""Height of the table, on which the arm stands, too."""
+"""Height of the table, on which the arm is mounted."""
 SHELF_M = (0.12, 0.70)
 """Position of the shelf, as in configs/cup/shelf.yaml."""
 INNER_RADIUS_M, CUP_HEIGHT_M, BALL_RADIUS_M = 0.0315, 0.08, 0.013
@@ -22,15 +22,19 @@ BALLS = ("ball_1", "ball_2", "ball_3", "ball_4", "ball_5")
 FINGERS = ("1", "2")
 PALM = "j2s6s200_link_6"
 GRASP_M, NEAR_M = 0.05, 0.01
-"""Height of the grasp above the foot of the cup, and its distance from which the hand slowly goes on to touch it."""
+"""Height of the grasp above the bottom of the cup, and distance from which the hand approaches slowly."""
 BACK_M, FRONT_M, ABOVE_M = 0.13, 0.2, 0.05
-"""Ways of the hand to and from the cup, and of the cup onto the shelf; height of the first lift and above the shelf."""
+"""Distances of the hand to and from the cup, and of the cup onto the shelf; height of the first lift and above the
+shelf.
+"""
 SPEED, SLOW_SPEED, TURN_SPEED = 0.09, 0.03, 0.28
 """Mean speeds of the hand [m/s] and of its turn about the base [rad/s]."""
 OPEN, CLOSED = (0.4, 0.2), (1.4, 1.4)
-"""Targets of a finger and its tip [rad]; those of a closed hand are inside the cup, which full effort then presses."""
+"""Targets of a finger and its tip [rad]; those of a closed hand are inside the cup, so that it is pressed with full
+effort.
+"""
 MAX_OFF_M, MAX_TILT_DEG, AT_REST_M = 0.02, 5.0, 0.0002
-"""Largest distance from its goal and tilt of a cup that stands there; largest motion in a cycle of one at rest."""
+"""Limits for a cup on the shelf: distance from its goal, tilt, and motion in a cycle while at rest."""
 Bend = tuple[float, float]
 
 
@@ -48,21 +52,21 @@ class Cup(Scene):
         self._largest_tilt_deg, self._moved_m, self._last = 0.0, math.inf, ZERO
 
     def prepare(self) -> None:
-        """Puts a cup of some friction on the table, the balls into it, and the shelf at some height."""
+        """Puts a cup of random friction on the table, the balls into it, and the shelf at a random height."""
         radius, azimuth, yaw = self.random.uniform((0.58, -0.6, -math.pi), (0.7, 0.2, math.pi)).tolist()
-        cup = Pose(Spot(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
+        cup = Pose(CylindricalPosition(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
         self.place("cup", cup)
         self.change("cup", lateralFriction=float(self.random.uniform(0.4, 1.0)))
         for number, ball in enumerate(BALLS):
             out, angle = self.random.uniform((0.0, -math.pi), (INNER_RADIUS_M - 1.1 * BALL_RADIUS_M, math.pi)).tolist()
-            self.place(ball, cup @ Spot(out, angle, 0.02 + 2.1 * BALL_RADIUS_M * number).pose())
+            self.place(ball, cup @ CylindricalPosition(out, angle, 0.02 + 2.1 * BALL_RADIUS_M * number).pose())
         self.place("shelf", Pose((*SHELF_M, TABLE_M + float(self.random.uniform(0.15, 0.3)))))
 
     def act(self) -> Iterator[None]:
-        """Comes, grasps, lifts, swings to the shelf, puts the cup down and leaves."""
+        """Approaches, grasps and lifts the cup, swings to the shelf, puts it down and retreats."""
         urdf = "{rpbi_examples}/robots/kinova_hand.urdf"
         arm = PolarArm(self, "kinova", urdf, "base", "j2s6s200_end_effector", Pose((0.0, 0.0, TABLE_M)))
-        start = Spot.of(self.sensed.poses["cup"].position)
+        start = CylindricalPosition.of(self.sensed.poses["cup"].position)
         yield from self._move_fingers(OPEN, OPEN, 0.02)
         for out in (-BACK_M, -NEAR_M):
             yield from arm.swing(start.moved(out, GRASP_M), SPEED, TURN_SPEED)
@@ -72,12 +76,14 @@ class Cup(Scene):
             raise SceneFailedError("kinova: expected both fingertips at the cup, got a hand that closed beside it")
         yield from arm.swing(arm.spot.moved(up=ABOVE_M), SPEED, TURN_SPEED)
         yield from self.measure()
-        cup = Spot.of(self.sensed.poses["cup"].position)
+        cup = CylindricalPosition.of(self.sensed.poses["cup"].position)
         risen_mm, expected_mm = 1e3 * (cup.height - start.height), 1e3 * ABOVE_M
         if risen_mm < 0.9 * expected_mm:
             raise SceneFailedError(f"kinova: expected the cup to rise by {expected_mm:.0f} mm, got {risen_mm:.0f} mm")
-        goal = Spot.of((self.sensed.poses["shelf"] @ self._goal).position)
-        above = Spot(*(end + hand - held for end, hand, held in zip(goal, arm.spot, cup))).moved(up=ABOVE_M)
+        goal = CylindricalPosition.of((self.sensed.poses["shelf"] @ self._goal).position)
+        above = CylindricalPosition(*(end + hand - held for end, hand, held in zip(goal, arm.spot, cup))).moved(
+            up=ABOVE_M
+        )
         for out in (-FRONT_M, 0.0):
             yield from arm.swing(above.moved(out), SPEED, TURN_SPEED)
         yield from self._until("shelf", arm.swing(above.moved(up=-1.2 * ABOVE_M), SLOW_SPEED, TURN_SPEED))
@@ -86,24 +92,26 @@ class Cup(Scene):
         yield from self.wait(0.5)
 
     def note(self) -> None:
-        """Notes how the cup tilts and moves."""
+        """Records tilt and motion of the cup."""
         place = self.seen.poses["cup"].position
         self._largest_tilt_deg = max(self._largest_tilt_deg, self._tilt_deg())
         self._moved_m, self._last = norm(minus(place, self._last)), place
 
     def has_succeeded(self) -> bool:
-        """Returns whether the cup stands on the shelf upright and at rest, with all balls, and nobody touches it."""
+        """Returns whether the cup is on the shelf, upright, at rest, with all balls and released."""
         is_there = self._off_m() < MAX_OFF_M and self._touching() - {*BALLS} == {"shelf"}
         stands = self._moved_m < AT_REST_M and self._tilt_deg() < MAX_TILT_DEG
         return is_there and stands and self._balls_inside() == len(BALLS)
 
     def fault(self) -> str:
-        """Returns how many balls are not in the cup, if any."""
+        """Returns the number of spilled balls in words, if any."""
         spilled = len(BALLS) - self._balls_inside()
         return f"{spilled} of {len(BALLS)} balls spilled" if spilled else ""
 
     def figures(self) -> dict[str, float]:
-        """Returns how many balls are in the cup, how far it is from its goal, its tilt and the largest on the way."""
+        """Returns the number of balls in the cup, its distance from the goal, its tilt and the largest tilt of the
+        episode.
+        """
         return {
             "balls inside": self._balls_inside(),
             "off [mm]": 1e3 * self._off_m(),
@@ -129,7 +137,7 @@ class Cup(Scene):
             yield
 
     def _touching(self) -> set[str]:
-        """Returns what touches the cup: other bodies, and links of the robot."""
+        """Returns the other bodies and the links of the robot that touch the cup."""
         touches = self.seen.contacts["cup"]
         return {touch.other_link if touch.other == "kinova" else touch.other for touch in touches}
 
@@ -145,5 +153,5 @@ class Cup(Scene):
 
     def _balls_inside(self) -> int:
         cup = self.seen.poses["cup"].inverse()
-        spots = [Spot.of((cup @ self.seen.poses[ball]).position) for ball in BALLS]
+        spots = [CylindricalPosition.of((cup @ self.seen.poses[ball]).position) for ball in BALLS]
         return sum(spot.radius < INNER_RADIUS_M and 0.0 < spot.height < CUP_HEIGHT_M for spot in spots)

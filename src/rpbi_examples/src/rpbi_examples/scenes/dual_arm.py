@@ -13,12 +13,11 @@ from .parts.arm import about_z, between, smooth, tilt_deg
 from .scene import Scene, Touch, Watched
 
 HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
-"""Half the way between the faces that are pressed, height of the table, half the height of the box."""
+"""Half the distance between the pressed faces, height of the table, half the height of the box."""
 STIFFNESS = 3000.0
 """Stiffness of the hands, as in configs/dual_arm/iiwa.yaml [N/m]."""
 FORCE_N, MAX_CHANGE = 80.0, 0.3
-"""Force with which both hands press, the internal force, which moves nothing; and its largest change, as a share,
-over 95 % of the way."""
+"""Internal force with which both hands press the box; and its largest relative change over 95 % of the path."""
 MASSES_KG = (1.0, 3.0)
 LIFT_M = 0.2
 SPEED = 0.1
@@ -74,13 +73,13 @@ class DualArm(Scene):
             yield
 
     def beside(self) -> Iterator[None]:
-        """Takes a box that does not touch the table for one that is carried."""
+        """Treats a box that does not touch the table as carried."""
         while True:
             self._is_carrying = "table" not in self._touching()
             yield
 
     def note(self) -> None:
-        """Notes the tilt of the box, and the forces on it while it is carried."""
+        """Records the tilt of the box, and the forces on it while it is carried."""
         self._tilt_deg = max(self._tilt_deg, tilt_deg(self.seen.poses["box"]))
         if self._is_carrying:
             self._forces.append(min(self._pressure(robot) for robot in FLANGES))
@@ -88,19 +87,19 @@ class DualArm(Scene):
             self._shares.append(left / max(left + right, 1.0))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the box stands at its goal alone, never tilted, and was pressed with a constant force."""
+        """Returns whether the box is released at its goal, never tilted, and was pressed with a constant force."""
         off_m, off_rad = self._error()
         is_there = off_m < NEAR_M and off_rad < NEAR_RAD and self._touching() == {"table"}
         is_held = np.quantile(np.abs(np.array(self._forces or [0.0]) - FORCE_N), 0.95) < MAX_CHANGE * FORCE_N
         return bool(is_there and is_held) and self._tilt_deg < MAX_TILT_DEG
 
     def fault(self) -> str:
-        """Returns how far the box is from its goal, if the hands lost it."""
+        """Returns the distance of the box from its goal in words, if the hands lost it."""
         off_m, _ = self._error()
         return "" if off_m < NEAR_M else f"the box slipped: it is {1e3 * off_m:.0f} mm from its goal"
 
     def figures(self) -> dict[str, float]:
-        """Returns the error, the largest tilt, the internal force, and who carries."""
+        """Returns the error, the largest tilt, the internal force, and the load of each arm."""
         off_m, off_rad = self._error()
         low, high = np.quantile(self._forces or [0.0], (0.025, 0.975))
         return {
@@ -126,7 +125,7 @@ class DualArm(Scene):
             yield
 
     def _pressure(self, robot: str) -> float:
-        """Returns the force of an arm on the box, along the way between both flanges [N]."""
+        """Returns the force of an arm on the box, along the line between both flanges [N]."""
         axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
         return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in self._touches(robot)))
 

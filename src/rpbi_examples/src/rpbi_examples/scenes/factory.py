@@ -16,22 +16,24 @@ from .scene import Scene, Watched
 
 URDF, CHEST = "{rpbi_examples}/robots/nextage_gripper.urdf", Pose((0.0, 0.0, 0.85))
 STATION_M, REACH_M = 0.18, 0.32
-"""The belt stops when a part is that far past the middle; parts within reach of it are taken."""
+"""Distance of a part past the middle at which the belt stops, and distance within which parts are taken."""
 MIDDLE_M, LEAST_M = 0.16, 0.05
-"""Only one arm at a time is nearer than that to the plane between both; least distance between the arms."""
+"""Half the width of the zone around the middle plane that one arm at a time may enter; least distance between the
+arms.
+"""
 HOME_X_M, HOME_Y_M, CARRY_Z_M, HOVER_M = 0.30, 0.25, 1.04, 0.07
-"""Where hands wait, out of the camera's view of the belt; height of hands that carry; height before a grasp."""
+"""Where hands wait, out of the camera's view of the belt; height of hands that carry a part; height before a grasp."""
 OPEN_M, SPARE_M, HELD_M = 0.04, 0.012, 0.012
-"""Largest way of a finger, gap beside a part, least way of a finger that holds one."""
+"""Largest opening of a finger, gap to a part before a grasp, least opening of a finger that holds a part."""
 GRASP_RAD, PLACE_RAD, SLOTS_M = -1.0, -math.pi / 2.0, (0.092, 0.03)
-"""Yaws that suit the left hand on the belt and over the box; how far out it puts parts of a kind there in turn."""
+"""Preferred yaws of the left hand on the belt and over the box; distances at which it puts parts of a kind in turn."""
 TRIES, PAUSE_S = 3, 0.3
-"""Most tries to take a part; time without work after which the belt goes on [s]."""
+"""Largest number of tries to take a part; time without work after which the belt continues [s]."""
 SIDES = {"left": 1.0, "right": -1.0}
 
 
 class Factory(Scene):
-    """Each arm takes the parts on its side, and the belt goes on when none is left there."""
+    """Each arm takes the parts on its side; the belt continues when none is left there."""
 
     world = "{rpbi_examples}/configs/factory/config.yaml"
     watch = Watched(robots=("nextage", "conveyor"), bodies=tuple(PARTS), tags=("tag_detections",))
@@ -47,7 +49,7 @@ class Factory(Scene):
         self._placed: list[tuple[str, Kind]] = []
 
     def prepare(self) -> None:
-        """Puts the parts on the belt in a random order, where the housing hides them."""
+        """Puts the parts on the belt in a random order, hidden by the housing."""
         for slot, part in enumerate(self.random.permutation(list(PARTS)).tolist()):
             x, y, yaw = self.random.uniform((-0.03, -0.015, -math.pi), (0.03, 0.015, math.pi)).tolist()
             place = (BELT_X_M + x, 0.53 + 0.12 * slot + y, BELT_Z_M + PARTS[part].height_m / 2.0)
@@ -73,7 +75,7 @@ class Factory(Scene):
             yield
 
     def note(self) -> None:
-        """Notes how near the arms came to each other."""
+        """Records the smallest distance between the arms."""
         if self._arms is not None:
             self._nearest_m = min(self._nearest_m, self._arms.measured_m())
 
@@ -82,7 +84,7 @@ class Factory(Scene):
         return not missing(self.seen.poses)
 
     def score(self) -> tuple[int, int]:
-        """Returns how many parts are in the compartment of their kind, of how many."""
+        """Returns the number of parts in the compartment of their kind, and the number of all parts."""
         return self.of - len(missing(self.seen.poses)), self.of
 
     def fault(self) -> str:
@@ -90,7 +92,7 @@ class Factory(Scene):
         return f"not in the box: {', '.join(missing(self.seen.poses))}"
 
     def figures(self) -> dict[str, float]:
-        """Returns how many parts are in the box, the smallest distance between the arms, and the time for each part."""
+        """Returns the number of parts in the box, the smallest distance between the arms, and the time per part."""
         time_s, nearest_mm = self.seen.time_s / max(done := self.score()[0], 1), 1e3 * self._nearest_m
         return {"parts placed": done, "time a part [s]": time_s, "smallest distance of the arms [mm]": nearest_mm}
 
@@ -121,7 +123,7 @@ class Factory(Scene):
                 self._busy[side] = ""
 
     def _take(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
-        """Goes over a part, looks again, grasps it and lifts it."""
+        """Moves above a part, measures its pose again, grasps it and lifts it."""
         kind, tag = PARTS[part], on_belt(self.sensed.tags)[part]
         yield from hand.open(kind.half_m + SPARE_M, 0.02)
         is_in_middle = abs(tag.position[1]) < MIDDLE_M
@@ -138,7 +140,7 @@ class Factory(Scene):
         yield from hand.go((x, y, CARRY_Z_M), yaw)
 
     def _put_down(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
-        """Goes over the compartment of a part, lets it go there, and stays in the middle."""
+        """Moves above the compartment of a part, releases it, and stays above the middle."""
         kind, yaw = PARTS[part], SIDES[side] * PLACE_RAD
         while not self._middle.take(side):
             yield hand.target

@@ -1,4 +1,4 @@
-"""A person waves, hands a thing to a Panda and takes it back; each acts by what it sees of the thing and the other."""
+"""A person waves, hands a thing to a Panda and takes it back; each reacts to the thing and to the other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose, Vector
 
 from .parts.arm import about_z, tilt_deg
-from .parts.holding import BEFORE, Holders, PandaArm, Still, above, until, upright_grasp, yaw_to
+from .parts.holding import BEFORE, Holders, PandaArm, RestDetector, above, until, upright_grasp, yaw_to
 from .parts.person import SwayingPerson, together
 from .scene import Scene, SceneFailedError, Watched
 
@@ -20,18 +20,18 @@ HALF_HEIGHTS_M = {"bottle": 0.063, "can": 0.06, "carton": 0.065}
 DYNAMICS = (0.25, 0.5), (0.45, 0.9)
 """Least mass [kg] and friction of a thing, and the largest ones."""
 REST, PLACES_M = Pose((0.31, -0.24, 1.08)), ((0.37, -0.34, 1.05), (0.45, -0.16, 1.18))
-"""The palm near the body, and corners of the box in which it is held out."""
+"""The palm near the body, and corners of the region in which it is held out."""
 OFF_M, OFF_RAD, PAUSES_S = 0.008, 0.1, (0.2, 1.5)
 """Largest errors of the person: of a thing on the palm, of the palm's direction to the robot; and pauses."""
 BASE = Pose((1.18, -0.2, 0.6), (0.0, 0.0, 1.0, 0.0))
 GRASP_M, LIFT_M, OPEN_M = 0.09, 0.1, 0.04
 """Height of a grasp above the base of a thing, height above the palm, way of each finger."""
 SHOWN_M, ALONE_S = (0.66, -0.2, 1.24), 1.0
-"""Where the robot shows the thing, and how long at least."""
+"""Where the robot shows the thing, and the least time for it."""
 LOWEST_M, CARRIED_N = -0.05, 2.0
-"""Height above the palm to which a thing is lowered at most, and force of the palm at which the robot lets go."""
+"""Least height above the palm to which a thing is lowered, and force of the palm at which the robot releases it."""
 WAVES, MAX_TILT_DEG, STILL_M = 3, 10.0, 0.002
-"""Waves, largest tilt at the end, and way within which a thing stands still on the palm."""
+"""Number of waves, largest tilt at the end, and distance within which a thing counts as at rest on the palm."""
 HANDS = {"human", "panda"}
 
 
@@ -50,27 +50,27 @@ class Handover(Scene):
         places = [tuple(place) for place in random.uniform(*PLACES_M, (2, 3)).tolist()]
         self._palms = [Pose(each, about_z(yaw_to(each, BASE) + random.uniform(-OFF_RAD, OFF_RAD))) for each in places]
         self._pauses_s = random.uniform(*PAUSES_S, 2).tolist()
-        self._holders, self._on_palm = Holders(self, self.thing), Still()
+        self._holders, self._on_palm = Holders(self, self.thing), RestDetector()
         self._force_n = self._largest_tilt_deg = 0.0
 
     @cached_property
     def person(self) -> SwayingPerson:
-        """The person, made by `note` in the first cycle, so that it begins alike everywhere."""
+        """The person, made by `note` in the first cycle, so that it starts equally in every process."""
         return SwayingPerson(self, self.random)
 
     def prepare(self) -> None:
-        """Puts a thing of some mass and friction on the palm."""
+        """Puts a thing of random mass and friction on the palm."""
         x, y, yaw = self.random.uniform(-1.0, 1.0, 3).tolist()
         self.place(self.thing, REST @ Pose((OFF_M * x, OFF_M * y, self._half_m + 1e-4), about_z(OFF_RAD * yaw)))
         mass, friction = self.random.uniform(*DYNAMICS).tolist()
         self.change(self.thing, mass=mass, lateralFriction=friction)
 
     def act(self) -> Iterator[None]:
-        """Has the person and the robot act side by side."""
+        """Makes the person and the robot act at the same time."""
         yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
 
     def beside(self) -> Iterator[None]:
-        """Has the person act."""
+        """Makes the person act."""
         yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:
@@ -87,7 +87,7 @@ class Handover(Scene):
         yield from person.go(REST, 1.0)
 
     def _robot_acts(self) -> Iterator[None]:
-        """Takes the thing from the palm, shows it, puts it back and lets go when the palm carries it."""
+        """Takes the thing from the palm, shows it, puts it back and releases it when the palm carries it."""
         arm, holders = PandaArm(self, "panda", BASE), self._holders
         home = arm.target
         yield from until(self.person.holds_out)
@@ -100,7 +100,7 @@ class Handover(Scene):
         in_gripper, yaw = arm.pose().inverse() @ thing, yaw_of(thing.quat_xyzw) - yaw_to(thing.position, BASE)
 
         def standing(place: Vector) -> Pose:
-            """Returns the gripper that holds the thing upright with its base at a place [m]."""
+            """Returns the pose of a gripper that holds the thing upright with its base at a place [m]."""
             return Pose(above(place, self._half_m), about_z(yaw_to(place, BASE) + yaw)) @ in_gripper.inverse()
 
         yield from arm.go(standing(SHOWN_M), 1.8)
@@ -118,11 +118,11 @@ class Handover(Scene):
         yield from arm.go(home, 1.5)
 
     def _grasp(self) -> Pose:
-        """Returns the gripper at the thing, where that is now."""
+        """Returns the pose of a gripper at the present pose of the thing."""
         return upright_grasp(self.sensed.poses[self.thing], GRASP_M - self._half_m)
 
     def note(self) -> None:
-        """Notes waves, who holds the thing, how it and the palm move, and forces on the person."""
+        """Records waves, the holders of the thing, its motion, that of the palm, and forces on the person."""
         self.person.note()
         self.landmarks = {"palm": self.person.palm()}
         self._holders.note()
@@ -131,14 +131,14 @@ class Handover(Scene):
         self._force_n = max(self._force_n, sum(touch.normal_force for touch in self.seen.contacts["human"]))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the person waved, the robot alone held the thing, and it now stands still on the palm."""
+        """Returns whether the person waved, the robot alone held the thing, and it is now at rest on the palm."""
         was_handed_over = self._holders.alone_s.get("panda", 0.0) >= ALONE_S and self.person.swings >= 2 * WAVES - 1
         is_back = self._holders.is_alone("human", 0.5) and self._holders.links() == {"RightHand"}
         is_standing = self._on_palm.is_within(STILL_M) and tilt_deg(self._where()) < MAX_TILT_DEG
         return was_handed_over and is_back and is_standing and self._holders.all_names <= HANDS
 
     def figures(self) -> dict[str, float]:
-        """Returns the largest force on the person, how long the robot held the thing, and its tilts."""
+        """Returns the largest force on the person, the time for which the robot held the thing, and its tilts."""
         return {
             "largest force on the person [N]": self._force_n,
             "held by the robot alone [s]": self._holders.alone_s.get("panda", 0.0),

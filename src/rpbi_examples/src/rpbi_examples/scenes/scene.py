@@ -17,11 +17,11 @@ from .sensing import SensedPoses
 MEASURE_S = 0.5
 """Time in which things at rest are measured with noise [s]."""
 TAG_DIGITS = 6
-"""Digits of poses of tags after the point [m]; detectors have noise of far more."""
+"""Decimal digits of poses of tags [m]; the noise of detectors is far larger."""
 
 
 class Watched(NamedTuple):
-    """What a scene sees of its world.
+    """Parts of its world that a scene observes.
 
     Attributes:
         robots: Robots whose joints it sees.
@@ -66,7 +66,7 @@ class Touch(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What a scene sees at the end of a cycle.
+    """Observation of a scene at the end of a cycle.
 
     Attributes:
         time_s: Time since the start of the scene [s].
@@ -85,7 +85,7 @@ class Seen(NamedTuple):
     tags: Mapping[int, Pose] = {}
 
 
-class Put(NamedTuple):
+class InputValue(NamedTuple):
     """Passes a value to an input before the next tick, see `World.put`: joints and numbers, or a pose."""
 
     slot: str
@@ -122,49 +122,49 @@ class Switch(NamedTuple):
     stop: tuple[str, ...]
 
 
-class Tune(NamedTuple):
+class GainChange(NamedTuple):
     """Changes keys of a controller, `ROBOT/CONTROLLER`, as its service `set_gains` does."""
 
     target: str
     values: Mapping[str, float | Vector]
 
 
-class Vanish(NamedTuple):
+class Removal(NamedTuple):
     """Removes a body."""
 
     name: str
 
 
-Deed = Put | Teleport | Shove | Change | Switch | Tune | Vanish
-"""Something that a scene does to its world."""
+WorldChange = InputValue | Teleport | Shove | Change | Switch | GainChange | Removal
+"""A change that a scene makes to its world."""
 
 
 class SceneFailedError(InterfaceError):
-    """The robots cannot go on, for instance since a target is out of reach; the episode ends as failed."""
+    """The robots cannot continue, for instance because a target is out of reach; the episode ends as failed."""
 
 
 class Scene(ABC):
-    """What robots do in a world, how it starts, and whether it has worked.
-
-    The world goes on in cycles: the scene sees, acts, and a cycle of ticks follows. All that is random comes from
-    `random`, so that a seed leads to the same episode anywhere.
+    """A task of robots in a world: its start, the robots' actions, and the test of success. Time passes in cycles: the
+    scene observes, acts, and a cycle of ticks follows. All random numbers come from `random`, so that a seed leads to
+    the same episode anywhere.
 
     Args:
         random: Random numbers of the episode.
 
     Attributes:
         world: Main YAML file of the world.
-        watch: What it sees.
-        hands: Links that controllers lead to poses, by `ROBOT/CONTROLLER`; joints of other robots have targets.
+        watch: The parts that it observes.
+        hands: Links that controllers move to poses, by `ROBOT/CONTROLLER`; joints of other robots have targets.
         others: Robots that no policy moves, such as a person, see `beside`.
         of: Number of parts of the task.
         cycle_ticks: Ticks of a cycle.
         longest_s: Time after which an episode ends [s].
-        seen: The newest view of the world, before the first cycle an empty one. It is true, for judgement.
+        seen: The newest view of the world, before the first cycle an empty one. It has no noise, and decides on
+            success.
         sensed: The view that policies act by: `seen`, and with noise the poses and tags that sensors report.
         landmarks: Further poses that a policy senses, in the world, such as that of a palm; `sensed.poses` has them.
         is_noisy: Whether sensors have noise and delay, see `sensing`; set before `prepare`.
-        goal_numbers: Numbers of the episode that a policy has to know beside what is seen, such as a place [m].
+        goal_numbers: Numbers of the episode that a policy needs besides observations, such as a place [m].
     """
 
     world: ClassVar[str]
@@ -183,23 +183,23 @@ class Scene(ABC):
         self._noise = random.spawn(3)  # of bodies, of tags, of robots; spawning changes no other random numbers
         self._bodies, self._tags = SensedPoses[str](self._noise[0]), SensedPoses[int](self._noise[1])
         self.goal_numbers: tuple[float, ...] = ()
-        self._deeds: list[Deed] = []
+        self._changes: list[WorldChange] = []
 
-    # --- What a subclass has
+    # --- For subclasses
 
     def prepare(self) -> None:  # noqa: B027 (some scenes start as their files say)
         """Prepares an episode before the first tick, for instance by `place`."""
 
     @abstractmethod
     def act(self) -> Iterator[None]:
-        """Acts; each `yield` waits for the next cycle. The scene has seen the world once before.
+        """Acts; each `yield` waits for the next cycle. The scene has observed the world once before.
 
         Raises:
-            SceneFailedError: If the robots cannot go on.
+            SceneFailedError: If the robots cannot continue.
         """
 
     def beside(self) -> Iterator[None]:
-        """Acts for all but the robots that a policy moves in place of `act`, such as a person; by default nothing.
+        """Acts for robots that no policy moves, such as a person, in place of `act`; does nothing by default.
 
         Raises:
             SceneFailedError: If the task cannot be done any more.
@@ -207,56 +207,58 @@ class Scene(ABC):
         yield from ()
 
     def note(self) -> None:  # noqa: B027 (some scenes look at the end alone)
-        """Notes what happened in a cycle, for figures and success."""
+        """Records events of a cycle, for figures and success."""
 
     @abstractmethod
     def has_succeeded(self) -> bool:
-        """Returns whether it has worked, by what is seen now and was noted."""
+        """Returns whether the task succeeded, from the present observation and the records."""
 
     def figures(self) -> dict[str, float]:
-        """Returns numbers that tell how well it worked, by name with unit, such as `error [mm]`."""
+        """Returns measures of quality, by name with unit, such as `error [mm]`."""
         return {}
 
     def score(self) -> tuple[int, int]:
-        """Returns how many of how many parts of the task are done; by default all or none."""
+        """Returns the number of completed parts of the task and the number of all parts; by default all or none."""
         return self.of * self.has_succeeded(), self.of
 
     def fault(self) -> str:
-        """Returns in a few words why it has not succeeded, as far as it shows at the end, or nothing."""
+        """Returns the reason of a failure in a few words, if the end of the episode shows it; otherwise nothing."""
         return ""
 
-    # --- What it does to the world
+    # --- Changes of the world
 
     def put(self, slot: str, value: Mapping[str, float] | Pose) -> None:
-        """Passes a value to an input, such as `kuka_lwr/target`, see `Put`."""
-        self._deeds.append(Put(slot, value))
+        """Passes a value to an input, such as `kuka_lwr/target`, see `InputValue`."""
+        self._changes.append(InputValue(slot, value))
 
     def place(self, name: str, pose: Pose) -> None:
         """Puts a body somewhere at once, at rest."""
-        self._deeds.append(Teleport(name, pose))
+        self._changes.append(Teleport(name, pose))
 
     def shove(self, target: str, force: Vector, duration_s: float) -> None:
-        """Has a force [N] act on a link for a time, see `Shove`."""
-        self._deeds.append(Shove(target, force, duration_s))
+        """Applies a force [N] to a link for a time, see `Shove`."""
+        self._changes.append(Shove(target, force, duration_s))
 
     def change(self, target: str, **values: float) -> None:
         """Changes dynamics of a body or a link, such as `mass` [kg] or `lateralFriction`, see `Change`."""
-        self._deeds.append(Change(target, values))
+        self._changes.append(Change(target, values))
 
     def switch(self, robot: str, start: tuple[str, ...] = (), stop: tuple[str, ...] = ()) -> None:
         """Stops and starts controllers of a robot, all at one tick."""
-        self._deeds.append(Switch(robot, start, stop))
+        self._changes.append(Switch(robot, start, stop))
 
     def tune(self, target: str, **values: float | Vector) -> None:
-        """Changes keys of a controller, such as `force` [N]; an active one begins again where the robot is."""
-        self._deeds.append(Tune(target, values))
+        """Changes keys of a controller, such as `force` [N]; an active one starts again from the robot's present
+        pose.
+        """
+        self._changes.append(GainChange(target, values))
 
     def vanish(self, name: str) -> None:
         """Removes a body."""
-        self._deeds.append(Vanish(name))
+        self._changes.append(Removal(name))
 
     def look(self, seen: Seen) -> None:
-        """Sees the world at the end of a cycle."""
+        """Observes the world at the end of a cycle."""
         self.seen = seen
         self.note()
         poses, tags = {**seen.poses, **self.landmarks}, seen.tags
@@ -264,10 +266,10 @@ class Scene(ABC):
             poses, tags = self._bodies.track(seen.time_s, poses), self._tags.track(seen.time_s, tags)
         self.sensed = seen._replace(poses=poses, tags=tags)
 
-    def take_deeds(self) -> list[Deed]:
-        """Returns what it did since the last call, in this order."""
-        deeds, self._deeds = self._deeds, []
-        return deeds
+    def take_changes(self) -> list[WorldChange]:
+        """Returns the changes since the last call, in order."""
+        changes, self._changes = self._changes, []
+        return changes
 
     def measure(self) -> Iterator[None]:
         """Waits until things at rest are measured well, if sensors have noise; used as `yield from self.measure()`.
@@ -285,11 +287,11 @@ class Scene(ABC):
 
 
 class Stage(ABC):
-    """Where a scene takes place: a world in this process, or the simulator of a ROS master."""
+    """Place of a scene: a world in this process, or the simulator of a ROS master."""
 
     @abstractmethod
-    def do(self, deed: Deed) -> None:
-        """Does something to the world, before its next tick.
+    def do(self, change: WorldChange) -> None:
+        """Makes a change to the world, before its next tick.
 
         Raises:
             InterfaceError: If the world refuses it.
@@ -297,19 +299,17 @@ class Stage(ABC):
 
     @abstractmethod
     def cycle(self) -> None:
-        """Has a cycle of ticks pass, and has the scene look at what is there then."""
+        """Advances by a cycle of ticks, and lets the scene observe the world."""
 
 
 class SceneResult(NamedTuple):
     """How an episode ended.
 
     Attributes:
-        success: Whether it has worked.
+        success: Whether the task succeeded.
         done: Number of parts of the task that are done.
         of: Number of all parts.
-        time_s: How long it took [s].
-        figures: Numbers that tell how well it worked.
-        reason: Why it has failed; empty if that is not known.
+        time_s: Duration [s]. figures: Measures of quality. reason: Reason of a failure; empty if unknown.
     """
 
     success: bool
@@ -321,7 +321,8 @@ class SceneResult(NamedTuple):
 
 
 def tag_in_world(camera: Pose, tag: Pose) -> Pose:
-    """Returns the pose of a tag, to the micrometre, so that it is the same by whatever way both poses came.
+    """Returns the pose of a tag, rounded to a micrometre, so that it does not depend on how both poses were
+    transmitted.
 
     Args:
         camera: Pose of the camera's optical frame in the world.
@@ -333,7 +334,7 @@ def tag_in_world(camera: Pose, tag: Pose) -> Pose:
 
 
 def run_scene(scene: Scene, stage: Stage) -> SceneResult:
-    """Runs an episode of a scene that was prepared, until it has acted or its time is over.
+    """Runs an episode of a prepared scene, until its actions end or its time is over.
 
     Raises:
         InterfaceError: If the world fails, or refuses something.
@@ -341,8 +342,8 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
     reason = ""
 
     def cycle() -> None:
-        for deed in scene.take_deeds():
-            stage.do(deed)
+        for change in scene.take_changes():
+            stage.do(change)
         stage.cycle()
 
     cycle()
@@ -360,5 +361,5 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
 
 
 def broken_off(scene: Scene, error: InterfaceError) -> SceneResult:
-    """Returns the result of an episode that an error of its world has ended: nothing is done."""
+    """Returns the result of an episode that an error of its world has ended: no part is done."""
     return SceneResult(False, 0, scene.of, scene.seen.time_s, {}, " ".join(str(error).split()))

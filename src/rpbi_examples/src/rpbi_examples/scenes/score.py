@@ -1,4 +1,4 @@
-"""Runs a scene with many seeds, in processes of their own, and tells how often it worked."""
+"""Runs a scene with many seeds in separate processes, and reports its rate of success."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SeedResult(NamedTuple):
         seed: The seed.
         result: How it ended.
         state_hash: Hash of the world's state at its end; empty after an error of the world.
-        picture: What the camera then saw, if it failed: uint8, shape (height, width, 3).
+        picture: Camera image at the end of a failed episode: uint8, shape (height, width, 3).
     """
 
     seed: int
@@ -60,9 +60,9 @@ class SeedResult(NamedTuple):
 
 
 def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) -> Generator[SeedResult, None, None]:
-    """Runs a scene with some seeds, and yields the results as they come; its processes end when it is closed.
+    """Runs a scene with some seeds, and yields the results as they arrive; closing the generator ends its processes.
 
-    An error of the world ends the episode alone, as failed; the next one has a new world.
+    An error of the world ends only its episode, as failed; the next one has a new world.
 
     Args:
         scene: A name of `SCENES`, or `module:Class`.
@@ -99,7 +99,7 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) 
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Blocks SIGINT meanwhile, and for good in processes that start here: Ctrl-C is for the one that started them."""
+    """Blocks SIGINT in this block, and permanently in processes started in it: their parent handles Ctrl-C."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -108,7 +108,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """Has this process end with the one that started it, whatever that one ends by."""
+    """Makes this process end with its parent, however that ends."""
 
     def wait() -> None:
         parent = multiprocessing.parent_process()
@@ -145,7 +145,7 @@ def _run(scene: str, seed: int, noise: bool) -> SeedResult:
 
 
 def summary(scene: str, results: Sequence[SeedResult], noise: bool = False) -> dict[str, Any]:
-    """Returns the score of a scene as plain data: what is done, of how much, and a row for each seed."""
+    """Returns the score of a scene as plain data: completed parts, all parts, and a row for each seed."""
     rows = [each.row() for each in sorted(results, key=lambda each: each.seed)]
     return {
         "scene": scene,
@@ -166,8 +166,7 @@ def write_json(path: Path, found: dict[str, Any]) -> None:
 def write_failures(path: Path, results: Sequence[SeedResult]) -> str:
     """Writes a picture of the ends of failed episodes, of `MAX_PICTURES` at most.
 
-    Returns:
-        A line with the file, and how many it shows of how many; empty if none failed.
+    Returns: A line with the file, and the numbers of shown and of failed episodes; empty if none failed.
     """
     all_failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None]
     failed = all_failed[:MAX_PICTURES]

@@ -1,4 +1,4 @@
-"""Poses as a tracking system measures them, with noise and late; smoothed, and of a base that knows its velocity."""
+"""Poses as a tracking system measures them, noisy and late; their filters, and an estimate of a moving base."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from robot_model.geometry import (
 NOISE_M, NOISE_RAD, DELAY_S = 0.002, math.radians(1.0), 0.02
 """Standard deviations of each axis of a position [m] and of a rotation vector [rad]; age of a measurement [s]."""
 MEAN_OF = 25
-"""Number of measurements that smoothing amounts to; the first ones count alike."""
+"""Number of measurements that the filter averages in effect; the first ones have equal weights."""
 JUMP_M, JUMP_RAD = 4.0 * NOISE_M, 4.0 * NOISE_RAD
-"""Distances from the smoothed pose beyond which a measurement counts alone: the body moves."""
+"""Distances from the filtered pose beyond which the filter restarts at the measurement: the body moves."""
 BASE_SMOOTHED_S = 0.2
-"""Time over which a moving base corrects its error by measurements [s]."""
+"""Time constant of the correction by measurements for a moving base [s]."""
 ROUNDING_S = 1e-9
 
 Key = TypeVar("Key", str, int)
@@ -53,7 +53,7 @@ class SensedPoses(Generic[Key]):
         self._smoothed: dict[Key, tuple[int, Pose]] = {}
 
     def track(self, time_s: float, poses: Mapping[Key, Pose]) -> dict[Key, Pose]:
-        """Returns the smoothed poses that are known at a time [s], of those that are measured now and were before."""
+        """Adds measurements, and returns the filtered poses that are known at a time [s]."""
         self._on_the_way.append((time_s, {key: noisy(poses[key], self._random) for key in sorted(poses)}))
         while len(self._on_the_way) > 1 and self._on_the_way[1][0] <= time_s - DELAY_S + ROUNDING_S:
             self._on_the_way.popleft()
@@ -74,7 +74,7 @@ class SensedPoses(Generic[Key]):
 
 
 class BaseEstimate:
-    """Where the base of a robot is: it follows the velocity, and corrects itself by measured poses that are late.
+    """Estimate of a robot's base: it integrates the velocity, and is corrected by late measurements of the pose.
 
     Args:
         base: The pose at the start.
@@ -86,10 +86,10 @@ class BaseEstimate:
         self._random, self._period_s = np.random.default_rng(seed), period_s
         self._pose = noisy(base, self._random)
         self._past: deque[tuple[Pose, Pose]] = deque(maxlen=round(DELAY_S / period_s) + 1)
-        """Poses as they are measured, and as they were estimated then."""
+        """Measured poses, each with the estimate of the same time."""
 
     def update(self, base: Pose, linear: Vector, angular: Vector) -> Pose:
-        """Returns the estimated pose, a period later.
+        """Returns the estimated pose after another period.
 
         Args:
             base: The true pose, which is measured.

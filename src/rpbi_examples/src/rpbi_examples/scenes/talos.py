@@ -22,26 +22,29 @@ TORSO, SOLES, FEET = "torso_2_link", ("left_sole_link", "right_sole_link"), {"le
 HEIGHT_M, LOWEST_M = 1.0223, 0.8
 """Height of the pelvis at the start, and the least while the robot stands."""
 MOST_SHIFT, MOST_RISE_M, MOST_TURN = 0.05, 2e-3, (0.01, 0.01, 0.2)
-"""Largest deviations of the start: of x and y [m], of the height, and as a rotation vector [rad]."""
+"""Largest deviations of the start pose: in x and y [m], in height [m], and in orientation as a rotation vector
+[rad].
+"""
 NEAREST, FARTHEST = (0.35, 0.05, 0.9), (0.55, 0.4, 1.3)
-"""Corners of the box of targets: before the pelvis and to its left, and over the floor [m]."""
+"""Corners of the region of targets: forwards and left of the pelvis, and above the floor [m]."""
 FORWARD = quaternion_of((0.0, -math.pi / 2.0, 0.0))
 """Orientation of a hand that points forward."""
 IMPULSE, PUSH_S = 10.0, 0.1
-"""Of a push [N s], and how long it takes [s]."""
+"""Impulse of a push [N s], and its duration [s]."""
 REACHED_S, BACK_S, STAYS_S = 3.0, 4.0, 2.0
-"""By when the hand is at its target, by when it is back after a push, and how long it stays there then."""
+"""Time by which the hand is at its target, time by which it is back after a push, and time for which it stays there."""
 NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG, MOST_LEAN_DEG = 0.02, 0.01, 5.0, 15.0
-"""Largest error of the hand, way of the feet, lean of the torso at the end, and at any time of the episode."""
+"""Largest error of the hand, largest motion of the feet, largest lean of the torso at the end, and during the
+episode.
+"""
 
 
 class Talos(Scene):
-    """A Talos balances by torques: it reaches for a ball, is pushed at its torso from somewhere, and stands.
+    """A torque-controlled Talos balances: it reaches for a ball, and is pushed at its torso from a random direction.
 
     Attributes:
-        target: Where the point of the hand is to be, in the world.
-        push_angle: Where the push goes to, from where the robot faces at the start, to its left [rad].
-        impulse: Of the push [N s].
+        target: Target of the hand's point, in the world. push_angle: Direction of the push, from the robot's initial
+            forward direction to its left [rad]. impulse: Impulse of the push [N s].
     """
 
     world = "{rpbi_examples}/configs/talos/config.yaml"
@@ -64,7 +67,7 @@ class Talos(Scene):
         self._is_late = self._has_stayed = self._has_touched = False
 
     def prepare(self) -> None:
-        """Puts the robot onto the floor, not quite upright."""
+        """Puts the robot on the floor, slightly tilted."""
         self.place("talos", self._start)
         if self.is_noisy:
             self.tune("talos/balance", noise_seed=int(self._noise[2].integers(2**31)))
@@ -91,7 +94,7 @@ class Talos(Scene):
         self._has_stayed = True
 
     def note(self) -> None:
-        """Notes lean, contacts, way of the feet and error of the hand."""
+        """Records lean, contacts, motion of the feet and error of the hand."""
         if self._feet:
             self._has_touched |= any(touch.other_link not in FEET for touch in self.seen.contacts["floor"])
             self._most_lean_deg = max(self._most_lean_deg, tilt_deg(self.pose(TORSO)))
@@ -101,14 +104,14 @@ class Talos(Scene):
             self._late_error_m = max(self._late_error_m, self._error_m())
 
     def has_succeeded(self) -> bool:
-        """Returns whether it always stood on its feet alone and now does upright, and the hand came back and stayed."""
+        """Returns whether it stood only on its feet, is upright at the end, and the hand came back and stayed."""
         stood = not self._has_touched and self._slip_m < MAX_SLIP_M and self._most_lean_deg < MOST_LEAN_DEG
         on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
         stands = on_floor == FEET and tilt_deg(self.pose(TORSO)) < MAX_LEAN_DEG
         return stood and stands and self._has_stayed and self._late_error_m < NEAR_M
 
     def figures(self) -> dict[str, float]:
-        """Returns the error of the hand after it is back, the largest lean and the way of the feet."""
+        """Returns the error of the hand after it is back, the largest lean and the motion of the feet."""
         return {
             "hand error [mm]": 1e3 * (self._late_error_m if self._is_late else self._error_m()),
             "largest lean [deg]": self._most_lean_deg,
@@ -116,12 +119,12 @@ class Talos(Scene):
         }
 
     def pose(self, link: str) -> Pose:
-        """Returns where a link is in the world."""
+        """Returns the pose of a link in the world."""
         joints = self.seen.joints["talos"]
         return self.seen.poses["talos"] @ self._robot.pose([joints[name] for name in self._robot.joint_names], link)
 
     def _push(self) -> Iterator[None]:
-        """Pushes the torso; a stick shows from where."""
+        """Pushes the torso; a stick shows the direction."""
         angle = self._yaw + self.push_angle
         cos, sin = math.cos(angle), math.sin(angle)
         behind = minus(self.pose(TORSO).position, scaled(0.6, (cos, sin, 0.0)))

@@ -21,8 +21,8 @@ from rpbi.world import World
 from . import SCENES
 from .scene import (
     Change,
-    Deed,
-    Put,
+    GainChange,
+    InputValue,
     Scene,
     SceneFailedError,
     SceneResult,
@@ -33,8 +33,8 @@ from .scene import (
     Switch,
     Teleport,
     Touch,
-    Tune,
     Watched,
+    WorldChange,
     run_scene,
     tag_in_world,
 )
@@ -47,7 +47,7 @@ class SceneTaskConfig(WorldTaskConfig):
 
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
     noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
-    low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the box that bodies are seen in.")
+    low: Position = Field((-2.0, -2.0, -1.0), description="Lower corner of the region in which bodies are observed.")
     high: Position = Field((2.0, 2.0, 3.0), description="Upper corner.")
     speed: Fraction = Field(0.5, description="Largest speed of joints, as a share of the velocity limits of the URDF.")
     hand_speed: Positive = Field(0.25, description="Largest speed of hands along each axis [m/s].")
@@ -55,7 +55,7 @@ class SceneTaskConfig(WorldTaskConfig):
 
 
 class SceneTask(WorldTask):
-    """Does what a scene is about: actions move its robots, or are None, for a scene that acts itself."""
+    """The task of a scene: actions move its robots; with None as action, the scene acts itself."""
 
     Config = SceneTaskConfig
     needs_action = False
@@ -66,7 +66,7 @@ class SceneTask(WorldTask):
         self.scene = self._kind(np.random.default_rng(0))
         """The scene of this episode."""
         self.seed: int | None = None
-        """Seed of scenes from now on; without one, their random numbers are those of the environment."""
+        """Seed of later scenes; without one, their random numbers are those of the environment."""
         self._start_tick = 0
         self._beside: Iterator[None] | None = None
         self._has_failed = False
@@ -102,13 +102,13 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves robots, and has the scene act for all others; None leaves all to the scene."""
+        """Moves robots, and lets the scene act for all others; with None, the scene moves all."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)
 
     def reward(self) -> float:
-        """Returns the share of the task that was done in the last action."""
+        """Returns the share of the task that the last action completed."""
         before, _ = self.scene.score()
         self.scene.look(self._see())
         try:
@@ -120,11 +120,11 @@ class SceneTask(WorldTask):
         return (done - before) / of
 
     def has_succeeded(self) -> bool:
-        """Returns whether the scene has worked."""
+        """Returns whether the scene has succeeded."""
         return self.scene.has_succeeded()
 
     def has_ended(self) -> bool:
-        """Returns whether the scene has worked, or cannot any more."""
+        """Returns whether the scene has succeeded, or cannot succeed any more."""
         return self._has_failed or self.has_succeeded()
 
     def _see(self) -> Seen:
@@ -132,8 +132,8 @@ class SceneTask(WorldTask):
         return see(self.world, self._kind.watch, time_s)
 
     def _do_all(self) -> None:
-        for deed in self.scene.take_deeds():
-            do(self.world, deed)
+        for change in self.scene.take_changes():
+            do(self.world, change)
 
 
 class EnvStage(Stage):
@@ -146,8 +146,8 @@ class EnvStage(Stage):
     def __init__(self, env: WorldEnv) -> None:
         self._env = env
 
-    def do(self, deed: Deed) -> None:
-        do(self._env.world, deed)
+    def do(self, change: WorldChange) -> None:
+        do(self._env.world, change)
 
     def cycle(self) -> None:
         self._env.step(None)
@@ -178,7 +178,7 @@ def run_episode(env: WorldEnv, seed: int) -> SceneResult:
 
 
 def see(world: World, watch: Watched, time_s: float) -> Seen:
-    """Returns what a scene sees of a world."""
+    """Returns the observation of a world by a scene."""
     tick = world.clock.tick
     joints = {}
     for name in watch.robots:
@@ -213,34 +213,34 @@ def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
                 yield from ((tag.id, tag_in_world(camera, Pose(*tag.pose))) for tag in sample.tags)
 
 
-def do(world: World, deed: Deed) -> None:
-    """Does something to a world, before its next tick.
+def do(world: World, change: WorldChange) -> None:
+    """Makes a change to a world, before its next tick.
 
     Raises:
         InterfaceError: If the world refuses it.
     """
     try:
-        _do(world, deed)
+        _do(world, change)
     except ValueError as error:
-        raise InterfaceError(f"{type(deed).__name__} {deed[0]}: {error}") from None
+        raise InterfaceError(f"{type(change).__name__} {change[0]}: {error}") from None
 
 
-def _do(world: World, deed: Deed) -> None:
-    if isinstance(deed, Put):
-        world.put(deed.slot, deed.value)
-    elif isinstance(deed, Teleport):
-        world.act(deed.name, "teleport", deed.pose)
-    elif isinstance(deed, Shove):
-        name, _, link = deed.target.partition("/")
-        world.act(name, "push", {"force": deed.force, "link": link, "duration_s": deed.duration_s})
-    elif isinstance(deed, Change):
-        world.change_dynamics(deed.target, deed.values)
-    elif isinstance(deed, Switch):
-        world.act(deed.robot, "switch_controllers", {"start": deed.start, "stop": deed.stop})
-    elif isinstance(deed, Tune):
-        robot, _, name = deed.target.partition("/")
+def _do(world: World, change: WorldChange) -> None:
+    if isinstance(change, InputValue):
+        world.put(change.slot, change.value)
+    elif isinstance(change, Teleport):
+        world.act(change.name, "teleport", change.pose)
+    elif isinstance(change, Shove):
+        name, _, link = change.target.partition("/")
+        world.act(name, "push", {"force": change.force, "link": link, "duration_s": change.duration_s})
+    elif isinstance(change, Change):
+        world.change_dynamics(change.target, change.values)
+    elif isinstance(change, Switch):
+        world.act(change.robot, "switch_controllers", {"start": change.start, "stop": change.stop})
+    elif isinstance(change, GainChange):
+        robot, _, name = change.target.partition("/")
         config = robot_of(world, robot).controllers.config(name)
-        changed = type(config).parse({**config.model_dump(exclude_unset=True), **deed.values}, deed.target)
+        changed = type(config).parse({**config.model_dump(exclude_unset=True), **change.values}, change.target)
         world.act(robot, "set_controller_gains", {"name": name, "config": changed})
     else:
-        world.remove(deed.name)
+        world.remove(change.name)

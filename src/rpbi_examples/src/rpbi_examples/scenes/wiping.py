@@ -20,24 +20,24 @@ FACING = (1.0, 0.0, 0.0, 0.0)
 PIVOT, FACE_M = (-0.16, 0.0, 0.15), 0.06
 """Ball joint of the board's stand in the world [m], and height of the board's face over it."""
 RANGES = ((-0.02, -0.02, -0.1, 0.3, -0.15, 2000.0, 0.4), (0.02, 0.02, 0.1, 0.5, 0.15, 5000.0, 1.0))
-"""Shift of the board along x and y [m], turns about x, y and z [rad], stiffness of the sponge [N/m], friction."""
+"""Shift of the board along x and y [m], rotations about x, y and z [rad], stiffness of the sponge [N/m], friction."""
 SIZE_M, STAINS, CELLS, STAIN_M = (0.25, 0.36), (8, 10), (50, 72), 0.009
-"""Extents of the dirty part of the board; its parts with a stain each, and cells for coverage; radius of a stain."""
+"""Extents of the dirty area of the board; its grid of stains, and grid of cells for coverage; radius of a stain."""
 LANES, LENGTH_M, PITCH_M, SPEED = 3, 0.36, 0.084, 0.15
-"""The path, and the speed along it [m/s]; in one of the lanes, a stain is wholly under the sponge."""
+"""The path, and the speed along it [m/s]; each stain is wholly under the sponge in one of the lanes."""
 OVER_M, PATIENCE_S = 0.05, 4.0
 """Height of the sponge over the board before and afterwards; longest time until it presses [s]."""
 FORCES_N, TOLERANCE, LEAST_WAY, LEAST_STAINS = (15.0, 25.0), 0.1, 0.95, 0.99
-"""Range of the force and its largest error; shares of the way with that force, and of the stains gone, in a success."""
+"""Range of the force and its largest error; shares of the path with that force and of removed stains for success."""
 
 
 class Wiping(Scene):
     """A KUKA LWR4+ wipes a board lane by lane; a controller in the tick holds the force.
 
     Attributes:
-        force: Normal force that is asked for [N].
+        force: Desired normal force [N].
         stains: Places of all stains on the board by name, shape (2,) [m].
-        left: Stains that are still there.
+        left: Stains that remain.
         stamps: Where the sponge was on the board, by cycle of the path.
         forces: Normal force of the sponge in these cycles [N].
         covered: Which cells of the board were wiped.
@@ -61,7 +61,7 @@ class Wiping(Scene):
         self.covered = np.zeros(CELLS, bool)
 
     def prepare(self) -> None:
-        """Tilts the board and all stains with it, and takes a sponge that is more or less soft and rough."""
+        """Tilts the board and its stains, and chooses stiffness and friction of the sponge."""
         x, y, about_x, about_y, yaw, stiffness, friction = self.random.uniform(*RANGES).tolist()
         turn = quaternion_product(quaternion_of((0.0, 0.0, yaw)), quaternion_of((about_x, about_y, 0.0)))
         board = Pose(plus(PIVOT, rotated(turn, (x, y, FACE_M))), turn)
@@ -72,7 +72,7 @@ class Wiping(Scene):
         self.change(f"kuka_lwr/{SPONGE}", contactStiffness=stiffness, contactDamping=100.0)
 
     def act(self) -> Iterator[None]:
-        """Goes over the board, presses, wipes lane by lane, and goes away."""
+        """Moves above the board, presses, wipes lane by lane, and retreats."""
         path = lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
         arm = yield from self._press(*path[0])
         board = self.sensed.poses["board"]
@@ -86,18 +86,18 @@ class Wiping(Scene):
         yield from arm.go(arm.target @ Pose((0.0, 0.0, -OVER_M)), 1.0)
 
     def beside(self) -> Iterator[None]:
-        """Presses the sponge onto the corner where lanes begin, and notes how a policy moves it from then on."""
+        """Presses the sponge onto the corner where lanes begin, and then records its motion by a policy."""
         arm = yield from self._press(*lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02)[0].tolist())
         while True:
             yield
             self._wipe(arm.pose())
 
     def has_succeeded(self) -> bool:
-        """Returns whether the force was held along the way, and the stains are gone."""
+        """Returns whether the force was held along the path, and the stains are removed."""
         return self._held() >= LEAST_WAY and self._gone() >= LEAST_STAINS
 
     def figures(self) -> dict[str, float]:
-        """Returns how the sponge pressed, and what it has reached."""
+        """Returns figures of the sponge's force and coverage."""
         return {
             "force [N]": self.force,
             "mean force [N]": float(np.mean(self.forces or [0.0])),
@@ -107,7 +107,7 @@ class Wiping(Scene):
         }
 
     def _press(self, x: float, y: float) -> Generator[None, None, LedArm]:
-        """Goes over a place of the board [m], and presses there; returns the arm."""
+        """Moves above a place of the board [m], and presses there; returns the arm."""
         board, arm = self.sensed.poses["board"], LedArm(self, *ARM)
         yield from arm.go(board @ Pose((x, y, OVER_M), FACING), 2.0)
         self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
@@ -121,7 +121,7 @@ class Wiping(Scene):
         return arm
 
     def _wipe(self, sponge: Pose) -> None:
-        """Notes where the sponge is and how it presses; what it wholly touches then vanishes from the board."""
+        """Records place and force of the sponge, and removes stains that it touches completely."""
         board, force = self.seen.poses["board"], self._normal_force()
         self.stamps.append(Stamp.of(board.inverse() @ sponge))
         self.forces.append(force)
@@ -142,9 +142,9 @@ class Wiping(Scene):
         return abs(force - self.force) <= TOLERANCE * self.force
 
     def _held(self) -> float:
-        """Returns the share of the way along which the force was held."""
+        """Returns the share of the path along which the force was held."""
         return share_of_way(self.stamps, [self._is_held(force) for force in self.forces])
 
     def _gone(self) -> float:
-        """Returns the share of the stains that are gone."""
+        """Returns the share of removed stains."""
         return 1.0 - len(self.left) / len(self.stains)

@@ -1,4 +1,4 @@
-"""Draws the force of the sponge along its way over the board, and what it has wiped, in an episode of `wiping`.
+"""Draws the force of the sponge along its path over the board, and the wiped area, in an episode of `wiping`.
 
 .venv/bin/python -m rpbi_examples.scenes.wiping_plot --seed 3 --out wiping.png
 """
@@ -34,7 +34,7 @@ def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
 
 
 def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
-    """Draws the normal force over the way, and the band in which it counts as held."""
+    """Draws the normal force over the path, and the band in which it counts as held."""
     low, high = ((1.0 + side * TOLERANCE) * scene.force for side in (-1.0, 1.0))
     axes.axhspan(low, high, color="0.92", label=f"within 10 %: {share:.1f} % of the way")
     axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"asked for: {scene.force:.1f} N")

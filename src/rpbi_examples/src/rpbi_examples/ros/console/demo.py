@@ -51,7 +51,7 @@ STOP_TIMEOUT_S = 30.0
 DRAW_S = 2.0
 """Time of the measurement of the drawing rate [s]."""
 ENDINGS = (signal.SIGTERM, signal.SIGHUP)
-"""Signals that end the demo as Ctrl-C does, so that no node is left."""
+"""Signals that end the demo as Ctrl-C does, with all of its nodes."""
 
 
 def demo(
@@ -75,13 +75,13 @@ def demo(
         raise UsageError(f"--seconds: expected 2 to 3600, got {seconds:g}")
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
     for number in ENDINGS:
-        if signal.getsignal(number) == signal.SIG_DFL:  # nohup has one of them ignored
+        if signal.getsignal(number) == signal.SIG_DFL:  # nohup ignores one of them
             signal.signal(number, _leave)
     return _demo(out.resolve(), seconds, headless or not os.environ.get("DISPLAY"), strict)
 
 
 def _leave(number: int, _: object) -> None:
-    """Leaves by way of all `with` blocks, which no second signal is to cut short."""
+    """Ends the program through all `with` blocks, and ignores further signals."""
     for each in ENDINGS:
         signal.signal(each, signal.SIG_IGN)
     sys.exit(128 + number)
@@ -112,7 +112,7 @@ def _demo(out: Path, seconds: float, headless: bool, strict: bool) -> int:
 
 @contextmanager
 def _example(headless: bool, log: Path) -> Iterator[None]:
-    """Launches the example on a ROS master of its own, apart from all other nodes, and ends it."""
+    """Launches the example on a separate ROS master, and ends it."""
     port = unused_port()
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"
@@ -136,7 +136,7 @@ def _example(headless: bool, log: Path) -> Iterator[None]:
 
 
 def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
-    """Waits until the arm is about to get targets, which is the last step of the start."""
+    """Waits until the node that sends the arm's targets is up, which starts last."""
     end_s = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < end_s and process.poll() is None:
         if _is_published(TARGETS) and _is_published(COLOUR):
@@ -147,7 +147,9 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
 
 
 def _start_world() -> None:
-    """Starts the world; by a process of its own, since rospy, waiting for a service, swallows exceptions of signals."""
+    """Starts the world in a separate process, since rospy swallows exceptions of signals while it waits for a
+    service.
+    """
     command = ["rosservice", "call", "/rpbi/start"]
     try:
         answer = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S)
@@ -166,7 +168,7 @@ def _is_published(topic: str) -> bool:
 
 
 def _expected_rates() -> dict[str, float]:
-    """Returns the rate of each topic [Hz], from the files that the example is made of."""
+    """Returns the rate of each topic [Hz] as configured in the files of the example."""
     world = load_world(WORLD)
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     robot = configs["kuka_lwr"]
@@ -186,7 +188,7 @@ def _expected_rates() -> dict[str, float]:
 def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path) -> dict[str, Any]:
     """Writes tables, pictures and the summary, and returns the summary.
 
-    Rates are those of the last seconds: before, the recorder was connecting, on a busy machine for long.
+    Rates are those of the last seconds, since the recorder may need long to connect on a busy machine.
     """
     tables = bag_to_dataframes(bag, [STATES, TARGETS, WRIST, CONTACTS, "/clock", "/diagnostics"])
     states, targets, clock = tables[STATES], tables[TARGETS], tables["/clock"]["clock"]
@@ -202,7 +204,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
     friction = _friction(world, "box", "floor") * demo_report.contact_force(tables[CONTACTS], "floor")
     demo_report.plot_forces(push, friction, tables[WRIST], states.index[0], out / "forces.png")
     assert world.config.rgbd_sensor is not None
-    for picture in (out / "colour.png", out / "depth.png"):  # a very busy machine may draw none
+    for picture in (out / "colour.png", out / "depth.png"):  # on a very busy machine there may be none
         picture.unlink(missing_ok=True)
     colour, depth = _middle_image(bag, COLOUR, np.uint8, 3), _middle_image(bag, DEPTH, np.float32, 1)
     if colour is not None:
@@ -227,13 +229,13 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
 
 def _friction(world: LoadedWorld, *names: str) -> float:
-    """Returns the coefficient of friction between two objects: the product of their own, as PyBullet has it."""
+    """Returns the coefficient of friction between two objects: the product of both coefficients, as in PyBullet."""
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     return math.prod(configs[name].changeDynamics.lateralFriction for name in names)
 
 
 def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
-    """Returns the reported state of the simulator while it ran, once a second."""
+    """Returns the state that the simulator reported once a second while it ran."""
     own = table[table["name"].str.endswith(": simulation") & (table["message"] != "stopped")]
     overruns = own["values/overruns_total"].astype(int)
     return {
@@ -244,13 +246,13 @@ def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _messages(bag: Path, since_s: float) -> dict[str, int]:
-    """Returns how many messages of each topic were recorded from a time on [s of ROS time]."""
+    """Returns the number of messages of each topic that were recorded after a time [s of ROS time]."""
     with BagReader(bag) as recording:
         return Counter(each.topic for each in recording.messages(recording.types) if each.record_time_s >= since_s)
 
 
 def _static_pose(bag: Path, frame: str) -> Pose:
-    """Returns where the recording has a frame that does not move, in the world."""
+    """Returns the pose in the world of a static frame of the recording."""
     with BagReader(bag) as recording:
         for each in recording.messages(["/tf_static"]):
             message = TFMessage()

@@ -20,12 +20,12 @@ WRITERS = (
 
 
 def files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file of a workspace that follows from the code."""
+    """Returns the text of each file of a workspace that is generated from the code."""
     return {path: text for writer in WRITERS for path, text in pkgutil.resolve_name(writer)(root).items()}
 
 
 def docs() -> None:
-    """Writes the schemas for editors and the reference pages anew, from the code."""
+    """Generates the schemas for editors and the reference pages from the code."""
     root = workspace()
     for path, text in files(root).items():
         path.parent.mkdir(exist_ok=True)

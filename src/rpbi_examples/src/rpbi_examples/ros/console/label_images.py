@@ -23,8 +23,8 @@ def label_images(
 
         ./rpbi label_images --images 100 --out clutter
 
-    It needs no ROS master. For each image the objects of the world fall at random, and a camera at a random place
-    looks at them once they are at rest. The data set is in the BOP format, with a COCO file; see docs/datasets.md.
+    It needs no ROS master. For each image, the objects of the world fall from random poses. A camera at a random place
+    then draws them at rest. The data set is in the BOP format, with a COCO file; see docs/datasets.md.
 
     Args:
         WORLD.yaml: a world with a camera and objects; that of the example `clutter` without it

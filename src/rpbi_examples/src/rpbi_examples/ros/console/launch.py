@@ -38,7 +38,7 @@ WORLDS = (".yaml", ".yml")
 WORLD = "world"
 """Launch file that runs a world of the user's."""
 PRINTS = ("--files", "--args", "--nodes", "--find-node", "--dump-params", "--ros-args")
-"""Options of `roslaunch` with which it prints something and starts nothing."""
+"""Options with which `roslaunch` prints something and starts no node."""
 ANNOUNCE_PERIOD_S = 0.5
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
@@ -49,7 +49,8 @@ def launch(
 ) -> int:
     """Runs an example, a world of your own or a launch file, until Ctrl-C; without a name, it lists the examples.
 
-    An argument that the launch file lacks is refused, with those that it has. The exit code is 1 if a node that the
+    An argument that the launch file lacks is refused; the message lists its arguments. The exit code is 1 if a node
+    that the
     launch file calls required has ended with an error.
 
     ROS stops a running simulator when another one of the same name starts, so that is refused. Either give the second a
@@ -136,7 +137,7 @@ class _Parent(ROSLaunchParent, ProcessListener):
         threading.Thread(target=self._announce, daemon=True).start()
 
     def _announce(self) -> None:
-        """Prints the commands for a running world as soon as one of the nodes answers them."""
+        """Prints the commands for a running world as soon as a simulator answers them."""
         nodes = {rosgraph.names.ns_join(node.namespace, node.name) for node in self.config.nodes}
         while self.pm is not None and not self.pm.is_shutdown:
             if (namespace := simulator_namespace(nodes, self.config.master.uri)) is not None:
@@ -149,13 +150,15 @@ class _Parent(ROSLaunchParent, ProcessListener):
             time.sleep(ANNOUNCE_PERIOD_S)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Notes the end of a process by itself; its name is that of the node, and a number."""
+        """Records the name of a process that has ended; it consists of the node's name and a number."""
         required = {f"{node.namespace}{node.name}".strip("/") for node in self.config.nodes if node.required}
         self.has_failed |= bool(exit_code) and process_name.rpartition("-")[0] in required
 
 
 def _controls_of(world: str, given: Iterable[str]) -> list[str]:
-    """Returns the arguments for the key `controls` of a world's file, unless they are given; a fault is the node's."""
+    """Returns launch arguments for the key `controls` of a world's file, unless they are given; the node reports faults
+    of the file.
+    """
     try:
         config = load_config(find_file(world, str(Path.cwd() / world)))
     except (InterfaceError, ValueError):
@@ -174,7 +177,7 @@ def _purpose(path: Path) -> str:
 
 
 def _options() -> argparse.ArgumentParser:
-    """Returns the parser of the options that are not roslaunch's alone."""
+    """Returns the parser of the options that `launch` adds to those of roslaunch."""
     parser = argparse.ArgumentParser(prog="launch", add_help=False, allow_abbrev=False)
     parser.add_argument("--ns")
     parser.add_argument("--replace", action="store_true")
@@ -186,17 +189,17 @@ def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str])
     """Raises an UnknownNameError for an argument that a launch file lacks, which roslaunch would ignore."""
     for argument in arguments:
         name, is_given, _ = argument.partition(":=")
-        if is_given and name not in known and not name.startswith("_"):  # those are ROS's own, such as __ns
+        if is_given and name not in known and not name.startswith("_"):  # reserved by ROS, such as __ns
             raise UnknownNameError(f"argument of {path.stem}", name, known)
 
 
 def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Returns the arguments of roslaunch that stand for the options."""
+    """Returns the arguments of roslaunch that the options translate to."""
     added = [] if options.port is None else ["-p", str(options.port)]
     if options.ns is None:
         return added
     namespace = options.ns.strip("/")
-    # a master has one clock, and TF no namespaces
+    # a master has one clock, and TF has no namespaces
     values = {"tf_prefix": namespace, "use_sim_time": "false"}
     names = {argument.partition(":=")[0] for argument in given}
     missing = [f"{name}:={value}" for name, value in values.items() if name in known and name not in names]
@@ -204,10 +207,9 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
 
 def _make_way(file: Path, options: argparse.Namespace) -> None:
-    """Sees to it that the launch file stops no simulator that runs, unless it is to replace that.
+    """Refuses a launch file that would stop a running simulator, unless it is to replace it.
 
-    Raises:
-        InterfaceError: If it would stop one, or run beside one that is the clock of their master.
+    Raises: InterfaceError: If it would stop one, or if another one already publishes the clock of this master.
     """
     master = master_of(options.port)
     if options.ns is not None and (clock := clocks(master)):

@@ -15,7 +15,7 @@ from custom_ros_tools.errors import UnknownNameError
 from rpbi_examples.scenes import SCENES
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, as of a shell."""
+"""Exit code after Ctrl-C, as in a shell."""
 
 
 def score(
@@ -31,8 +31,9 @@ def score(
 
         ./rpbi score cup --seeds 1-100 --json cup.json
 
-    It needs no ROS master. Success is judged by the state of the simulation. A seed leads to the same episode in any
-    process, and in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed episodes are
+    It needs no ROS master. Success is determined from the state of the simulation. A seed leads to the same episode in
+    any process, also in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed
+    episodes are
     in FOLDER/SCENE_failures.png. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
 
     Usage:
@@ -53,7 +54,7 @@ def score(
         raise UsageError(f"--jobs: expected at least 1, got {jobs}")
     from rpbi_examples.scenes.score import run_seeds, summary, write_failures, write_json  # needs Gymnasium
 
-    SCENES.find(scene)  # here, where what is missing is named
+    SCENES.find(scene)  # imported here for an error that names a missing extra
     results, code = [], 0
     period_s = 0.1 if sys.stderr.isatty() else 10.0
     try:

@@ -7,7 +7,7 @@ from custom_ros_tools.console.argument import Argument
 
 
 def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> None:
-    """Does only what every command does first: installs and builds what is missing.
+    """Installs and builds missing parts, as every command does first.
 
     Args:
         EXTRA: ik, mpc, tags, data, gym, farm, html, assets or notebook, which stays wanted; see docs/installation.md

@@ -18,11 +18,11 @@ WORDS = Argument("[--quick | --all] [PATH | OPTION OF PYTEST ...]", files="*", i
 def test(*words: Annotated[str, WORDS]) -> int:
     """Runs the tests, or those chosen as for pytest, in parallel workers.
 
-    Without options these are the tests of what a change can break. Tests with the mark `thorough` run only with
+    The default tests are those that a change can break. Tests with the mark `thorough` run only with
     --all, also when their file or their own name is given as PATH.
 
-    A run without PATH installs all extras first, 1.8 GB. Chosen tests install nothing but what every command needs, and
-    those that miss an extra are skipped with its name.
+    A run without PATH installs all extras first, 1.8 GB. With PATH, no extra is installed; tests that need a missing
+    extra are skipped, and the reason names it.
 
     A run ends with the time of each folder, of the slowest files and of the slowest tests.
 

@@ -1,1 +1,1 @@
-"""Nodes of `lfd.launch`: the lesson, and the scripted person."""
+"""Nodes of `lfd.launch`: learning from demonstration, and the scripted person."""

@@ -1,4 +1,4 @@
-"""The arm of the lesson: goes to places, follows the teleoperated frame, and follows plans."""
+"""The arm that learns: it moves to places, follows the teleoperated frame, and follows plans."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ HOME_S, START_S = 2.0, 1.0
 """Time to get there, and from there to a start [s]."""
 SIGNAL_HZ = 50.0
 RETURN_RATE = 3.0
-"""Speed towards the plan for each metre of the target beside it [1/s]."""
+"""Speed towards the plan per metre of the target's distance from it [1/s]."""
 LAG_M, SLACK_M = 0.02, 0.01
 """Lag of the tip behind the plan that is normal, and further lag that halves the speed of the plan [m].
 
 The plan waits for the arm by phase stopping: Ijspeert et al., Dynamical Movement Primitives, Neural Computation 25(2).
 """
 MIN_PACE = 0.1
-"""Least speed of the plan, so that it ends although the arm cannot follow."""
+"""Least speed of the plan, so that it ends even if the arm cannot follow."""
 BEYOND_M = 0.02
-"""Length by which a plan may leave the limits of teleoperation, where the target stops [m]."""
+"""Tolerance by which a plan may exceed the limits of teleoperation, at which the target stops [m]."""
 END_S = 0.5
 """Time for which the last place is kept [s]."""
 
@@ -68,7 +68,7 @@ class Arm:
         self._limits = np.array([limits.xlim, limits.ylim])
 
     def home(self) -> None:
-        """Raises the tip, so that it is nowhere near the box; the arm follows nothing afterwards."""
+        """Raises the tip far above the box; afterwards, the arm follows no target."""
         self._switch(False)
         self._move(JointState(name=list(HOME), position=list(HOME.values())), HOME_S)
 
@@ -106,8 +106,8 @@ class Arm:
                 )
 
     def follow(self, plan: PushPlan) -> None:
-        """Moves the target along a plan by velocities, as a person does, and returns at its end."""
-        call_service("operator_node/toggle", SetBool, False)  # the person does not steer meanwhile
+        """Moves the target along a plan by velocities, as a person does; returns at the end of the plan."""
+        call_service("operator_node/toggle", SetBool, False)  # signals of the person are ignored meanwhile
         try:
             now, rate = rospy.Time.now(), rospy.Rate(SIGNAL_HZ)
             begin, phase_s = now, 0.0
@@ -128,7 +128,7 @@ class Arm:
             call_service("operator_node/toggle", SetBool, True)
 
     def _pace(self, planned: Array) -> float:
-        """Returns the speed of a plan's time, less than 1 while the tip is far from where it shall be."""
+        """Returns the speed of the plan's time; it is less than 1 while the tip is far from the plan."""
         message = self._tf.get_tf_msg(ORIGIN, TIP)
         if message is None:
             return 1.0
@@ -137,7 +137,7 @@ class Arm:
         return max(1.0 / (1.0 + (max(lag - LAG_M, 0.0) / SLACK_M) ** 2), MIN_PACE)
 
     def _switch(self, on: bool) -> None:
-        """Switches on or off that the arm follows the person."""
+        """Switches on or off whether the arm follows the person."""
         if on != self._follows_person:
             for toggle in self._toggles:
                 call_service(toggle, SetBool, on)

@@ -1,4 +1,4 @@
-"""The box that is pushed: dropped in, taken away, and where it is."""
+"""The box that is pushed: adds and removes it, and looks up its pose."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .arm import ORIGIN, planar
 FILE, NAME = "{rpbi_examples}/configs/lfd/box.yaml", "pushing_box"
 FRAME, GOAL = f"rpbi/{NAME}", "rpbi/visual_goal"
 REST_S, MAX_DROP_S = 0.5, 5.0
-"""Time for which the box has to lie still, and longest time until it does [s]."""
+"""Time for which the box has to be at rest, and longest time until it is [s]."""
 REST_M = 0.0005
-"""Distance by which a box that lies still may move meanwhile [m]."""
+"""Distance by which a box at rest may move meanwhile [m]."""
 POLL_S = 0.05
 
 
 class PushedBox:
-    """The box of the lesson.
+    """The box that is pushed.
 
     Attributes:
         is_there: Whether it is in the world.
@@ -39,7 +39,7 @@ class PushedBox:
         self.is_there = False
 
     def drop(self) -> None:
-        """Drops it in, and waits until it lies still.
+        """Adds the box above the floor, and waits until it is at rest.
 
         Raises:
             InterfaceError: If it cannot be added, or does not come to rest.
@@ -58,17 +58,17 @@ class PushedBox:
                 still_s, last = rospy.get_time(), pose
 
     def remove(self) -> None:
-        """Takes it away, if it is there."""
+        """Removes the box, if it is in the world."""
         if self.is_there:
             call_service("rpbi/remove_pybullet_object", SetString, NAME)
             self.is_there = False
 
     def error(self) -> BoxError:
-        """Returns how far it is from its goal now."""
+        """Returns its present error from the goal."""
         return BoxError.of(*TfInterface.msg_to_pos_quat(self._pose_in(GOAL)))
 
     def _pose_in(self, frame: str) -> TransformStamped:
-        """Returns its pose in a frame, not older than this call: TF keeps that of an earlier box."""
+        """Returns its pose in a frame, not older than this call, since TF keeps poses of an earlier box."""
         now = rospy.Time.now()
         while (message := self._tf.wait_for_tf_msg(frame, FRAME)) is None or message.header.stamp < now:
             time.sleep(POLL_S)

@@ -1,4 +1,6 @@
-"""`run_lfd.py`: learns from a person how to push a box, plans from random starts, executes, and draws what happened."""
+"""`run_lfd.py`: learns from a person to push a box, plans from random starts, executes the plans, and draws the
+results.
+"""
 
 from __future__ import annotations
 
@@ -39,19 +41,19 @@ LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
 """Classes that learn and plan, by value of the launch file's argument `dmp`."""
 DEMONSTRATING = "demonstrating"
 AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
-"""State after a step that failed, by the state before."""
+"""State after a failed step, by the state before the step."""
 ORIGIN_PLACE = np.zeros(2)
 MAX_OFFSET_M = 0.1
 """Largest distance of a random start from the origin, along x and y [m]."""
 NEAR_ORIGIN_M = 0.03
 """Distance of the tip from the origin up to which a demonstration may begin [m]."""
 QUIET_S = 15.0
-"""Wall time of a demonstration without motion after which it is reported [s]."""
+"""Wall time without motion in a demonstration after which a warning is logged [s]."""
 POLL_S = 0.05
 
 
-class Lesson:
-    """Does what keys ask for, one after the other, and publishes on `lfd/state` what it is ready for."""
+class LfdNode:
+    """Carries out the requests of keys one after the other, and publishes on `lfd/state` which key it expects."""
 
     def __init__(self) -> None:
         self._out = Path(rospy.get_param("~out", "lfd"))
@@ -85,7 +87,7 @@ class Lesson:
         rospy.Subscriber("joy", Joy, self._on_joy, queue_size=100)
 
     def run(self) -> None:
-        """Acts until ROS shuts down, or until the wanted number of executions.
+        """Runs until ROS shuts down, or until the requested number of executions.
 
         Raises:
             InterfaceError: If the box was not at its goal after one of them.
@@ -135,7 +137,7 @@ class Lesson:
         self._state.publish(name)
 
     def _idle(self) -> None:
-        """Keeps windows alive, and warns of a demonstration in which nothing happens."""
+        """Updates windows, and warns of a demonstration without motion."""
         if self._plots and self._executed:
             from matplotlib import pyplot
 
@@ -146,10 +148,10 @@ class Lesson:
             if math.hypot(tip.x, tip.y) < NEAR_ORIGIN_M:
                 rospy.logwarn("no input moves the tip for %g s: does the window of the device have the focus?", QUIET_S)
 
-    # --- The steps of the lesson
+    # --- The steps
 
     def _home(self) -> None:
-        """Raises the arm, takes the box away and goes to the origin; a demonstration is discarded."""
+        """Raises the arm, removes the box and moves to the origin; an unfinished demonstration is discarded."""
         if self._name == DEMONSTRATING:
             rospy.loginfo("discarded: %s", discard_episode())
         self._become("moving")
@@ -176,7 +178,7 @@ class Lesson:
         return not self._box.is_there and max(math.hypot(*each[:2]) for each in (tip, target)) < NEAR_ORIGIN_M
 
     def _last_contact(self) -> Array:
-        """Returns where the tip is when it has pushed the box to the goal along a straight line [m]."""
+        """Returns the place of the tip after it has pushed the box to the goal along a straight line [m]."""
         goal = np.array([self._goal.x, self._goal.y])
         return np.asarray(goal * (1.0 - (HALF_SIDE_M + TIP_RADIUS_M) / np.linalg.norm(goal)))
 
@@ -202,7 +204,7 @@ class Lesson:
         self._become("learned")
 
     def _execute(self) -> None:
-        """Plans from a random start, goes there first, and then executes the plan."""
+        """Plans from a random start, moves there, and executes the plan."""
         assert self._skill is not None
         start = self._random.uniform(-MAX_OFFSET_M, MAX_OFFSET_M, 2)
         self._become("executing")
@@ -219,11 +221,11 @@ class Lesson:
         self._become("executed")
 
     def _pose(self, frame: str) -> PlanarPose:
-        """Returns where a frame is in the person's frame."""
+        """Returns the pose of a frame in the person's frame."""
         return planar(self._tf.wait_for_tf_msg(ORIGIN, frame))
 
     def _prepare(self, start: Array) -> None:
-        """Raises the arm, takes the box away and moves the tip to a start."""
+        """Raises the arm, removes the box and moves the tip to a start."""
         self._arm.home()
         self._box.remove()
         self._arm.go_to(start)
@@ -272,4 +274,4 @@ class Lesson:
 
 def main() -> None:
     """Runs the node."""
-    run_node("run_lfd", lambda: Lesson().run())
+    run_node("run_lfd", lambda: LfdNode().run())

@@ -1,4 +1,4 @@
-"""`lfd_person.py`: a scripted person, who presses keys as the keyboard's node publishes them, or those of a window."""
+"""`lfd_person.py`: a scripted person, who publishes keys as the keyboard's node does, or presses keys of its window."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NEXT_KEY = {
     "learned": "3",
     "executed": "3",
 }
-"""Key that is pressed in each state of the lesson."""
+"""Key that is pressed in each state."""
 DEMONSTRATING, DEMONSTRATE = "demonstrating", "2"
 MAX_TRIES = 4
 MAX_ANSWER_S = 5.0
@@ -42,10 +42,10 @@ Send = Callable[[bool, str], None]
 
 
 class ScriptedPerson:
-    """Demonstrates when it is time, and presses the key that comes next.
+    """Demonstrates when the node expects it, and presses the key that the state requires.
 
     Args:
-        send: Presses keys and lets them go.
+        send: Presses and releases keys.
     """
 
     def __init__(self, send: Send) -> None:
@@ -77,7 +77,7 @@ class ScriptedPerson:
         self._state = message.data
 
     def _wait_for_state(self) -> str:
-        """Waits until a key is expected, and returns the state of the lesson."""
+        """Waits until a key is expected, and returns the state."""
         rate = rospy.Rate(LOOK_HZ)
         while (state := self._state) not in NEXT_KEY:
             rate.sleep()
@@ -95,7 +95,7 @@ class ScriptedPerson:
         self._send(False, key)
 
     def _hold(self, down: Direction | None, up: Direction | None) -> None:
-        """Lets go of one key, and presses another."""
+        """Releases one key, and presses another."""
         if up is not None:
             self._send(False, up.name)
         if down is not None:
@@ -129,7 +129,7 @@ def window_keys() -> Send:
 
 
 def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | None, Direction | None], None]) -> None:
-    """Has a person push the box that TF shows; returns when the person is done.
+    """Makes a person push the box seen on TF; returns when the person is done.
 
     Args:
         hold: Called when the held key changes, with the key that goes down and the one that goes up.

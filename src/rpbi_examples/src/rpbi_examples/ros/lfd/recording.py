@@ -34,7 +34,7 @@ def begin_episode() -> str:
 
 
 def discard_episode() -> str:
-    """Discards the episode that is recorded, and returns where it is."""
+    """Discards the episode that is being recorded, and returns its folder."""
     return str(call_service("record/discard", Trigger).message)
 
 

@@ -1,1 +1,1 @@
-"""Scenes that act in the simulator of a ROS master."""
+"""Scenes in the simulator of a ROS master."""

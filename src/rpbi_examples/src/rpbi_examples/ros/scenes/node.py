@@ -1,4 +1,4 @@
-"""`scene_node.py`: a scene acts in the simulator, with one seed after the other."""
+"""`scene_node.py`: runs a scene in the simulator, with one seed after the other."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class SceneNodeConfig(ConfigModel):
     """Parameters of the node."""
 
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
-    seed: Count = Field(1, description="Seed of the first episode; each has the next one.")
+    seed: Count = Field(1, description="Seed of the first episode; each further one adds 1.")
     episodes: Count = Field(0, description="Number of episodes; 0: until it is stopped.")
     noise: Switch = Field(False, description="Whether poses are sensed with noise and delay.")
     real_time_factor: NonNegative = Field(1.0, description="Simulated seconds a second; 0: as fast as possible.")
@@ -42,7 +42,7 @@ def _run() -> None:
         stage.begin(scene)
         try:
             result = run_scene(scene, stage)
-        except InterfaceError as error:  # the reset of the next episode may mend its cause
+        except InterfaceError as error:  # the reset for the next episode may remove the cause
             result = broken_off(scene, error)
         succeeded += result.success
         _report(seed, result, stage)

@@ -1,4 +1,4 @@
-"""A scene's view of the simulator: topics tell what is there, services act."""
+"""A scene's access to the simulator: it observes by topics, and acts by services."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from rpbi.ros.services.prediction import POSE_NAMES
 from rpbi.ros.tick_listener import TickListener
 from rpbi_examples.scenes.scene import (
     Change,
-    Deed,
-    Put,
+    GainChange,
+    InputValue,
     Scene,
     Seen,
     SeenWrench,
@@ -37,8 +37,8 @@ from rpbi_examples.scenes.scene import (
     Switch,
     Teleport,
     Touch,
-    Tune,
     Watched,
+    WorldChange,
     tag_in_world,
 )
 
@@ -46,14 +46,14 @@ PATIENCE_S = 20.0
 """Longest wait for the messages of a tick, of wall time [s]."""
 WORLD = "rpbi/world"
 LATE_S = 0.1
-"""Time that is made up for after a delay [s]."""
+"""Longest delay that is caught up with [s]."""
 
 
 class SimulatorStage(Stage):
-    """Steps the simulator, and waits for what the scene sees of it.
+    """Steps the simulator, and waits for the messages that the scene needs.
 
-    Since the world waits for the scene, an episode goes as that of the same seed in another process, however slow the
-    computer is. When ROS shuts down, all methods raise a ROSInterruptException.
+    Since the world waits for the scene, an episode is equal to that of the same seed in another process, on any
+    computer. When ROS shuts down, all methods raise a ROSInterruptException.
 
     Args:
         watch: What scenes see.
@@ -84,25 +84,25 @@ class SimulatorStage(Stage):
         self._scene, self._begin_s = scene, time.monotonic()
         self._due_s = self._begin_s
         scene.prepare()
-        for deed in scene.take_deeds():
-            self.do(deed)
+        for change in scene.take_changes():
+            self.do(change)
 
-    def do(self, deed: Deed) -> None:
-        if isinstance(deed, Put):
-            self._inputs.append(_input(deed))
-        elif isinstance(deed, Teleport):
-            self._ask(f"rpbi/{deed.name}/set_pose", SetTransform, transform_message(*deed.pose))
-        elif isinstance(deed, Shove):
-            force = Wrench(force=Vector3(*deed.force))
-            self._ask("rpbi/apply_wrench", ApplyWrench, deed.target, force, Point(), "", deed.duration_s)
-        elif isinstance(deed, Change):
-            self._ask("rpbi/change_dynamics", ChangeDynamics, deed.target, json.dumps(deed.values))
-        elif isinstance(deed, Switch):
-            self._ask(f"rpbi/{deed.robot}/switch_controllers", SwitchControllers, deed.start, deed.stop)
-        elif isinstance(deed, Tune):
-            self._ask(f"rpbi/{deed.target}/set_gains", SetString, json.dumps(deed.values))
+    def do(self, change: WorldChange) -> None:
+        if isinstance(change, InputValue):
+            self._inputs.append(_input(change))
+        elif isinstance(change, Teleport):
+            self._ask(f"rpbi/{change.name}/set_pose", SetTransform, transform_message(*change.pose))
+        elif isinstance(change, Shove):
+            force = Wrench(force=Vector3(*change.force))
+            self._ask("rpbi/apply_wrench", ApplyWrench, change.target, force, Point(), "", change.duration_s)
+        elif isinstance(change, Change):
+            self._ask("rpbi/change_dynamics", ChangeDynamics, change.target, json.dumps(change.values))
+        elif isinstance(change, Switch):
+            self._ask(f"rpbi/{change.robot}/switch_controllers", SwitchControllers, change.start, change.stop)
+        elif isinstance(change, GainChange):
+            self._ask(f"rpbi/{change.target}/set_gains", SetString, json.dumps(change.values))
         else:
-            self._ask("rpbi/remove_pybullet_object", SetString, deed.name)
+            self._ask("rpbi/remove_pybullet_object", SetString, change.name)
 
     def cycle(self) -> None:
         answer = self._step(self._ticks)
@@ -160,7 +160,7 @@ class SimulatorStage(Stage):
         )
 
     def _camera(self, frame: str) -> Pose:
-        """Returns where a camera, which stands still, is in the world."""
+        """Returns the pose of a static camera in the world."""
         if frame not in self._cameras:
             assert self._tf is not None
             message = self._tf.wait_for_tf_msg(WORLD, frame, PATIENCE_S)
@@ -175,11 +175,11 @@ def _raise_if_shut_down() -> None:
         raise rospy.ROSInterruptException("ROS shuts down")
 
 
-def _input(deed: Put) -> PlannedInput:
-    value = deed.value
+def _input(change: InputValue) -> PlannedInput:
+    value = change.value
     if isinstance(value, Pose):
-        return PlannedInput(0, deed.slot, POSE_NAMES, (*value.position, *value.quat_xyzw))
-    return PlannedInput(0, deed.slot, tuple(value), tuple(value.values()))
+        return PlannedInput(0, change.slot, POSE_NAMES, (*value.position, *value.quat_xyzw))
+    return PlannedInput(0, change.slot, tuple(value), tuple(value.values()))
 
 
 def _pose(message: Any) -> Pose:

@@ -37,39 +37,38 @@ KINDS = {
     "block": Kind(0.03, 0.0175, math.pi, 0.34),
 }
 PARTS = {f"{name}_{number}": kind for name, kind in KINDS.items() for number in (1, 2)}
-"""Kinds of the parts, in the order of their tags, which begin with 1."""
+"""Kinds of the parts, in the order of their tag numbers, from 1."""
 
 
 def on_belt(tags: Mapping[int, Pose]) -> dict[str, Pose]:
-    """Returns the poses of the tags that are over the belt, by part."""
+    """Returns the poses of the tags above the belt, by part."""
     seen = {part: tags[number] for number, part in enumerate(PARTS, 1) if number in tags}
     return {part: tag for part, tag in seen.items() if abs(tag.position[0] - BELT_X_M) < BELT_HALF_M}
 
 
 def is_in_box(part: str, position: Vector) -> bool:
-    """Returns whether a part with its middle at a position [m] is in the compartment of its kind."""
+    """Returns whether a part at a position [m] is in the compartment of its kind."""
     x, y, z = position
     return abs(x - PARTS[part].x_m) < HALF_X_M and abs(y) < HALF_Y_M and FLOOR_Z_M < z < RIM_Z_M
 
 
 def missing(poses: Mapping[str, Pose]) -> list[str]:
-    """Returns the parts that are not in the compartment of their kind, by where all of them are in the world."""
+    """Returns the parts that are not in the compartment of their kind, from the positions of all parts in the world."""
     return [part for part in PARTS if not is_in_box(part, poses[part].position)]
 
 
 def grasp_yaw(kind: Kind, yaw: float, wanted: float) -> float:
-    """Returns the yaw of a hand that grasps a part at a yaw, of those that do the nearest to a wanted one [rad]."""
+    """Returns the yaw of a hand that grasps a part at a yaw; of several, the nearest to a desired one [rad]."""
     return yaw + kind.turn * round((wanted - yaw) / kind.turn) if kind.turn else wanted
 
 
 class Belt:
-    """Runs and stops with a constant acceleration, up to the end of its way.
+    """A belt that starts and stops with a constant acceleration, and stops at the end of its path.
 
     Args:
         scene: The scene that it is in.
         slot: Input of its targets.
-        joint: Its joint.
-        way_m: Its way [m].
+        joint: Its joint. way_m: Length of its path [m].
         speed: Its speed [m/s].
         acceleration: Its acceleration, which parts follow by friction [m/s^2].
 
@@ -90,11 +89,11 @@ class Belt:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it stands at the end of its way, but for where it has to brake."""
+        """Whether it has stopped at the end of its path, less its braking distance."""
         return not self.is_moving and self._at_m + self._braking_m(self._most) >= self._way_m
 
     def act(self) -> None:
-        """Moves on by the time since the last call."""
+        """Moves the belt by the time since the last call."""
         dt_s, self._time_s = self._scene.seen.time_s - self._time_s, self._scene.seen.time_s
         is_free = self._at_m + self._braking_m(self._most) < self._way_m
         change = self._acceleration * dt_s * (1.0 if self.is_on and is_free else -1.0)
@@ -103,5 +102,5 @@ class Belt:
         self._scene.put(self._slot, {self._joint: self._at_m})
 
     def _braking_m(self, speed: float) -> float:
-        """Returns the way to rest from a speed, v^2 / (2 a) [m]."""
+        """Returns the braking distance from a speed, v^2 / (2 a) [m]."""
         return speed**2 / (2.0 * self._acceleration)

@@ -1,4 +1,4 @@
-"""Two arms of one robot that keep a distance from each other, a zone for one of them at a time, and their grippers."""
+"""Two arms of one robot that keep a distance from each other, a zone that one arm at a time may enter, and grippers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from safe_robot.geometry.distances import LinkDistances
 from safe_robot.robot import GuardedRobot
 
 FAR_M = 0.5
-"""Distances beyond this are not looked for [m]."""
+"""Distances beyond this are not computed [m]."""
 DOWN = (0.0, 1.0, 0.0, 0.0)
 """Orientation of a hand at yaw 0: its z points down, its fingers move along y."""
 
 
 class TwoArms:
-    """Leads both arms, and holds one back while its next target would be too near to the other arm.
+    """Moves both arms, and stops one while its next target would be too near to the other arm.
 
     Args:
         scene: The scene that they act in.
@@ -61,7 +61,7 @@ class TwoArms:
         self._sent_m = self._distance_m({}, least_m)
 
     def send(self, name: str, pose: Pose) -> bool:
-        """Sends an arm to a pose in the world, unless it is too near to the other arm there and not on its way out.
+        """Sends an arm to a pose in the world, unless it would be too near to the other arm and not move away from it.
 
         Returns:
             Whether the arm was sent.
@@ -81,11 +81,11 @@ class TwoArms:
         return True
 
     def measured_m(self) -> float:
-        """Returns the distance between the arms as they are [m]; inf beyond `FAR_M`."""
+        """Returns the present distance between the arms [m]; inf beyond `FAR_M`."""
         return self._distance_m(self._scene.seen.joints[self._robot], FAR_M)
 
     def _distance_m(self, joints: Mapping[str, float], most_m: float) -> float:
-        """Returns the distance with some joints elsewhere than they were sent to [m]; inf beyond `most_m`."""
+        """Returns the distance with other positions for some joints [m]; inf beyond `most_m`."""
         sent = [position for arm in self.arms.values() for position in arm.positions]
         places = zip(self._names, [*sent, *self._joints.values()])
         self._distances.place(np.array([joints.get(name, position) for name, position in places]))
@@ -93,18 +93,18 @@ class TwoArms:
 
 
 class Zone:
-    """A zone that one arm at a time may be in."""
+    """A zone that one arm at a time may enter."""
 
     def __init__(self) -> None:
         self._owner = ""
 
     def take(self, name: str) -> bool:
-        """Lets an arm in if no other one is there; returns whether it may go there."""
+        """Reserves the zone for an arm if it is free; returns whether the arm may enter."""
         self._owner = self._owner or name
         return self._owner == name
 
     def leave(self, name: str) -> None:
-        """Tells that an arm is not there any more."""
+        """Releases the zone that an arm has left."""
         if self._owner == name:
             self._owner = ""
 
@@ -141,17 +141,19 @@ class Gripper:
         return self._arm.target
 
     def opening(self) -> float:
-        """Returns the way of each finger from where they meet [m]."""
+        """Returns the distance of each finger from the closed position [m]."""
         return self._scene.seen.joints[self._robot][self._finger]
 
     def open(self, way_m: float, duration_s: float) -> Iterator[Pose]:
-        """Sends both fingers to a way [m], by 0 with all their force, and waits."""
+        """Opens both fingers to a distance [m] and waits; 0 closes them with full force."""
         self._scene.put(f"{self._robot}/target", {self._finger: way_m})
         for _ in range(round(duration_s / self._cycle_s)):
             yield self._arm.target
 
     def go(self, position: Vector, yaw: float) -> Iterator[Pose]:
-        """Goes along a line to where it points down, from rest to rest, with the position [m] between the fingers."""
+        """Moves along a line from rest to rest, until the gripper points down with a position [m] between its
+        fingers.
+        """
         start, end = self._arm.target, Pose(position, quaternion_product(about_z(yaw), DOWN))
         way_s = norm(minus(end.position, start.position)) / self._speed
         turn_s = angle_between(start.quat_xyzw, end.quat_xyzw) / self._turn_speed

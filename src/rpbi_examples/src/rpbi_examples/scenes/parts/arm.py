@@ -1,4 +1,4 @@
-"""An arm that leads one of its links along lines."""
+"""An arm that moves one of its links along lines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
 
 class LedArm:
-    """Leads a link of a robot by the targets of its joints, from where the last target was.
+    """Moves a link of a robot by targets of its joints, from the last target on.
 
     Args:
         scene: The scene that it acts in.
@@ -50,7 +50,7 @@ class LedArm:
         self.target = self.pose()
 
     def pose(self) -> Pose:
-        """Returns where the link is in the world."""
+        """Returns the pose of the link in the world."""
         joints = self._scene.seen.joints[self._robot]
         return self._base @ self._solver.chain.pose([joints[name] for name in self.joint_names])
 
@@ -83,7 +83,7 @@ class LedArm:
         self._scene.put(self._slot, dict(zip(self.joint_names, self._positions)))
 
     def go(self, pose: Pose, duration_s: float) -> Iterator[None]:
-        """Goes along a line to a pose in the world, from rest to rest; used as `yield from arm.go(...)`."""
+        """Moves along a line to a pose in the world, from rest to rest; used as `yield from arm.go(...)`."""
         start, begin_s = self.target, self._scene.seen.time_s
         while (share := (self._scene.seen.time_s - begin_s) / duration_s) < 1.0:
             self.send(between(start, pose, smooth(share)))
@@ -105,7 +105,7 @@ class LedArm:
 
 
 def smooth(share: float) -> float:
-    """Returns the share of a way after a share of its time: a polynomial of degree 5, from rest to rest.
+    """Returns the share of a distance covered after a share of the time: a polynomial of degree 5, from rest to rest.
 
     T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5(7), 1985.
     """
@@ -114,7 +114,7 @@ def smooth(share: float) -> float:
 
 
 def between(start: Pose, end: Pose, share: float) -> Pose:
-    """Returns the pose at a share of the way, on a line and by the shortest turn."""
+    """Returns the pose at a share of the distance, on a line and by the shortest rotation."""
     position = plus(start.position, scaled(share, minus(end.position, start.position)))
     turn = quaternion_of(scaled(share, rotation_between(start.quat_xyzw, end.quat_xyzw)))
     return Pose(position, quaternion_product(turn, start.quat_xyzw))

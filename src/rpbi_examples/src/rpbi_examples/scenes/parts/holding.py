@@ -1,4 +1,6 @@
-"""Who holds a thing, by its contacts; whether it is still; and a Panda that closes its gripper until it feels it."""
+"""The holders of a thing, from its contacts; whether it is at rest; and a Panda that closes its gripper until
+contact.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +17,20 @@ from .arm import LedArm, about_z, between, smooth
 CYCLE_S = 0.02
 """Time of a cycle [s]."""
 STILL_S = 0.5
-"""Time after which something is still that has not moved [s]."""
+"""Time without motion after which a thing counts as at rest [s]."""
 FINGER, FINGER_LINKS = "panda_finger_joint1", {"panda_leftfinger", "panda_rightfinger"}
-"""The finger of a Panda that the other one mimics, which opens from 0 on; and the links of both."""
+"""The finger of a Panda that the other one mimics; it is closed at 0. And the links of both fingers."""
 APPROACH = Pose(quat_xyzw=(0.0, math.sin(math.radians(-55.0)), 0.0, math.cos(math.radians(-55.0))))
 BEFORE = Pose((0.0, 0.0, -0.14))
-"""The gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, seen from there."""
+"""Pose of the gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, relative to
+that.
+"""
 FINGER_SPEED, PRESS_S = 0.04, 0.3
-"""Speed of each finger [m/s], and for how long the fingers press before they are taken to hold."""
+"""Speed of each finger [m/s], and time for which the fingers press before the grasp counts as firm."""
 
 
 class Holders:
-    """Notes in every cycle what touches a thing.
+    """Records in every cycle which bodies touch a thing.
 
     Args:
         scene: The scene that it is in.
@@ -46,7 +50,7 @@ class Holders:
         self._since_s = 0.0
 
     def note(self) -> None:
-        """Notes what touches it in this cycle."""
+        """Records the bodies that touch it in this cycle."""
         names = frozenset(touch.other for touch in self._scene.seen.contacts[self._thing])
         if names != self.names:
             self.names, self._since_s = names, self._scene.seen.time_s
@@ -56,7 +60,7 @@ class Holders:
             self.alone_s[name] = max(self.alone_s.get(name, 0.0), self.has_lasted_s())
 
     def watch(self, act: Iterator[None], hands: Collection[str]) -> Iterator[None]:
-        """Goes on with an act while nothing but hands has touched the thing.
+        """Continues an action while only hands touch the thing.
 
         Raises:
             SceneFailedError: If something else touches it.
@@ -67,11 +71,11 @@ class Holders:
             yield
 
     def has_lasted_s(self) -> float:
-        """Returns for how long the same bodies have touched it [s]."""
+        """Returns the time for which the same bodies have touched it [s]."""
         return self._scene.seen.time_s - self._since_s
 
     def is_alone(self, name: str, duration_s: float) -> bool:
-        """Returns whether a body alone has touched it for some time [s]."""
+        """Returns whether only one body has touched it for a time [s]."""
         return self.names == {name} and self.has_lasted_s() >= duration_s
 
     def force(self, name: str) -> float:
@@ -83,24 +87,24 @@ class Holders:
         return {touch.other_link for touch in self._scene.seen.contacts[self._thing]}
 
 
-class Still:
-    """Notes in every cycle where something is, to tell whether it stays there."""
+class RestDetector:
+    """Records the positions of a thing in every cycle, and decides whether it is at rest."""
 
     def __init__(self) -> None:
         self._places: deque[Vector] = deque(maxlen=round(STILL_S / CYCLE_S))
 
     def note(self, place: Vector) -> None:
-        """Notes where it is [m]."""
+        """Records its position [m]."""
         self._places.append(place)
 
     def is_within(self, way_m: float) -> bool:
-        """Returns whether it has been within a way of where it is now, for `STILL_S`."""
+        """Returns whether it was within a distance of its present position for `STILL_S`."""
         is_known = len(self._places) == self._places.maxlen
         return is_known and all(norm(minus(self._places[-1], each)) < way_m for each in self._places)
 
 
 class PandaArm(LedArm):
-    """A Panda, led by the point between its fingers, which feel what touches them.
+    """A Panda, moved by the point between its fingers, whose contacts are known.
 
     Args:
         scene: The scene that it acts in.
@@ -112,7 +116,7 @@ class PandaArm(LedArm):
         super().__init__(scene, robot, "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget", base)
 
     def follow(self, goal: Callable[[], Pose], duration_s: float) -> Iterator[None]:
-        """Goes to a goal that may move meanwhile, as `go` does.
+        """Moves to a goal that may move meanwhile, as `go` does.
 
         Raises:
             SceneFailedError: If it is out of reach.
@@ -124,7 +128,7 @@ class PandaArm(LedArm):
             yield
 
     def opening(self) -> float:
-        """Returns the way of each finger [m]."""
+        """Returns the opening of each finger [m]."""
         return self._scene.seen.joints[self._robot][FINGER]
 
     def close_on(self, holders: Holders) -> Iterator[None]:
@@ -144,7 +148,7 @@ class PandaArm(LedArm):
         yield from self._scene.wait(PRESS_S)
 
     def open(self, opening_m: float) -> Iterator[None]:
-        """Opens both fingers, so slowly that they push nothing away."""
+        """Opens both fingers slowly, so that they push nothing away."""
         target_m = self.opening()
         while target_m < opening_m:
             target_m = min(target_m + FINGER_SPEED * CYCLE_S, opening_m)
@@ -156,12 +160,14 @@ class PandaArm(LedArm):
 
 
 def above(place: Vector, height_m: float) -> Vector:
-    """Returns the place that is higher by a height [m]."""
+    """Returns a place raised by a height [m]."""
     return plus(place, (0.0, 0.0, height_m))
 
 
 def upright_grasp(thing: Pose, height_m: float) -> Pose:
-    """Returns a gripper at a height above the origin of a thing that stands [m], from where its x axis points."""
+    """Returns the pose of a gripper at a height above the origin of an upright thing [m], from the side of its x
+    axis.
+    """
     return Pose(above(thing.position, height_m), about_z(yaw_of(thing.quat_xyzw))) @ APPROACH
 
 

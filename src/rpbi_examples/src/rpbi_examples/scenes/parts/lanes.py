@@ -1,4 +1,4 @@
-"""Areas that a rectangular tool goes over lane by lane."""
+"""Areas that a rectangular tool covers lane by lane."""
 
 from __future__ import annotations
 
@@ -73,8 +73,7 @@ def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:
     Args:
         count: Number of lanes; they are parallel to y, and about the origin.
         length: Length of a lane [m].
-        pitch: Way between lanes [m].
-        step: Way from place to place [m], rounded to divide the path.
+        pitch: Distance between lanes [m]. step: Distance between places [m], rounded to divide the path.
 
     Returns:
         Shape (n, 2) [m].
@@ -105,7 +104,7 @@ def middles(size: tuple[float, float], count: tuple[int, int]) -> np.ndarray:
 
 
 def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
-    """Returns the way from the first place to each, along the path.
+    """Returns the distance from the first place to each, along the path.
 
     Args:
         places: At least one; x and y [m] of each come first.
@@ -118,10 +117,10 @@ def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
 
 
 def share_of_way(places: Sequence[Sequence[float]], holds: Sequence[bool]) -> float:
-    """Returns the share of the way along which something holds, by whether it does at the end of each step.
+    """Returns the share of the path along which a condition holds, from its value at the end of each step.
 
     Args:
         places: x and y [m] of each come first.
-        holds: For each place.
+        holds: Whether the condition holds, for each place.
     """
     return float(np.average(holds[1:], weights=np.diff(ways_along(places)))) if len(places) > 1 else 0.0

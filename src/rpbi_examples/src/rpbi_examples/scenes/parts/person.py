@@ -11,23 +11,25 @@ from robot_model.geometry import Pose, plus, quaternion_of, quaternion_product
 from rpbi_examples.scenes.scene import Scene
 
 from .arm import LedArm, between, smooth
-from .holding import Still
+from .holding import RestDetector
 
 NAME, URDF, ROOT = "human", "{rpbi_examples}/robots/human_hands.urdf", Pose((0.0, 0.0, 0.9275))
 """The avatar in its world, its URDF, and where its trunk is."""
 LEFT_HAND = Pose((0.0, 0.36, 0.0))
 """Middle of the left hand in the frame of its forearm."""
 OUT_X_M, CALM_M = 0.34, 0.008
-"""The place beyond which the palm is held out, and the way within which it is still in spite of its sway."""
+"""The place beyond which the palm counts as held out, and the distance within which the swaying palm counts as at
+rest.
+"""
 SWAY_HZ, TREMOR_HZ = 0.4, 8.0
 SWAY_M, TREMOR_M, SWAY_RAD = 2.5e-3, 2e-4, 0.01
 """Amplitudes of sway and tremor along each axis, and of the sway about it."""
 RAISED = {"Shoulder_rotx": -35.0, "Shoulder_roty": -90.0, "Elbow_rotz": -115.0}
 """Joints of the left arm that waves [deg]; the others are at 0."""
 WAVE_DEG, WAVE_S, RAISE_S = 25.0, 0.8, 1.0
-"""Amplitude of the elbow, period of a wave, and time that raising or lowering the arm takes."""
+"""Amplitude of the elbow, period of a wave, and time to raise or lower the arm."""
 SHOULDER_M, MIDDLE_M, SWING_M = 1.43, 0.55, 0.08
-"""Height of the shoulders, where the left hand waves along y, and how far a swing goes at least to each side."""
+"""Height of the shoulders, at which the left hand waves along y, and least distance of a swing to each side."""
 
 
 class SwayingPerson:
@@ -39,7 +41,8 @@ class SwayingPerson:
 
     Attributes:
         target: The pose around which the palm sways, in the world: z out of the palm, x along the fingers.
-        swings: How often the raised left hand has gone from one side to the other, as the joints have it.
+        swings: Number of times that the raised left hand has moved from one side to the other, from the joints'
+            positions.
     """
 
     def __init__(self, scene: Scene, random: np.random.Generator) -> None:
@@ -48,14 +51,14 @@ class SwayingPerson:
         self._left = LedArm(scene, NAME, URDF, "Trunk", "LeftForeArm", ROOT)
         self._phases = random.uniform(0.0, 2.0 * math.pi, (3, 3))
         self.target = self._right.target
-        self.swings, self._side, self._calm = 0, 0.0, Still()
+        self.swings, self._side, self._calm = 0, 0.0, RestDetector()
 
     def palm(self) -> Pose:
-        """Returns where the right palm is."""
+        """Returns the pose of the right palm."""
         return self._right.pose()
 
     def note(self) -> None:
-        """Notes in a cycle where both hands are."""
+        """Records the positions of both hands in a cycle."""
         self._calm.note(self.palm().position)
         _, y, z = (self._left.pose() @ LEFT_HAND).position
         if z > SHOULDER_M and abs(y - MIDDLE_M) > SWING_M:
@@ -79,7 +82,7 @@ class SwayingPerson:
             yield
 
     def stay_until(self, is_over: Callable[[], bool]) -> Iterator[None]:
-        """Keeps the right palm where it is until a condition holds."""
+        """Keeps the right palm at its place until a condition holds."""
         while not is_over():
             self._send(self.target)
             yield
@@ -110,7 +113,7 @@ class SwayingPerson:
 
 
 def together(*acts: Iterator[None]) -> Iterator[None]:
-    """Goes on with all acts in every cycle, in their order, until the last one has ended."""
+    """Advances all actions in every cycle, in their order, until the last one has ended."""
     running = list(acts)
     while running := [act for act in running if next(act, running) is None]:
         yield

@@ -1,4 +1,4 @@
-"""An arm that leads its link about the axis of its base, pointing away from it."""
+"""An arm that moves a link around the axis of its base; the link points away from the axis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .arm import LedArm, about_z, smooth
 SHORTEST_S = 0.5
 
 
-class Spot(NamedTuple):
+class CylindricalPosition(NamedTuple):
     """A place in cylindrical coordinates, whose axis is z of the world.
 
     Attributes:
@@ -28,14 +28,14 @@ class Spot(NamedTuple):
     height: float
 
     @classmethod
-    def of(cls, position: Vector) -> Spot:
-        """Returns the spot of a position in the world [m]."""
+    def of(cls, position: Vector) -> CylindricalPosition:
+        """Returns the cylindrical coordinates of a position in the world [m]."""
         x, y, z = position
         return cls(math.hypot(x, y), math.atan2(y, x), z)
 
-    def moved(self, out: float = 0.0, up: float = 0.0) -> Spot:
-        """Returns the spot that is further out and higher [m]."""
-        return Spot(self.radius + out, self.azimuth, self.height + up)
+    def moved(self, out: float = 0.0, up: float = 0.0) -> CylindricalPosition:
+        """Returns the position that is further out and higher [m]."""
+        return CylindricalPosition(self.radius + out, self.azimuth, self.height + up)
 
     def pose(self) -> Pose:
         """Returns the pose in the world whose axis x points away from the axis, and z up."""
@@ -44,7 +44,7 @@ class Spot(NamedTuple):
 
 
 class PolarArm(LedArm):
-    """Leads a link of an arm whose base is on the axis z of the world, without a turn of the wrist.
+    """Moves a link of an arm whose base is on the axis z of the world, without turning the wrist.
 
     Args:
         scene: The scene that it acts in.
@@ -55,23 +55,23 @@ class PolarArm(LedArm):
         base: Pose of the base link in the world.
 
     Attributes:
-        spot: The last spot that the link was sent to.
+        spot: The last position that the link was sent to.
     """
 
     def __init__(self, scene: Scene, robot: str, urdf: str, base_link: str, link: str, base: Pose) -> None:
         super().__init__(scene, robot, urdf, base_link, link, base)
-        self.spot = Spot.of(self.target.position)
+        self.spot = CylindricalPosition.of(self.target.position)
 
-    def swing(self, end: Spot, speed: float, turn_speed: float) -> Iterator[None]:
-        """Goes to a spot, from rest to rest; used as `yield from arm.swing(...)`.
+    def swing(self, end: CylindricalPosition, speed: float, turn_speed: float) -> Iterator[None]:
+        """Moves to a position, from rest to rest; used as `yield from arm.swing(...)`.
 
         Args:
-            end: The spot.
+            end: The position.
             speed: Mean speed out and up [m/s].
             turn_speed: Largest mean speed of the azimuth [rad/s].
 
         Raises:
-            SceneFailedError: If a spot on the way is out of reach.
+            SceneFailedError: If a position on the path is out of reach.
         """
         start, begin_s = self.spot, self._scene.seen.time_s
         out, turn, up = (b - a for a, b in zip(start, end))
@@ -80,6 +80,8 @@ class PolarArm(LedArm):
         while share < 1.0:
             share = min((self._scene.seen.time_s - begin_s) / duration_s, 1.0)
             gone = smooth(share)
-            self.spot = Spot(start.radius + gone * out, start.azimuth + gone * turn, start.height + gone * up)
+            self.spot = CylindricalPosition(
+                start.radius + gone * out, start.azimuth + gone * turn, start.height + gone * up
+            )
             self.send(self.spot.pose())
             yield
