@@ -1,4 +1,4 @@
-"""Couplings: accelerations that change a motion while it is executed."""
+"""Couplings: additional accelerations of an executed motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from custom_ros_tools.transforms import Array, finite_vector
 from .dynamics import MotionState, SpringDamper
 
 STEEPNESS = 20.0 / math.pi
-"""Decay of the evasion with the angle between the motion and the obstacle [1/rad] (Hoffmann 2009)."""
+"""Decay of the avoidance with the angle between the motion and the obstacle [1/rad] (Hoffmann 2009)."""
 SLOWEST_M_S = 1e-6
-"""Speed below which a motion heads nowhere [m/s]."""
+"""Speed below which a motion has no direction [m/s]."""
 
 
 @dataclass
 class ForceCoupling:
-    """Gives way to a force as a spring: a constant force moves the motion by force / stiffness.
+    """Yields to a force like a spring: a constant force shifts the motion by force / stiffness.
 
     Attributes:
-        stiffness: The stiffness of each number of a velocity [N/m or N m/rad]; one number for all.
-        force: The force that acts on the moved thing [N or N m], shape (dof,); set it whenever it is measured.
+        stiffness: Stiffness along each coordinate of the velocity [N/m or N m/rad]; a single number applies to all.
+        force: Force on the moved object [N or N m], shape (dof,); set it at each measurement.
     """
 
     stiffness: ArrayLike
@@ -44,14 +44,14 @@ class ForceCoupling:
 class ObstacleCoupling:
     """Steers the first three positions around a ball (Hoffmann 2009, equation 8).
 
-    The motion is turned away from the ball's edge as seen from it, more so the straighter it heads there, and within
-    `range_m` of its surface.
+    The motion is turned away from the direction of the ball's edge: the more, the smaller the angle to it and the
+    distance from the surface.
 
     Attributes:
-        center: Its centre x, y, z [m]; set it whenever it moves.
+        center: Its centre x, y, z [m]; set it when the ball moves.
         radius_m: Its radius [m].
-        range_m: Distance from its surface at which the evasion has fallen to 37 % [m].
-        gain: Strength of the evasion, 1000 in the paper.
+        range_m: Distance from its surface at which the avoidance has fallen to 37 % [m].
+        gain: Strength of the avoidance, 1000 in the paper.
     """
 
     center: ArrayLike
@@ -78,7 +78,7 @@ class ObstacleCoupling:
         if angle > 0.5 * math.pi:  # it has passed
             return evasion
         away = heading * float(heading @ to_center) - to_center  # across the motion
-        if np.linalg.norm(away) < 1e-6 * distance:  # straight into the centre: any side will do, the same until the end
+        if np.linalg.norm(away) < 1e-6 * distance:  # straight towards the centre: choose one side, always the same
             away = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
         seen = math.asin(min(self.radius_m / distance, 1.0))
         beside = max(angle - seen, 1.0 / STEEPNESS)

@@ -37,7 +37,7 @@ JOINT_PREFIX = "position/"
 
 @dataclass(frozen=True)
 class Demonstration:
-    """A motion that was shown; made by `of` and the other class methods, which check it.
+    """A demonstrated motion; made by `of` and the other class methods, which check it.
 
     Attributes:
         space: Names of its signals.
@@ -156,14 +156,14 @@ def _default_names(count: int) -> tuple[str, ...]:
 
 
 def checked_array(values: ArrayLike, subject: str, dimensions: int) -> Array:
-    """Returns finite numbers of a demonstration as an array.
+    """Returns numbers of a demonstration as an array, if they are finite.
 
     Args:
         subject: Name of the numbers in messages.
         dimensions: Number of dimensions of the array.
 
     Raises:
-        DemonstrationError: If they have another shape, or one is not finite.
+        DemonstrationError: If the number of dimensions differs, or a number is not finite.
     """
     try:
         array = np.array(values, dtype=float)

@@ -1,4 +1,6 @@
-"""Dynamics of movement primitives: a path, and a spring whose deviation from it is forced and coupled."""
+"""Dynamics of movement primitives: a path, and a spring-damper for the deviation from it, with forcing term and
+couplings.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,9 @@ TOLERANCE_RAD = math.radians(0.1)
 FROM_START = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 """Quintic from 0 to 1, from rest to rest; coefficients of rising powers."""
 COASTING = (0.0, 1.0, 0.0, -6.0, 8.0, -3.0)
-"""Quintic from 0 to 0, from velocity 1 to rest; without acceleration at both ends."""
+"""Quintic from 0 to 0, from velocity 1 to rest; acceleration is 0 at both ends."""
 MIN_CHANGE_SHARE = 0.25
-"""Least share of the duration that a change of the goal takes."""
+"""Least duration of a change of the goal, as a share of the motion's duration."""
 
 
 class MotionState(NamedTuple):
@@ -41,7 +43,7 @@ class MotionState(NamedTuple):
 
 
 class SpringDamper(NamedTuple):
-    """Critically damped spring, whose time scale is the duration.
+    """Critically damped spring; its time scale is the duration.
 
     Attributes:
         alpha: Damping; the stiffness is a quarter of its square, both for a duration of 1 s.
@@ -63,7 +65,7 @@ class SpringDamper(NamedTuple):
 
 
 Coupling = Callable[[MotionState, SpringDamper], Array]
-"""Returns an acceleration [m/s^2 or rad/s^2], shape (dof,), for a state and the spring that pulls to the motion."""
+"""Returns an acceleration [m/s^2 or rad/s^2], shape (dof,), for a state and the spring of the motion."""
 
 
 class Execution(ABC):
@@ -82,11 +84,11 @@ class Execution(ABC):
     @property
     @abstractmethod
     def end_s(self) -> float:
-        """Time at which it is to be at its goal [s]."""
+        """Planned time at the goal [s]."""
 
     @abstractmethod
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Goes on by a time step [s] and returns the new state.
+        """Advances by a time step [s] and returns the new state.
 
         Args:
             couplings: Functions of state and spring that return further accelerations.
@@ -97,7 +99,7 @@ class Execution(ABC):
         """Sets another goal from now on.
 
         Raises:
-            PlanError: If it is no point of the space, or the primitive cannot change its goal any more.
+            PlanError: If it is not a point of the space, or it is too late to change the goal of this primitive.
         """
 
     def miss(self) -> tuple[float, float]:
@@ -105,7 +107,7 @@ class Execution(ABC):
         return (0.0, 0.0) if self.goal is None else self.space.distance(self.state.point, self.goal)
 
     def is_at_goal(self, tolerance: float = TOLERANCE, tolerance_rad: float = TOLERANCE_RAD) -> bool:
-        """Returns whether the time is over and the goal is reached."""
+        """Returns whether the duration has passed and the goal is reached."""
         distance, angle_rad = self.miss()
         is_over = self.state.time_s >= self.end_s * (1.0 - 1e-9)
         return is_over and distance <= tolerance and angle_rad <= tolerance_rad
@@ -115,13 +117,13 @@ class Path(Protocol):
     """The path that a motion deviates from."""
 
     end_s: float
-    """Time from which on it stands still [s]."""
+    """Time after which it is at rest [s]."""
 
     def at(self, time_s: float) -> tuple[Array, Array]:
         """Returns point and velocity, shape (dof,)."""
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Sets another goal at a time of the motion."""
+        """Changes the goal at a time of the motion."""
 
 
 class QuinticOffset(NamedTuple):
@@ -149,9 +151,9 @@ class QuinticOffset(NamedTuple):
 
 
 class QuinticPath:
-    """A path from start to goal along a quintic, which is there in time (as the goal of Muelling 2013, equation 6).
+    """A path from start to goal along a quintic, which arrives in time (as the goal of Muelling 2013, equation 6).
 
-    Another goal is one more move: velocity and acceleration stay continuous.
+    A new goal adds another quintic: velocity and acceleration stay continuous.
 
     Args:
         velocity: Velocity at the start [m/s or rad/s], shape (dof,).
@@ -165,7 +167,7 @@ class QuinticPath:
             self._moves.append(QuinticOffset(0.0, duration_s, velocity * duration_s, COASTING))
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Sets another goal; it is reached at the end, or after a quarter of the duration if that is later."""
+        """Changes the goal; it is reached at the end, or after a quarter of the duration if that is later."""
         left_s = max(self._duration_s - time_s, MIN_CHANGE_SHARE * self._duration_s)
         self._moves.append(QuinticOffset(time_s, left_s, self._space.minus(goal, self._goal)))
         self._goal, self.end_s = goal, max(self.end_s, time_s + left_s)
@@ -182,7 +184,7 @@ class QuinticPath:
 class PathExecution(Execution):
     """A motion that deviates from a path: a spring pulls it back, a forcing term and couplings push it away.
 
-    The deviation, with orientations as rotation vectors, follows one linear equation for all signals, in one phase:
+    The deviation follows one linear equation for all signals, in one phase; orientations are rotation vectors. It is
     that of Ijspeert 2013 (equation 2.1), with the path in place of the goal.
 
     Args:
@@ -205,11 +207,11 @@ class PathExecution(Execution):
 
     @property
     def end_s(self) -> float:
-        """Time at which it is to be at its goal [s]."""
+        """Planned time at the goal [s]."""
         return self.path.end_s
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Goes on by a time step, see `Execution`."""
+        """Advances by a time step, see `Execution`."""
         spring = self.spring
 
         def acceleration(deviation: MotionState) -> Array:
@@ -223,18 +225,18 @@ class PathExecution(Execution):
         return self.state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Sets another goal, see `Execution`."""
+        """Changes the goal, see `Execution`."""
         checked = self.space.point(goal, "goal")
         self.path.set_goal(checked, self.state.time_s)
         self.goal = checked
 
     def start_at(self, point: Array, velocity: Array) -> None:
-        """Starts beside the path, at a point with a velocity."""
+        """Starts at a point off the path, with a velocity."""
         shift = self.space.minus(point, self.path.at(0.0)[0])
         self.start_beside(shift, self.space.shift_rate(shift, velocity))
 
     def start_beside(self, shift: Array, rate: Array) -> None:
-        """Starts at a difference from the path, shape (dof,), that changes at a rate."""
+        """Starts at an offset from the path, shape (dof,), with a rate of the offset."""
         self.deviation = MotionState(0.0, shift, rate)
         self.state = self._moved(self.deviation)
 
@@ -246,7 +248,7 @@ class PathExecution(Execution):
 
 
 def deviated(space: Space, point: Array, velocity: Array, shift: Array, rate: Array) -> tuple[Array, Array]:
-    """Returns point and velocity of a motion whose difference from another one is `shift` and changes at `rate`."""
+    """Returns point and velocity of a motion offset from another one by `shift`, which changes at `rate`."""
     if not space.has_orientation:
         return point + shift, velocity + rate
     n = len(space.names)

@@ -7,7 +7,7 @@ from custom_ros_tools.errors import InterfaceError
 
 @dataclass(eq=False)
 class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
-    """Input that does not fit.
+    """Invalid input.
 
     Attributes:
         subject: The part that is wrong.

@@ -24,7 +24,7 @@ class PrimitiveFile(ConfigModel):
     type: Text = Field(description="Its type, a name of the table or `module:Class`.")
     options: dict[Text, Any] = Field({}, description="Options of the type.")
     names: ListOf[Text] = Field(min_length=1, description="Names of the positions.")
-    orientation: Switch = Field(False, description="Whether an orientation goes with them.")
+    orientation: Switch = Field(False, description="Whether there is an orientation, too.")
     learned: dict[Text, Any] = Field(description="What it has learned.")
 
 

@@ -30,22 +30,22 @@ Bounds = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class FrameSource(ConfigModel):
-    """Pose of a TF frame that demonstrations show."""
+    """Pose of a TF frame as signal of demonstrations."""
 
-    parent: FrameId = Field(description="The frame that poses are in.")
-    child: FrameId = Field(description="The frame whose poses they are.")
+    parent: FrameId = Field(description="The reference frame of the poses.")
+    child: FrameId = Field(description="The moving frame.")
     orientation: Switch = Field(True, description="Whether orientations are part of the motion.")
 
 
 class JointSource(ConfigModel):
-    """Joints whose positions demonstrations show."""
+    """Positions of joints as signals of demonstrations."""
 
     topic: TopicName = Field("joint_states", description="Topic of the joint states, in bags too.")
     names: ListOf[Text] = Field(min_length=1, description="The joints, in the order of points.")
 
 
 class SourceConfig(ConfigModel):
-    """Signals that demonstrations show: either a frame or joints."""
+    """Signals of demonstrations: either a frame or joints."""
 
     tf: FrameSource | None = optional("A TF frame.")
     joints: JointSource | None = optional("Joints of a robot.")
@@ -67,8 +67,8 @@ class SourceConfig(ConfigModel):
 class FrameOutput(ConfigModel):
     """TF frame that is broadcast."""
 
-    parent: FrameId = Field(description="The frame that poses are in.")
-    child: FrameId = Field(description="The frame whose poses they are.")
+    parent: FrameId = Field(description="The reference frame of the poses.")
+    child: FrameId = Field(description="The moving frame.")
 
 
 class JointOutput(ConfigModel):
@@ -99,8 +99,8 @@ class ObstacleConfig(ConfigModel):
 
     frame_id: FrameId = Field(description="TF frame of its centre.")
     radius: PositiveMetres = Field(0.05, description="Its radius.")
-    range: PositiveMetres = Field(0.1, description="Distance from its surface at which the evasion falls to 37 %.")
-    gain: Positive = Field(1000.0, description="Strength of the evasion.")
+    range: PositiveMetres = Field(0.1, description="Distance from its surface at which the avoidance falls to 37 %.")
+    gain: Positive = Field(1000.0, description="Strength of the avoidance.")
 
     def obstacle(self) -> ObstacleCoupling:
         """Returns the obstacle, at the origin."""
@@ -108,15 +108,15 @@ class ObstacleConfig(ConfigModel):
 
 
 class CouplingConfig(ConfigModel):
-    """Changes of a motion while it is executed."""
+    """Couplings of an executed motion."""
 
     force_stiffness: Annotated[Positive, Unit("N/m")] | None = optional(
-        "Stiffness with which positions give way to forces on `primitive/wrench`, in the axes of the source's parent."
+        "Stiffness with which positions yield to forces on `primitive/wrench`, in the axes of the source's parent."
     )
     torque_stiffness: Annotated[Positive, Unit("N m/rad")] | None = optional(
-        "Stiffness with which orientations give way to its torques."
+        "Stiffness with which orientations yield to its torques."
     )
-    obstacles: ListOf[ObstacleConfig] = Field((), description="Balls that are avoided.")
+    obstacles: ListOf[ObstacleConfig] = Field((), description="Balls to avoid.")
 
     def force(self, space: Space) -> ForceCoupling | None:
         """Returns the coupling to forces, None without one."""
@@ -128,14 +128,14 @@ class CouplingConfig(ConfigModel):
 
 
 class PrimitivesNodeConfig(ConfigModel):
-    """Motions that are learned, planned and executed."""
+    """Configuration of learned, planned and executed motions."""
 
     primitive: dict[Text, Any] = Field(
-        {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, and its options."
+        {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, with its options."
     )
     source: SourceConfig = Field(description="Signals of demonstrations.")
     output: OutputConfig = Field(OutputConfig(), description="Outputs of executed motions.")
-    coupling: CouplingConfig = Field(CouplingConfig(), description="Changes of a motion while it is executed.")
+    coupling: CouplingConfig = Field(CouplingConfig(), description="Couplings of an executed motion.")
     bounds: dict[Text, Bounds] = Field(
         {}, description="Least and largest position by name; a plan that leaves them is refused [m or rad]."
     )

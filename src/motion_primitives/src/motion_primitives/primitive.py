@@ -23,9 +23,9 @@ from .space import Space
 DT_S = 0.01
 """Time between two points of a plan by default [s]."""
 MAX_LONGER = 3.0
-"""Multiple of the requested duration after which a goal that was not reached counts as out of reach."""
+"""Multiple of the requested duration after which an unreached goal counts as out of reach."""
 MIN_STEPS, MAX_STEPS = 20, 1_000_000
-"""Numbers of steps of a plan; durations and time steps beyond are rejected."""
+"""Least and largest number of steps of a plan; other combinations of duration and time step are rejected."""
 
 
 class ViaPoint(NamedTuple):
@@ -80,18 +80,18 @@ class PrimitiveConfig(ConfigModel):
     alpha: Positive = Field(
         25.0,
         description="Damping of the spring that pulls to the motion, for a duration of 1 s; its stiffness is a quarter "
-        "of the square. Larger values follow more closely and give way less.",
+        "of the square. With larger values, the motion follows more closely and yields less.",
     )
 
 
 class Primitive(ABC):
-    """A motion that is learned from demonstrations, and repeated with other starts, goals and durations.
+    """A motion learned from demonstrations, and repeated with other starts, goals and durations.
 
     Attributes:
         Config: Model of its options.
-        Learned: Model of what it has learned, for files.
+        Learned: Model of the learned data, for files.
         config: Its options.
-        space: Its signals, once it has learned.
+        space: Its signals, after `learn`.
     """
 
     Config: ClassVar[type[PrimitiveConfig]] = PrimitiveConfig
@@ -103,7 +103,7 @@ class Primitive(ABC):
 
     @property
     def is_learned(self) -> bool:
-        """Whether it has learned, or was loaded."""
+        """Whether it has learned or was loaded."""
         return self._space is not None
 
     @property
@@ -118,10 +118,10 @@ class Primitive(ABC):
         return self._space
 
     def learn(self, demonstrations: Demonstration | Sequence[Demonstration]) -> Primitive:
-        """Learns from demonstrations, in place of what it knew, and returns itself.
+        """Learns from demonstrations, replaces earlier learned data, and returns itself.
 
         Raises:
-            DemonstrationError: If they do not go together, or do not suffice.
+            DemonstrationError: If their signals differ, or they do not suffice.
         """
         given = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         space = common_space(given)
@@ -137,7 +137,7 @@ class Primitive(ABC):
         via_points: Sequence[ViaPoint] = (),
         velocity: ArrayLike | None = None,
     ) -> Execution:
-        """Returns a motion at its start.
+        """Begins a motion, and returns it.
 
         Args:
             start: First point; by default the mean of the demonstrations.
@@ -148,7 +148,7 @@ class Primitive(ABC):
 
         Raises:
             NotLearnedError: If it has not learned yet.
-            PlanError: If an argument does not fit.
+            PlanError: If an argument is invalid.
         """
         space = self.space
         if duration_s is not None and not 0.0 < duration_s < math.inf:
@@ -176,7 +176,7 @@ class Primitive(ABC):
     ) -> MotionPlan:
         """Returns a whole motion; for the other arguments see `begin`.
 
-        It takes the duration, and longer only if couplings, or the type of the primitive, keep it from its goal.
+        It lasts for the duration, or longer if couplings or the type of the primitive delay the goal.
 
         Args:
             dt_s: Time between two points [s]; it is reduced so that the duration is a multiple of it.
@@ -186,7 +186,7 @@ class Primitive(ABC):
 
         Raises:
             NotLearnedError: If it has not learned yet.
-            PlanError: If an argument does not fit.
+            PlanError: If an argument is invalid.
             GoalNotReachedError: If it is not at the goal after three times the duration.
         """
         execution = self.begin(start, goal, duration_s, via_points, velocity)
@@ -204,7 +204,7 @@ class Primitive(ABC):
         return MotionPlan(self.space, times, points, velocities)
 
     def learned(self) -> ConfigModel:
-        """Returns what it has learned, for files.
+        """Returns the learned data, for files.
 
         Raises:
             NotLearnedError: If it has not learned yet.
@@ -214,7 +214,7 @@ class Primitive(ABC):
         return self._learned()
 
     def restore(self, space: Space, learned: Any) -> None:
-        """Sets what it has learned, as read from a file.
+        """Sets the learned data, as read from a file.
 
         Raises:
             ValueError: If sizes do not fit the space or the options.
@@ -241,11 +241,11 @@ class Primitive(ABC):
 
     @abstractmethod
     def _learned(self) -> ConfigModel:
-        """Returns what it has learned; see `learned`."""
+        """Returns the learned data; see `learned`."""
 
     @abstractmethod
     def _restore(self, space: Space, learned: Any) -> None:
-        """Sets what it has learned; see `restore`."""
+        """Sets the learned data; see `restore`."""
 
 
 def check_shape(values: Any, shape: Mapping[str, int], subject: str) -> Array:

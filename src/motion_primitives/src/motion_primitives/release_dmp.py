@@ -1,6 +1,6 @@
 """The dynamic movement primitives of the authors' release, one for each dimension, for its old clients.
 
-The forcing term is stored as samples over the share of the duration, and interpolated linearly. New code uses
+The forcing term is stored as samples over the share of the duration, and interpolated linearly. For new code use
 `PRIMITIVES`, whose primitives also have orientations, end on time and are smooth.
 """
 
@@ -25,7 +25,7 @@ MIN_SAMPLES = 3
 LONGEST_S = 1000.0
 """Duration after which a plan ends, even if it is not at its goal [s]."""
 MAX_STEPS = 1_000_000
-"""Number of integration steps after which a plan ends likewise."""
+"""Number of integration steps after which a plan ends."""
 MIN_WEIGHTS = 2
 
 
@@ -99,7 +99,7 @@ def learn(
 
     Raises:
         DemonstrationError: If the demonstration has too few samples, times do not increase or sizes differ.
-        PlanError: If gains do not fit.
+        PlanError: If gains are invalid.
     """
     t, x = checked_array(times, "times", 1), checked_array(positions, "positions", 2)
     if len(t) != len(x):
@@ -140,7 +140,7 @@ def plan(
 ) -> ReleasePlan:
     """Returns a motion, by Euler's method.
 
-    It lasts for tau at least, and then until it is at its goal, at most for 1000 s.
+    It lasts at least tau, until it is at its goal, and at most 1000 s.
 
     Args:
         primitives: One of each of n dimensions.
@@ -148,14 +148,15 @@ def plan(
         x_dot_0: n start velocities [1/s].
         t_0: Time of the primitives at which it starts [s].
         goal: n goals.
-        goal_thresh: How near to the goal counts as there, for each dimension; entries of 0 and less are ignored.
-        seg_length: How long the plan is [s]; -1 until the goal.
+        goal_thresh: Largest distance from the goal that counts as reached, for each dimension; entries of 0 and less
+            are ignored.
+        seg_length: Duration of the plan [s]; -1 until the goal.
         tau: Duration [s].
         dt: Time between two points [s].
         integrate_iter: Steps of integration between two points.
 
     Raises:
-        PlanError: If an argument does not fit.
+        PlanError: If an argument is invalid.
     """
     n = len(primitives)
     if not n:

@@ -1,8 +1,8 @@
-"""Spaces of motions: positions of n signals, and with them, if wanted, one orientation.
+"""Spaces of motions: positions of n signals, and optionally one orientation.
 
 A point is an array of n positions, followed by the unit quaternion x, y, z, w if the space has an orientation. A
 difference of points, and a velocity, is an array of n numbers, followed by a rotation vector, or an angular velocity,
-about the fixed axes. Positions and orientation thus share one formula, and one phase.
+about the fixed axes. Positions and orientation thus share formulas and phase.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ POSE = ("x", "y", "z")
 """Names of the positions of a pose."""
 ROUNDING = 1e-12
 MIN_NORM, MAX_NORM = 0.9, 1.1
-"""Lengths of a quaternion that count as rounding [1]; others are rejected."""
+"""A quaternion with a length in this range is normalised; others are rejected."""
 
 
 class Space(NamedTuple):
-    """Names of n positions, and whether an orientation goes with them."""
+    """Names of n positions, and whether there is an orientation, too."""
 
     names: tuple[str, ...]
     has_orientation: bool = False
@@ -51,7 +51,7 @@ class Space(NamedTuple):
             subject: Name of the point in messages, such as `goal`.
 
         Raises:
-            PlanError: If the number of values differs, one is not finite or the quaternion has not length 1.
+            PlanError: If the number of values differs, one is not finite or the quaternion's length is not 1.
         """
         try:
             point = finite_vector(values, len(self.point_names), subject).copy()
@@ -69,7 +69,7 @@ class Space(NamedTuple):
         return point
 
     def minus(self, end: Array, start: Array) -> Array:
-        """Returns the difference that leads from one point to another; orientations the shorter way."""
+        """Returns the difference that leads from one point to another; orientations by the shorter rotation."""
         if not self.has_orientation:
             return end - start
         n = len(self.names)
@@ -86,7 +86,7 @@ class Space(NamedTuple):
         return np.array([*(start[:n] + difference[:n]).tolist(), *quat])
 
     def shift_rate(self, shift: Array, velocity: Array) -> Array:
-        """Returns how fast a difference from a fixed point changes at a velocity, shape (dof,)."""
+        """Returns the rate of the difference from a fixed point at a velocity, shape (dof,)."""
         n = len(self.names)
         if not self.has_orientation or not shift[n:].any():
             return velocity
@@ -108,7 +108,7 @@ class Space(NamedTuple):
         return float(np.abs(difference[:n]).max(initial=0.0)), math.hypot(*difference[n:].tolist())
 
     def mean(self, points: Sequence[Array]) -> Array:
-        """Returns the mean of some points, of their orientations the one with the least squared angles."""
+        """Returns the mean of points; the mean orientation minimises the sum of squared angles."""
         mean = points[0]
         for _ in range(MEAN_ITERATIONS if self.has_orientation else 1):
             mean = self.plus(mean, np.mean([self.minus(each, mean) for each in points], axis=0))
@@ -140,5 +140,5 @@ def turned(rotation: Array, vector: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()  # many times as fast as numpy's
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()  # many times faster than numpy's
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

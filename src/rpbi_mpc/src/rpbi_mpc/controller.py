@@ -12,7 +12,7 @@ from .plant import Sensed
 
 @dataclass(frozen=True)
 class ControlPlan:
-    """Commands for the next cycles, and what is expected to happen.
+    """Commands for the next cycles, and the predicted states.
 
     Attributes:
         commands: Commands of this cycle and those after it, cycles x numbers of a command.
@@ -20,10 +20,10 @@ class ControlPlan:
         state_step_s: Time between two predicted states [s].
         cost: Value of the cost.
         converged: Whether the solver found a solution within its limits.
-        status: Its answer, or the reason why there is none.
+        status: Status of the solver, or the reason why there is none.
         iterations: Number of its iterations.
-        wall_s: Time that it took [s].
-        processor_s: Time of the processor [s].
+        wall_s: Wall time of the solution [s].
+        processor_s: Processor time [s].
         extras: Further numbers of this cycle, by name, for the table.
     """
 
@@ -40,7 +40,7 @@ class ControlPlan:
 
 
 class MpcController(ABC):
-    """Plans from measurements; the loop executes the first command of each plan.
+    """Makes plans from measurements; the loop executes the first command of each plan.
 
     Attributes:
         measured_names: Names of the numbers that a plant measures.
@@ -54,18 +54,18 @@ class MpcController(ABC):
 
     @abstractmethod
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns a plan; it depends on the measurements since `reset` alone, not on time or chance.
+        """Returns a plan. It depends only on the measurements since `reset`, not on wall time or random numbers.
 
         Args:
             sensed: A complete measurement.
             delay_s: Time from `sensed.time_s` until the first command acts [s].
         """
 
-    def executed(self, time_s: float, command: np.ndarray | None) -> None:  # noqa: B027 (may stay as it is)
-        """Takes note of the command that acts from a time on [s]; None if the plant stands."""
+    def executed(self, time_s: float, command: np.ndarray | None) -> None:  # noqa: B027 (optional)
+        """Records the command that acts from a time on [s]; None if the plant is stopped."""
 
-    def reset(self) -> None:  # noqa: B027 (may stay as it is)
-        """Forgets everything of the past; the next plan is that of a new controller."""
+    def reset(self) -> None:  # noqa: B027 (optional)
+        """Discards all history; the next plan is that of a new controller."""
 
     @property
     def is_finished(self) -> bool:
@@ -74,10 +74,10 @@ class MpcController(ABC):
 
     @property
     def result(self) -> str:
-        """A clause on the task that is done."""
+        """Result of a finished task, as a clause."""
         return "the task is done"
 
     @property
     def failure(self) -> str:
-        """Reason why the task cannot be done any more, with which the loop stops; empty while it can."""
+        """Reason of a failed task, with which the loop stops; empty while the task can succeed."""
         return ""

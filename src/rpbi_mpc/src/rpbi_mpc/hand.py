@@ -1,4 +1,4 @@
-"""A hand that moves in a plane: positions of an arm's joints for places of a point of the hand."""
+"""A hand that moves in a plane: positions of an arm's joints for places of a point on the hand."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ TOLERANCE_M, TOLERANCE_RAD = 1e-4, 1e-3
 MAX_ITERATIONS = 100
 """Newton steps after which a place counts as out of reach."""
 MAX_STEP_RAD = 0.1
-"""Largest change of a joint in one of them [rad]; larger ones jump to other postures."""
+"""Largest change of a joint in a Newton step [rad]; larger ones jump to other postures."""
 DAMPING = 1e-3
-"""Damping of the least squares [m^2/rad^2]; more slows down, less shakes near singular postures."""
+"""Damping of the least squares [m^2/rad^2]; larger values converge slowly, smaller ones oscillate near singular
+postures.
+"""
 
 
 class PlanarHandConfig(ConfigModel):
@@ -31,12 +33,12 @@ class PlanarHandConfig(ConfigModel):
 
     Attributes:
         urdf: The robot.
-        link: The link of the point, its origin; its axis z points down.
+        link: Link whose origin is the point; its axis z points down.
         joints: The joints that move it.
         base: Position of the robot's root link in the world [m].
         height: Height of the point in the world [m].
         yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
-        posture: Positions of the joints from which the first place is looked for [rad].
+        posture: Initial positions of the joints for the first place [rad].
     """
 
     urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
@@ -60,7 +62,7 @@ class PlanarHand:
 
     Raises:
         ConfigError: If the URDF cannot be read.
-        UnknownNameError: If link or joints are unknown.
+        UnknownNameError: If the link or a joint is unknown.
         InterfaceError: If the posture does not have one number for each joint.
     """
 
@@ -79,7 +81,7 @@ class PlanarHand:
         return position
 
     def solve(self, start: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Returns positions of the joints with the point at a place.
+        """Returns positions of the joints that bring the point to a place.
 
         Args:
             start: Positions to start from [rad].
@@ -99,14 +101,16 @@ class PlanarHand:
         raise InterfaceError(f"hand.{self._config.link}: expected a place within reach, got ({place_text}) m")
 
     def _error(self, q: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Returns the way to a place [m], and the rotation to the wanted orientation [rad], in the axes of the root."""
+        """Returns the vector to a place [m], and the rotation to the desired orientation [rad], in the axes of the
+        root.
+        """
         pose, cos, sin = self._pose(q), np.cos(self._config.yaw), np.sin(self._config.yaw)
         wanted = np.array([[cos, sin, 0.0], [sin, -cos, 0.0], [0.0, 0.0, -1.0]])
         turn = Rotation.from_matrix(wanted @ pose[:3, :3].T).as_rotvec()
         return np.array([*(goal - self._config.base - pose[:3, 3]), *turn])
 
     def _improved(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
-        """Returns positions that are nearer, by one damped step of least squares."""
+        """Returns improved positions after one step of damped least squares."""
         jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
         damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
         step = jacobian.T @ solve(damped, error)

@@ -25,11 +25,11 @@ class Sensed(NamedTuple):
 
 
 class Plant(ABC):
-    """A system that is measured, commanded, and goes on by a time.
+    """A system that is measured and commanded, and that advances in time.
 
     Attributes:
-        is_timed: Whether time passes by itself, as for hardware. Then a plan that is late does not count; otherwise the
-            plant waits, and no decision depends on the speed of the computer.
+        is_timed: Whether time passes by itself, as for hardware. Then late plans are discarded; otherwise the plant
+            waits, and no decision depends on the speed of the computer.
     """
 
     is_timed = False
@@ -44,7 +44,7 @@ class Plant(ABC):
 
     @abstractmethod
     def stand(self) -> None:
-        """Stops; the plant stands until the next command."""
+        """Stops the plant until the next command."""
 
     @abstractmethod
     def advance(self, duration_s: float) -> None:

@@ -20,7 +20,8 @@ def table_of(cycles: Sequence[Cycle], controller: MpcController) -> pandas.DataF
     """Returns one row for each cycle.
 
     Columns are `cycle`, `time_s`, `status`, `reason`, `cost`, `iterations`, `wall_s`, `processor_s`, those of the
-    controller's `extras`, and by their names `measured.`, `command.` and `state.`, the first predicted state.
+    controller's `extras`, and, with the prefixes `measured.`, `command.` and `state.`, the measurement, the command and
+    the first predicted state.
     """
     import pandas
 
@@ -41,7 +42,7 @@ def summary_of(table: pandas.DataFrame) -> dict[str, Any]:
 
 
 def write_records(folder: str | Path, cycles: Sequence[Cycle], controller: MpcController) -> dict[str, Any]:
-    """Writes `cycles.csv` and `summary.json` to a folder, which is made if it is missing; returns the summary.
+    """Writes `cycles.csv` and `summary.json` to a folder, which is created if missing; returns the summary.
 
     Raises:
         OSError: If the folder cannot be written.

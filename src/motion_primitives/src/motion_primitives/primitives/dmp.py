@@ -30,7 +30,7 @@ from motion_primitives.space import Space
 QUADRATURE_POINTS = 4001
 """Number of points at which responses to basis functions are integrated (Simpson's rule)."""
 MAX_DEVIATION_RAD = 0.95 * math.pi
-"""Largest angle between a demonstrated orientation and the path [rad]; beyond it, the shorter way is ambiguous."""
+"""Largest angle between a demonstrated orientation and the path [rad]; beyond it, the shorter rotation is ambiguous."""
 
 
 class DMPConfig(PrimitiveConfig):
@@ -65,7 +65,7 @@ def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: M
 
 
 class FixedGoalExecution(Execution):
-    """A motion that a fixed goal attracts, and that a forcing term shapes on the way; for arguments see `pull`."""
+    """A motion attracted by a fixed goal and shaped by a forcing term; for arguments see `pull`."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class FixedGoalExecution(Execution):
         return self._spring.duration_s
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Goes on by a time step, see `Execution`."""
+        """Advances by a time step, see `Execution`."""
         spring, goal = self._spring, self.goal
         assert goal is not None
 
@@ -97,12 +97,12 @@ class FixedGoalExecution(Execution):
         return self.state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Sets another goal: the acceleration jumps."""
+        """Changes the goal; the acceleration jumps."""
         self.goal = self.space.point(goal, "goal")
 
 
 class DMP(Primitive):
-    """A discrete dynamic movement primitive: it starts and ends anywhere, and keeps the demonstrated shape.
+    """A discrete dynamic movement primitive: it keeps the demonstrated shape with any start and goal.
 
     Positions and orientations share equation and phase, see `PathExecution`. With a fixed attractor they are those of
     Ijspeert 2013 and Ude 2014, see `FixedGoalExecution`.
@@ -150,7 +150,7 @@ class DMP(Primitive):
         return np.asarray(bends - [pull(space, spring, points[0], points[-1], state) for state in states])
 
     def _rest_at_end(self, basis: GaussianBasis) -> Array:
-        """Returns conditions on weights: no force at start and end, and there the shape is at rest at the goal.
+        """Returns conditions on weights: the force is 0 at start and end, and the shape ends at rest at the goal.
 
         A shape is the response of a critically damped spring to the forcing term; its value and rate at the end are
         integrals over the forcing term.

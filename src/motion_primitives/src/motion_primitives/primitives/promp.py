@@ -30,17 +30,17 @@ MIN_EXTENT = 0.01
 SAMPLES_OF_MEAN = 50
 """Number of samples of each demonstration for the mean orientation."""
 END_WEIGHT = 100.0
-"""Weight of the error at the first and the last sample: the shown start and goal are kept."""
+"""Weight of the error at the first and the last sample, which keeps the demonstrated start and goal."""
 EXACT_STD = 1e-6
 """Standard deviation with which start and goal are kept [m or rad]."""
 LAST_CHANGE = 0.9
-"""Share of the duration after which the goal cannot be changed any more."""
+"""Share of the duration up to which the goal can be changed."""
 LOOKS = np.linspace(0.0, 1.0, 201)
 """Shares of the duration at which a motion is checked."""
 MISSED_STDS = 3.0
 """Number of its standard deviations beyond which a point counts as missed."""
 MAX_TURN_RAD = 2.0 * math.pi
-"""Angle from the mean orientation at which a motion is rejected [rad]: it is a whole turn."""
+"""Angle from the mean orientation from which a motion is rejected [rad]: a whole turn."""
 
 
 class ProMPConfig(PrimitiveConfig):
@@ -49,13 +49,13 @@ class ProMPConfig(PrimitiveConfig):
     bases: int = Field(20, ge=4, le=200, description="Number of basis functions of each signal.")
     prior: Positive = Field(
         1.0,
-        description="Number of demonstrations as much as which it counts, that motions may deviate smoothly from their "
-        "mean. Larger values follow new points more gently where demonstrations did not differ.",
+        description="Weight of the prior of smooth deviations from the mean, as a number of demonstrations. With "
+        "larger values, motions reach new points more smoothly where demonstrations did not differ.",
     )
     reach: Positive = Field(
         2.0,
-        description="How far a motion may leave the demonstrated positions, as a multiple of their largest extent; one "
-        "that goes farther is refused.",
+        description="Largest distance of a motion from the demonstrated positions, as a multiple of their largest "
+        "extent; motions beyond it are refused.",
     )
 
 
@@ -95,7 +95,7 @@ class WeightDistribution(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A point that a motion passes, or its rate at a share of the duration.
+    """A known point or rate of a motion at a share of the duration.
 
     Attributes:
         subject: Its name in messages.
@@ -120,7 +120,7 @@ class MeanPath:
         goal: The last point, None if it is one of the known points.
 
     Raises:
-        PlanError: If a point is missed, or the motion goes too far from the demonstrations.
+        PlanError: If a point is missed, or the motion is too far from the demonstrations.
     """
 
     def __init__(self, primitive: ProMP, known: Sequence[Known], duration_s: float, goal: Array | None) -> None:
@@ -141,10 +141,10 @@ class MeanPath:
         return point, velocity / self.end_s
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Sets another goal: the mean, given where it is now, and that it ends there.
+        """Changes the goal: conditions the mean on its present state and the new goal.
 
         Raises:
-            PlanError: If it is too late, or as for a new motion.
+            PlanError: If it is too late, or if a new motion would be rejected.
         """
         primitive, progress = self._primitive, time_s / self.end_s
         if progress > LAST_CHANGE:
@@ -187,7 +187,7 @@ class ProMP(Primitive):
         self._set(space, origin, duration_s, np.array(weights))
 
     def _set(self, space: Space, origin: Array, duration_s: float, weights: Array) -> None:
-        """Sets what was learned; `weights` has the shape (N, dof, k)."""
+        """Sets the learned data; `weights` has the shape (N, dof, k)."""
         self._origin, self._duration_s, self._weights = origin, duration_s, weights
         self._basis = TimeBasis.of(self.config.bases)
         self._dof = space.dof
@@ -204,7 +204,7 @@ class ProMP(Primitive):
         self.distribution = WeightDistribution(mean, (spread + prior * np.kron(scales, kernel)) / (count + prior))
 
     def _prior_stds(self, space: Space, weights: Array) -> Array:
-        """Returns a standard deviation for each signal; all positions share one, and all angles."""
+        """Returns a standard deviation for each signal: one for all positions, one for all angles."""
         extents, n = np.ptp(weights, axis=1), len(space.names)
         parts = (part for part in (extents[:n], extents[n:]) if len(part))
         return np.concatenate([np.full(len(part), PRIOR_SHARE * max(part.max(), MIN_EXTENT)) for part in parts])
@@ -240,7 +240,7 @@ class ProMP(Primitive):
         return PathExecution(self.space, spring, path, lambda _: rest, path.at(duration)[0] if goal is None else goal)
 
     def given(self, distribution: WeightDistribution, known: Sequence[Known]) -> WeightDistribution:
-        """Returns a distribution, given points and rates."""
+        """Returns a distribution conditioned on points and rates."""
         rows = np.vstack([self.rows(each.progress, each.is_rate) for each in known])
         stds = np.array([max(each.std, EXACT_STD) for each in known])
         return distribution.given(rows, np.concatenate([each.values for each in known]), np.repeat(stds**2, self._dof))
@@ -251,8 +251,8 @@ class ProMP(Primitive):
         """Checks the mean of a distribution from a share of the duration on.
 
         Raises:
-            PlanError: If it misses a known point, leaves the demonstrations by more than the option `reach`, or turns
-                by more than a whole turn.
+            PlanError: If it misses a known point, is farther from the demonstrations than the option `reach` permits,
+                or turns by more than a whole turn.
         """
         n = len(self.space.names)
         looks = LOOKS[LOOKS >= progress]
@@ -275,7 +275,7 @@ class ProMP(Primitive):
                 raise PlanError(each.subject, expected, f"a miss by {distance:.3g} and {angle:.3g} rad")
 
     def _check_reach(self, subject: str, path: Array, times_s: Array) -> None:
-        """Rejects positions, shape (n, m), at m times that are too far from the demonstrations."""
+        """Rejects positions, shape (n, m), at m times, if they are too far from the demonstrations."""
         least, most, reach = self._least[: len(path)], self._most[: len(path)], self.config.reach
         room = reach * max(float((most - least).max()), MIN_EXTENT)
         beyond = np.maximum(least[:, None] - path, path - most[:, None])
@@ -286,7 +286,9 @@ class ProMP(Primitive):
             raise PlanError(subject, expected, f"{path[index, at]:.3g} at {times_s[at]:.3g} s")
 
     def rows(self, progress: float, is_rate: bool = False) -> Array:
-        """Returns the linear functions of all weights that are the coordinates at a share of the duration, or rates."""
+        """Returns the linear functions from all weights to the coordinates, or their rates, at a share of the
+        duration.
+        """
         basis = self._basis.rates if is_rate else self._basis.values
         return np.kron(np.eye(self._dof), basis(np.array(progress)))
 
@@ -306,7 +308,7 @@ class ProMP(Primitive):
         return self.space.plus(self._origin, coordinates), rates
 
     def stds(self, progress: ArrayLike, distribution: WeightDistribution | None = None) -> Array:
-        """Returns standard deviations at m shares of the duration, shape (m, dof), of all motions that it may make.
+        """Returns standard deviations at m shares of the duration, shape (m, dof), of all its motions.
 
         Args:
             distribution: By default that of the demonstrations; see `conditioned`.
@@ -321,7 +323,7 @@ class ProMP(Primitive):
         """Returns the distribution of the motions that pass some points.
 
         Raises:
-            PlanError: If one is no point of the space.
+            PlanError: If one is not a point of the space.
         """
         known = []
         for index, each in enumerate(via_points):

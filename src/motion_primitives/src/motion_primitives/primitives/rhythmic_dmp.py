@@ -21,7 +21,7 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space
 
 MIN_CORRELATION = 0.7
-"""Least correlation of a motion with itself a period later; below it, the motion does not count as repeating."""
+"""Least autocorrelation at the period of a motion that counts as repeating."""
 MIN_CYCLES = 1.5
 """Least number of periods in a demonstration whose period is not given."""
 SETTLING_CYCLES, STEPS_PER_CYCLE = 2, 100
@@ -32,22 +32,22 @@ class RhythmicDMPConfig(PrimitiveConfig):
     """Options of a rhythmic dynamic movement primitive."""
 
     bases: int = Field(30, ge=6, le=1000, description="Number of basis functions of each signal.")
-    period_s: Seconds | None = optional("Period of the demonstrations; by default it is found by their correlation.")
+    period_s: Seconds | None = optional("Period of the demonstrations; by default from their autocorrelation.")
 
 
 class LearnedRhythmicDMP(ConfigModel):
     """A learned rhythmic dynamic movement primitive."""
 
-    center: ListOf[float] = Field(description="Point around which it moves.")
+    center: ListOf[float] = Field(description="Centre of the motion.")
     start: ListOf[float] = Field(description="Difference from the centre at which the cycle starts.")
-    start_rate: ListOf[float] = Field(description="Its rate, per period.")
+    start_rate: ListOf[float] = Field(description="Rate of this difference, per period.")
     period_s: Seconds = Field(description="Period of the demonstrations.")
     duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
     weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, a row for each signal.")
 
 
 class RhythmicExecution(PathExecution):
-    """A rhythmic motion, until its time is over.
+    """A rhythmic motion, until its end.
 
     Attributes:
         amplitude: Its amplitude, as a multiple of the demonstrated one; may be set at any time.
@@ -63,7 +63,7 @@ class RhythmicExecution(PathExecution):
 
     @property
     def end_s(self) -> float:
-        """Time at which it is to end [s]."""
+        """Time of its end [s]."""
         return self._duration_s
 
     @property
@@ -76,7 +76,7 @@ class RhythmicExecution(PathExecution):
         self.spring = SpringDamper(self.spring.alpha, checked_period(period_s))
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Goes on by a time step, see `Execution`."""
+        """Advances by a time step, see `Execution`."""
         state = super().step(dt_s, couplings)
         self.cycles, self._counted_s = self._cycles_at(state.time_s), state.time_s
         return state
@@ -105,7 +105,7 @@ def checked_period(period_s: float) -> float:
 
 
 class RhythmicDMP(Primitive):
-    """A rhythmic dynamic movement primitive: it repeats, around any centre, with any period and amplitude.
+    """A rhythmic dynamic movement primitive: a periodic motion with any centre, period and amplitude.
 
     It is the limit cycle of Ijspeert 2013 (equations 2.7 to 2.9).
 
@@ -159,7 +159,7 @@ class RhythmicDMP(Primitive):
         self._find_start(space)
 
     def _find_start(self, space: Space) -> None:
-        """Finds where the cycle starts, and how fast, by letting it settle."""
+        """Finds start and initial velocity of the cycle, by integration until the motion has settled."""
         self._space = space
         settling = RhythmicExecution(self, self._learned_center, self._period_s)
         settling.amplitude = 1.0
@@ -204,10 +204,10 @@ class RhythmicDMP(Primitive):
 
 
 def _period_of(space: Space, demonstration: Demonstration, center: Array) -> float:
-    """Returns the period of a demonstration [s]: the first lag at which it correlates with itself, refined by a fit.
+    """Returns the period of a demonstration [s]: the first peak of its autocorrelation, refined by a fit.
 
     Raises:
-        DemonstrationError: If it does not repeat.
+        DemonstrationError: If it is not periodic.
     """
     path = np.array([space.minus(point, center) for point in demonstration.points])
     duration_s, count = demonstration.duration_s, len(path)
@@ -234,7 +234,7 @@ def _period_of(space: Space, demonstration: Demonstration, center: Array) -> flo
 
 
 def _shift_of(basis: PeriodicBasis, cycle: Array, cycles: Array, path: Array) -> float:
-    """Returns the share of a period by which a demonstration is ahead of a cycle, by the best fit."""
+    """Returns the lead of a demonstration over a cycle as a share of the period, by the best fit."""
 
     def error(shift: float) -> float:
         return float(np.sum((path - basis.values(cycles + shift) @ cycle.T) ** 2))

@@ -1,4 +1,4 @@
-"""Recording of demonstrations, as the release's `dmp.data_collector` has it."""
+"""Recording of demonstrations, with the interface of the release's `dmp.data_collector`."""
 
 import threading
 
@@ -12,7 +12,7 @@ from custom_ros_tools.transforms import Array
 
 
 class EmptyRecordingError(InterfaceError):
-    """A recording has no sample."""
+    """A recording has no samples."""
 
     def __str__(self) -> str:
         return "nothing was recorded: expected samples between start and stop"
@@ -23,7 +23,7 @@ class DMPDataCollector:
 
     Args:
         zero_time: Whether times of `get` begin at 0.
-        interpolate: Number of samples of `get`, at equal times; None for the samples as they came.
+        interpolate: Number of samples of `get`, at equal times; None for the recorded samples.
     """
 
     def __init__(self, zero_time: bool = True, interpolate: int | None = None) -> None:
@@ -34,7 +34,7 @@ class DMPDataCollector:
         self.is_on = False
 
     def is_empty(self) -> bool:
-        """Returns whether there is no sample."""
+        """Returns whether there are no samples."""
         return not self._times
 
     def reset(self) -> None:
@@ -43,7 +43,7 @@ class DMPDataCollector:
             self._times, self._samples = [], []
 
     def start(self) -> None:
-        """Starts to record, in addition to the samples that there are."""
+        """Starts to record; earlier samples are kept."""
         self.is_on = True
 
     def stop(self) -> None:
@@ -51,7 +51,7 @@ class DMPDataCollector:
         self.is_on = False
 
     def append(self, time_s: float, sample: list[float]) -> None:
-        """Adds a sample, unless it is not newer than the one before."""
+        """Adds a sample, if it is newer than the one before."""
         with self._lock:
             if not self._times or time_s > self._times[-1]:
                 self._times.append(time_s)
@@ -85,8 +85,8 @@ class TFPositionDMPDataCollector(DMPDataCollector):
     """Records the position of a TF frame in another [m].
 
     Args:
-        parent: The frame that positions are in.
-        child: The frame whose positions they are.
+        parent: The reference frame.
+        child: The frame whose positions are recorded.
         hz: Rate of samples [Hz]; a transform whose stamp has not changed is no sample.
         zero_time: See `DMPDataCollector`.
         collect_x: Whether x is recorded.

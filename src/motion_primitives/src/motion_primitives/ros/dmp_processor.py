@@ -1,4 +1,4 @@
-"""Learning and planning by the release's services, as its `dmp.dmp_proc` has it."""
+"""Learning and planning by the release's services, with the interface of its `dmp.dmp_proc`."""
 
 from collections.abc import Sequence
 
@@ -12,11 +12,11 @@ from custom_ros_tools.ros.services import get_srv_handler
 from custom_ros_tools.transforms import Array
 
 Gains = float | Sequence[float]
-"""A gain of each dimension, or one for all."""
+"""A gain for each dimension, or one for all."""
 
 
 class DMPProcessor:
-    """Calls the services of `dmp_server`, and waits until they are there."""
+    """Calls the services of `dmp_server`, and waits until they are available."""
 
     def __init__(self) -> None:
         self._learn = get_srv_handler("learn_dmp_from_demo", LearnDMPFromDemo)

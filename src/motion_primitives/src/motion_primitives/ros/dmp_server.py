@@ -21,9 +21,9 @@ from motion_primitives.release_dmp import ReleaseDMP, learn, plan
 
 
 class DMPServer:
-    """Learns primitives of one dimension each, and plans with those that were set active.
+    """Learns primitives of one dimension each, and plans with the active ones.
 
-    A request that makes no sense gets an error of the service, which names the field; the active primitives stay.
+    An invalid request fails with an error that names the field; the active primitives stay.
     """
 
     def __init__(self) -> None:

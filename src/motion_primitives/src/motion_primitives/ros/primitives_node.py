@@ -1,4 +1,4 @@
-"""`primitives_node.py`: learns movement primitives from what it sees, plans with them and executes them."""
+"""`primitives_node.py`: learns movement primitives from demonstrations, plans with them and executes them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ NODE = "primitives_node"
 STATE_HZ = 10.0
 """Rate of the state while nothing changes [Hz]."""
 MAX_STEP_S, MAX_TICK_S = 0.01, 0.1
-"""Longest step of integration, and longest time that a motion goes on at once, however late the node is [s]."""
+"""Longest step of integration, and longest time by which a motion advances at once, even if the node is late [s]."""
 MAX_SAMPLES = 1_000_000
 """Number of samples after which a recording ends."""
 NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -198,7 +198,7 @@ class PrimitivesNode:
         for index, name in enumerate(trajectory.space.names):
             lower, upper = self._config.bounds.get(name, (-math.inf, math.inf))
             column = trajectory.positions[:, index]
-            for value in (column[-1], column.min(), column.max()):  # the goal is named first
+            for value in (column[-1], column.min(), column.max()):  # an error in the goal is reported first
                 if not lower <= value <= upper:
                     subject = f"goal: {name}" if value == column[-1] else name
                     raise PlanError(subject, f"positions from {lower:g} to {upper:g}", f"{value:.4g}")
@@ -266,7 +266,7 @@ class PrimitivesNode:
             now = rospy.Time.now()
             passed_s = min((now - self._ticked).to_sec(), MAX_TICK_S)
             self._ticked = now
-            if passed_s <= 0.0:  # simulated time stands still, or begins anew
+            if passed_s <= 0.0:  # simulated time is paused, or has been reset
                 return
             count, couplings = math.ceil(passed_s / MAX_STEP_S), self._couplings()
             for _ in range(count):
@@ -315,7 +315,7 @@ class PrimitivesNode:
             )
 
     def _tried(self, action: Callable[[], str]) -> Answer:
-        """Returns the answer of a service whose action returns a message, or raises an error."""
+        """Returns the response of a service whose action returns a message, or raises an error."""
         with self._lock:
             try:
                 success, self._message = True, action()

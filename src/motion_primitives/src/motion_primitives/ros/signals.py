@@ -1,4 +1,4 @@
-"""Signals that demonstrations show, and that executed motions are: TF, joints, bare numbers."""
+"""Signals of demonstrations and of executed motions: TF, joints, bare numbers."""
 
 from __future__ import annotations
 

@@ -52,7 +52,8 @@ class FloatingRobot:
         upper: Greatest ones.
         centre: The centre of mass in the world, shape (3,) [m].
 
-    Raises: ValueError: If the URDF has other joints.
+    Raises:
+        ValueError: If the URDF has other joints.
     """
 
     def __init__(self, urdf_filename: str, joints: Sequence[str]) -> None:

@@ -63,7 +63,8 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 def rings_of(corners: ArrayLike) -> Array:
     """Returns the rings of the sleeve but the last (11 x 14 x 3) [m], from the corners of its triangles.
 
-    Raises: ValueError: If the number of triangles differs, or a corner is not finite.
+    Raises:
+        ValueError: If the number of triangles differs, or a corner is not finite.
     """
     triangles, expected = np.asarray(corners, dtype=float), 2 * AROUND * (RINGS - 1)
     if triangles.size != 9 * expected:

@@ -55,7 +55,9 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
 class Trial:
     """A trial: a person holds out an arm in the example's world, and a controller dresses them.
 
-    Args: world: World of the example, possibly with additions. person: Person whose segments the avatar follows.
+    Args:
+        world: World of the example, possibly with additions.
+        person: Person whose segments the avatar follows.
         dressing: The controller.
         force_limit_n: Largest sum of forces on the arm [N].
 

@@ -40,7 +40,8 @@ class Way:
     Args:
         arm: Where the person's arm is.
 
-    Attributes: length: Length of the path [m].
+    Attributes:
+        length: Length of the path [m].
     """
 
     def __init__(self, arm: ArmPosition) -> None:

@@ -144,9 +144,10 @@ class SceneFailedError(InterfaceError):
 
 
 class Scene(ABC):
-    """A task of robots in a world: its start, the robots' actions, and the test of success. Time passes in cycles: the
-    scene observes, acts, and a cycle of ticks follows. All random numbers come from `random`, so that a seed leads to
-    the same episode anywhere.
+    """A task of robots in a world: its start, the robots' actions, and the test of success.
+
+    Time passes in cycles: the scene observes, acts, and a cycle of ticks follows. All random numbers come from
+    `random`, so that a seed leads to the same episode anywhere.
 
     Args:
         random: Random numbers of the episode.
@@ -309,7 +310,9 @@ class SceneResult(NamedTuple):
         success: Whether the task succeeded.
         done: Number of parts of the task that are done.
         of: Number of all parts.
-        time_s: Duration [s]. figures: Measures of quality. reason: Reason of a failure; empty if unknown.
+        time_s: Duration [s].
+        figures: Measures of quality.
+        reason: Reason of a failure; empty if unknown.
     """
 
     success: bool

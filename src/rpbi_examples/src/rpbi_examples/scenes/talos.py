@@ -43,8 +43,9 @@ class Talos(Scene):
     """A torque-controlled Talos balances: it reaches for a ball, and is pushed at its torso from a random direction.
 
     Attributes:
-        target: Target of the hand's point, in the world. push_angle: Direction of the push, from the robot's initial
-            forward direction to its left [rad]. impulse: Impulse of the push [N s].
+        target: Target of the hand's point, in the world.
+        push_angle: Direction of the push, from the robot's initial forward direction to its left [rad].
+        impulse: Impulse of the push [N s].
     """
 
     world = "{rpbi_examples}/configs/talos/config.yaml"

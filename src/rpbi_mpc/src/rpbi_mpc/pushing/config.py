@@ -28,11 +28,11 @@ class PushingConfig(ConfigModel):
         approach: Motion to the slider.
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
         max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
-        max_off: Distance of the slider from the path beyond which the task has failed [m].
+        max_off: Distance of the slider from the path at which the task fails [m].
         tolerance: Largest errors of a push that counts as finished.
-        settle_s: Time after the end of the path for which the last pose is aimed at [s].
+        settle_s: Time after the end of the path for which the last pose is the target [s].
         cycle_s: Time of a cycle, for which a command acts [s].
-        lag_s: Time from a command until the pusher moves by it, beside the delay of the loop [s].
+        lag_s: Delay from a command to the motion of the pusher, besides the delay of the loop [s].
         plan_cycles: Number of commands of a plan, one for each cycle.
         max_command: Largest speed of the pusher [m/s].
     """
@@ -46,9 +46,9 @@ class PushingConfig(ConfigModel):
     gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(5.0, description="Rate at which a gap is closed in contact.")
     max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
     max_off: PositiveMetres = Field(0.15, description="Distance of the slider from the path at which the loop stops.")
-    tolerance: ToleranceConfig = Field(ToleranceConfig(), description="Largest errors of a push that is finished.")
+    tolerance: ToleranceConfig = Field(ToleranceConfig(), description="Largest errors of a successful push.")
     settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
     cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
-    lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Time until the pusher moves by a command.")
+    lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Delay of the pusher's motion.")
     plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Commands of a plan, one for each cycle.")
     max_command: Annotated[Positive, Unit("m/s")] = Field(0.2, description="Largest speed of the pusher.")

@@ -1,4 +1,6 @@
-"""The controller of pushing: estimates, brings the pusher to the slider, and has a planner push along a path."""
+"""The controller of pushing: estimates the state, moves the pusher to the slider, and follows a planner along the
+path.
+"""
 
 from __future__ import annotations
 
@@ -19,18 +21,18 @@ from .planar.paths import PushPath
 from .planner import ProgramPlanner, PushPlanner, PushSituation
 
 KEPT_REFERENCES = 100
-"""Number of references that are kept, to be compared with measurements of their time."""
+"""Number of references kept for comparison with later measurements."""
 
 
 class PushingController(MpcController):
     """Pushes a slider along a path by a round pusher, whose velocity is commanded.
 
-    The time of the path stands still while the pusher is not at the slider, and while the slider is too far behind
-    the reference. The measured slider decides whether the task is done, not the estimated one, which follows the model.
+    Path time stops while the pusher is not at the slider, and while the slider is too far behind the reference. The
+    measured slider decides whether the task is done, not the estimated one, which follows the model.
 
     Args:
         config: Slider, pusher, path and cost.
-        planner: Plans while the pusher is at the slider; without it, a nonlinear program does.
+        planner: Makes plans while the pusher is at the slider; by default, a nonlinear program.
     """
 
     measured_names = ("x", "y", "yaw", "pusher_x", "pusher_y")
@@ -58,7 +60,7 @@ class PushingController(MpcController):
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors of the measured slider, and the misfit of the model, up to now."""
+        """Errors of the measured slider, and the misfit of the model, so far."""
         return self._record.outcome
 
     @property
@@ -84,9 +86,9 @@ class PushingController(MpcController):
         self._estimator.executed(time_s + self.config.lag_s, command)
 
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns commands from the scene that is expected when the first one acts.
+        """Returns commands, planned from the predicted scene at the time of the first one.
 
-        A plan of the approach has commands and no solution; its cost is NaN.
+        A plan of the approach has commands but no solution; its cost is NaN.
         """
         acts_s = sensed.time_s + delay_s + self.config.lag_s
         self._references.append((acts_s, self.path_time_s))
@@ -107,7 +109,7 @@ class PushingController(MpcController):
         return dataclasses.replace(plan, extras=extras | plan.extras)
 
     def _note(self, sensed: Sensed) -> float:
-        """Notes what was measured, and returns the distance from the reference of that time [m]."""
+        """Records a measurement, and returns its distance from the reference of the same time [m]."""
         assert sensed.values is not None
         measured = PlanarScene.of(sensed.values)
         times_s, path_times_s = zip(*self._references)
@@ -121,7 +123,7 @@ class PushingController(MpcController):
         return float(np.hypot(*deviation[:2]))
 
     def _go_on(self, lag: float) -> None:
-        """Moves the reference on by a cycle, unless the slider is too far behind it."""
+        """Advances the reference by a cycle, unless the slider is too far behind it."""
         if self.path_time_s >= self.path.duration_s:
             self._settled_s += self.config.cycle_s
         elif lag <= self.config.max_lag:

@@ -1,4 +1,4 @@
-"""Result of a push by what was measured: errors at the goal and on the way, and how far the model is off."""
+"""Result of a push from measurements: errors at the goal and along the path, and the error of the model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ToleranceConfig(ConfigModel):
     """
 
     goal: PositiveMetres = Field(0.005, description="Largest distance of the slider from the end of the path.")
-    goal_rad: Annotated[Positive, Unit("rad")] = Field(0.26, description="Largest difference in yaw there.")
+    goal_rad: Annotated[Positive, Unit("rad")] = Field(0.26, description="Largest difference in yaw at the end.")
     tracking: PositiveMetres = Field(0.015, description="Largest mean distance from the reference.")
 
 
@@ -35,9 +35,9 @@ class PushOutcome(NamedTuple):
         goal_m: Distance from the end of the path at the end [m]; NaN before it.
         goal_rad: Angle from the direction of the path there [rad]; NaN before it.
         tracking_m: Mean distance from the reference [m].
-        misfit: Mean speed by which the slider moves unlike the model while it is pushed, as a share of the speed along
-            the path; turning counts by the characteristic length.
-        face_m: By how much the pushed face is farther from the middle than in the model [m].
+        misfit: Mean difference of the slider's velocity from the model while it is pushed, as a share of the speed
+            along the path; rotation is weighted by the characteristic length.
+        face_m: Distance of the pushed face from the middle, minus that in the model [m].
     """
 
     goal_m: float
@@ -78,7 +78,7 @@ class PushOutcome(NamedTuple):
 
 
 class PushRecord:
-    """Collects what is measured in each cycle.
+    """Collects the measurements of each cycle.
 
     Args:
         slider: The slider of the model.
@@ -93,18 +93,18 @@ class PushRecord:
         self._pushed: list[tuple[float, float]] = []
 
     def track(self, deviation: np.ndarray, at_end: bool) -> None:
-        """Notes the deviation of the measured slider from the reference [m, m, rad]."""
+        """Records the deviation of the measured slider from the reference [m, m, rad]."""
         self._errors.append(float(np.hypot(*deviation[:2])))
         if at_end:
             self._ends.append(deviation)
 
     def push(self, drift: np.ndarray, gap: float) -> None:
-        """Notes by which twist the slider moves unlike the model [m/s, m/s, rad/s], and the measured gap [m]."""
+        """Records the difference of the slider's twist from the model [m/s, m/s, rad/s], and the measured gap [m]."""
         self._pushed.append((float(np.linalg.norm(self._scale * drift)) / self._speed, gap))
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors and misfit up to now; NaN where nothing was noted yet."""
+        """Errors and misfit so far; NaN without records."""
         x, y, yaw = np.mean(self._ends, axis=0) if self._ends else np.full(3, math.nan)
         misfit, gap = np.mean(self._pushed, axis=0) if self._pushed else np.full(2, math.nan)
         tracking_m = float(np.mean(self._errors)) if self._errors else math.nan

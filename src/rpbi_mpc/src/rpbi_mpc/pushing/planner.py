@@ -21,12 +21,12 @@ class PushSituation(NamedTuple):
     """Scene, path and time from which a planner starts.
 
     Attributes:
-        scene: The scene that is expected when the first command acts.
+        scene: The predicted scene at the time of the first command.
         gap: Distance between pusher and face in it [m], negative inside.
         contact: Place of the pusher along the face [m].
-        delay_s: Time from now until then [s].
+        delay_s: Time until the first command acts [s].
         path: The path.
-        path_time_s: Time along the path then [s].
+        path_time_s: Time along the path when it acts [s].
     """
 
     scene: PlanarScene
@@ -37,9 +37,9 @@ class PushSituation(NamedTuple):
     path_time_s: float
 
     def reference(self, times_s: np.ndarray) -> np.ndarray:
-        """Returns where the slider should be at times after the first command [s], N x 3 [m, m, rad].
+        """Returns reference poses of the slider at times after the first command [s], N x 3 [m, m, rad].
 
-        Yaw is that of the slider plus less than half a turn.
+        Yaw differs by less than half a turn from that of the slider.
         """
         poses = self.path.poses(self.path_time_s + times_s)
         poses[:, 2] += 2 * math.pi * round((self.scene.slider[2] - poses[0, 2]) / (2 * math.pi))
@@ -52,7 +52,7 @@ class PushSituation(NamedTuple):
 
 
 class PushPlanner(ABC):
-    """Plans velocities of a pusher that is at the slider."""
+    """Plans velocities of a pusher in contact with the slider."""
 
     @abstractmethod
     def plan(self, situation: PushSituation) -> ControlPlan:
@@ -64,10 +64,10 @@ class PushPlanner(ABC):
 
 
 class ProgramPlanner(PushPlanner):
-    """Solves `PushingProgram` at each cycle, started from the last solution.
+    """Solves `PushingProgram` at each cycle, with a warm start from the last solution.
 
-    Further numbers of a plan are its first force, `normal` and `tangential` in units of the speed that it causes, and
-    the speed of `sliding` to the left along the face [m/s].
+    The extras of a plan are its first force, `normal` and `tangential` in units of the speed that it causes, and the
+    speed of `sliding` to the left along the face [m/s].
 
     Args:
         config: Slider, pusher, path and cost.
@@ -128,6 +128,6 @@ class ProgramPlanner(PushPlanner):
 
 
 def _limited(velocity: np.ndarray, most: float) -> np.ndarray:
-    """Returns a velocity in the same direction that is not faster."""
+    """Returns a velocity, scaled down to the limit."""
     speed = float(np.hypot(*velocity))
     return velocity if speed <= most else velocity * (most / speed)

@@ -30,9 +30,9 @@ class WeightsConfig(ConfigModel):
         position: Distance from the path [1/m^2].
         yaw: Difference from its direction [1/rad^2].
         contact: Distance of the pusher from the middle of the face [1/m^2].
-        force: Difference of the normal force from that along the path, and tangential force [s^2/m^2].
+        force: Difference of the normal force from that of motion along the path, and tangential force [s^2/m^2].
         sliding: Speed of sliding along the face [s^2/m^2].
-        change: Change of the force from the one before to that of the first step [s^2/m^2].
+        change: Change from the previous force to that of the first step [s^2/m^2].
         final: Factor of the weights of the last state.
         complementarity: Penalty of inputs that neither stick nor slide [s^2/m^2].
     """
@@ -40,7 +40,7 @@ class WeightsConfig(ConfigModel):
     position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
     yaw: NonNegative = Field(10.0, description="Weight of the difference from its direction [1/rad^2].")
     contact: NonNegative = Field(1.0, description="Weight of the pusher's distance from the middle [1/m^2].")
-    force: NonNegative = Field(10.0, description="Weight of forces unlike those along the path [s^2/m^2].")
+    force: NonNegative = Field(10.0, description="Weight of deviations from the forces along the path [s^2/m^2].")
     sliding: NonNegative = Field(10.0, description="Weight of sliding along the face [s^2/m^2].")
     change: NonNegative = Field(10.0, description="Weight of a change of the force at the first step [s^2/m^2].")
     final: NonNegative = Field(5.0, description="Factor of the weights of the last state.")
@@ -52,24 +52,24 @@ class ProgramConfig(ConfigModel):
 
     Attributes:
         steps: Number of steps of the horizon.
-        step_s: Time of one [s].
+        step_s: Duration of a step [s].
         max_speed: Largest normal speed of the pusher, and of sliding along the face [m/s].
         weights: The cost.
         solvers: Solvers in the order in which they are tried until one converges: `fatrop` (L. Vanroye et al., IROS
-            2023), an interior-point method for optimal control that is several times as fast, and `ipopt` (A. Waechter
+            2023), an interior-point method for optimal control that is several times faster, and `ipopt` (A. Waechter
             and L. Biegler, Mathematical Programming 106, 2006), which converges more often.
-        max_iterations: Number after which a solver gives up.
+        max_iterations: Number of iterations after which a solver gives up.
         tolerance: Optimality at which it stops.
     """
 
     steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
-    step_s: Seconds = Field(0.08, description="Time of one step.")
+    step_s: Seconds = Field(0.08, description="Duration of a step.")
     max_speed: Annotated[Positive, Unit("m/s")] = Field(0.15, description="Largest speed of the pusher.")
     weights: WeightsConfig = Field(WeightsConfig(), description="The cost.")
     solvers: Annotated[ListOf[Literal["fatrop", "ipopt"]], Field(min_length=1)] = Field(
         ("fatrop", "ipopt"), description="Solvers, tried in this order until one converges."
     )
-    max_iterations: Annotated[int, Field(ge=1)] = Field(40, description="Number after which a solver gives up.")
+    max_iterations: Annotated[int, Field(ge=1)] = Field(40, description="Largest number of iterations.")
     tolerance: Positive = Field(1e-3, description="Optimality at which it stops.")
 
 
@@ -98,7 +98,7 @@ class Solved(NamedTuple):
 
 
 class PushingProgram:
-    """Inputs that push a slider along a path, over a horizon; compiled once, solved at each cycle.
+    """Optimal inputs to push a slider along a path, over a horizon; compiled once, solved at each cycle.
 
     Args:
         slider: The slider.
@@ -117,7 +117,7 @@ class PushingProgram:
 
         Args:
             state: The first state.
-            reference: Poses to be at, (steps + 1) x 3 [m, m, rad].
+            reference: Reference poses, (steps + 1) x 3 [m, m, rad].
             speed: Normal force along the path [m/s].
             force: Normal and tangential force before the first step [m/s].
             guess: States and inputs to start from, see `guess_of`.
@@ -195,7 +195,9 @@ class PushingProgram:
         )
 
     def _limited(self, state: Any, control: Any) -> Any:
-        """Returns the rows of a step that are not negative: the friction cone, and the speed of the pusher."""
+        """Returns the inequality constraints of a step, as non-negative rows: the friction cone, and the speed of the
+        pusher.
+        """
         normal, tangential = control[0], control[1]
         edge = self._slider.friction * normal
         return casadi.vertcat(
@@ -210,7 +212,7 @@ class PushingProgram:
         least, most = np.array([0.0, -fast, 0.0, 0.0]), np.array([fast, fast, fast, fast])
         self._lower = self.guess_of(np.tile(lower, (self._steps + 1, 1)), np.tile(least, (self._steps, 1)))
         self._upper = self.guess_of(np.tile(upper, (self._steps + 1, 1)), np.tile(most, (self._steps, 1)))
-        free = slice(0, NX)  # the first state is given, wherever the pusher is
+        free = slice(0, NX)  # the first state is given, also outside the limits
         self._lower[free], self._upper[free] = -np.inf, np.inf
         self._lower_g = np.zeros(len(self._equal))
         self._upper_g = np.where(self._equal, 0.0, np.inf)

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 OUTLINES = 12
 """Number of outlines of the slider in the picture of the path."""
 AHEAD_S = (0.4, 1.2)
-"""Times after which predicted and actual place of the slider are compared [s]."""
+"""Times after which the predicted and the actual position of the slider are compared [s]."""
 
 
 def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingController) -> dict[str, Any]:
     """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder; returns the summary.
 
-    Errors are those of the measured slider to the reference of the time of the measurement.
+    Errors are differences of the measured slider from the reference at the time of the measurement.
 
     Raises:
         OSError: If the folder cannot be written.
@@ -74,7 +74,9 @@ def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, An
 
 
 def _predicted(cycle: Cycle, ahead_s: float) -> np.ndarray:
-    """Returns x, y of the slider that a plan predicts for some time after its first command [m]; NaN without it."""
+    """Returns x, y of the slider predicted by a plan for a time after its first command [m]; NaN without a
+    prediction.
+    """
     plan = cycle.plan
     row = 0 if plan is None else round(ahead_s / plan.state_step_s)
     return np.full(2, np.nan) if plan is None or row >= len(plan.states) else plan.states[row, :2]

@@ -1,4 +1,4 @@
-"""Plans of pushing by simulation: candidates are pushed in forks of the world, and the best one acts."""
+"""Plans of pushing by simulation: candidates are simulated in forks of the world, and the best one is executed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PushRollouts(Protocol):
         Args:
             velocities: Velocities of the pusher in the axes of the table [m/s], candidates x cycles x 2.
             period_s: Time of a command [s].
-            delay_s: Time until the first one acts [s]; the present one goes on until then.
+            delay_s: Time until the first one acts [s]; until then, the present one is kept.
         """
 
 
@@ -42,7 +42,7 @@ class PushSamplingConfig(SamplingConfig):
             line. Within the horizon, turning hardly reduces the distance from the path, so it has a weight of its own.
     """
 
-    horizon: Seconds = Field(1.2, description="Time that is looked ahead.")
+    horizon: Seconds = Field(1.2, description="Horizon.")
     knots: Annotated[int, Field(ge=2)] = Field(3, description="Knots of a plan, between which velocities are linear.")
     sampler: dict[Text, Any] = Field(
         {"type": "predictive", "candidates": 16, "noise": 0.2},
@@ -58,12 +58,12 @@ RETREAT = 0.2
 
 
 class SamplingPlanner(PushPlanner):
-    """Takes the push that ends best in forks of the world.
+    """Chooses the push with the lowest cost in forks of the world.
 
     Args:
         rollouts: Simulates pushes.
         config: Slider, path and weights.
-        sampling: Candidates, and the choice among them.
+        sampling: Number and choice of candidates.
     """
 
     def __init__(self, rollouts: PushRollouts, config: PushingConfig, sampling: PushSamplingConfig) -> None:
@@ -126,7 +126,7 @@ class _ScoredPushes:
         return gaps, contacts
 
     def _costs(self, scenes: np.ndarray, gaps: np.ndarray, contacts: np.ndarray, period_s: float) -> np.ndarray:
-        """Returns the cost of each candidate; inf for one without scenes, or whose pusher leaves the face."""
+        """Returns the cost of each candidate; inf without scenes, or if the pusher leaves the face."""
         weights, slider = self._config.program.weights, self._config.slider
         difference = scenes[..., :3] - self.situation.reference(period_s * (1.0 + np.arange(scenes.shape[1])))
         by_cycle = (

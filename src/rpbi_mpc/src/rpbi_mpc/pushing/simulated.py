@@ -1,4 +1,4 @@
-"""Pushing in a world of the simulator, in this process and without ROS."""
+"""Pushing in a world in this process, without ROS."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ TIMEOUT_S = 0.1
 
 
 class PushingWorld(Plant):
-    """A slider that Vicon sees, and a pusher on two slides whose velocities are commanded.
+    """A slider tracked by Vicon, and a pusher on two linear joints whose velocities are commanded.
 
-    Measurements of the pusher are as late as those of the slider.
+    Measurements of the pusher have the same delay as those of the slider.
 
     Args:
         world: The world, with a body `box` that carries a sensor `vicon`, and a robot `pusher` whose first two joints

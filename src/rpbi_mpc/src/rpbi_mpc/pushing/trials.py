@@ -1,4 +1,4 @@
-"""Random trials of pushing in the simulator: with other friction, another centre of mass, noise, delay and shoves."""
+"""Random trials of pushing in the simulator: with varied friction and centre of mass, noise, delay and shoves."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .simulated import PushingWorld
 
 WORLD = "{rpbi_mpc}/configs/bench/config.yaml"
 FRICTION, CENTRE = 0.3, 0.1
-"""Largest relative error of the coefficients of friction, and of the centre of mass in sizes of the box."""
+"""Largest error of the coefficients of friction, relative, and of the centre of mass, as a share of the box's size."""
 SIZE, HEIGHT = (0.1, 0.1), 0.025
 """Length and width of the box, and the height of its middle [m]."""
 TABLE_FRICTION, PUSHER_FRICTION = 1.0, 0.857
-"""Nominal friction in the files of the world; that of the box, 0.35, is a factor of both."""
+"""Nominal friction in the files of the world; the friction of the box, 0.35, is a factor of both."""
 SHOVE_M, SHOVE_RAD = 0.03, math.radians(30.0)
 """Distance and angle of a shove."""
 LEAST_CLEARANCE = 0.0005
-"""Distance from the pusher that a shoved box keeps [m]."""
+"""Least distance of a shoved box from the pusher [m]."""
 
 
 class Variation(NamedTuple):
@@ -56,7 +56,7 @@ class Variation(NamedTuple):
 
     @classmethod
     def random(cls, seed: int, noise_m: float = 0.002, latency_s: float = 0.02) -> Variation:
-        """Returns a variation by its seed, evenly distributed between the limits above."""
+        """Returns the variation of a seed, uniformly distributed between the limits above."""
         random = np.random.default_rng(seed)
         table, pusher = 1.0 + random.uniform(-FRICTION, FRICTION, 2)
         x, y = random.uniform(-CENTRE, CENTRE, 2) * SIZE
@@ -69,12 +69,12 @@ class PushingTrial(NamedTuple):
     """Result of a trial.
 
     Attributes:
-        errors: Distance of the slider's middle from the reference, one for each cycle [m]. The reference stands still
-            while the pusher is not at the slider, or the slider is too far behind.
-        off_path: Distance from the path, wherever along it, likewise [m].
+        errors: Distance of the slider's middle from the reference, one for each cycle [m]. The reference stops while
+            the pusher is not at the slider, or the slider is too far behind.
+        off_path: Least distance from the path, one for each cycle [m].
         cycles: The cycles.
         truth: Time, x, y, yaw, pusher x, pusher y after each half of a cycle.
-        finished: Whether the end of the path was reached, with errors within the tolerance of the configuration.
+        finished: Whether the slider reached the end of the path, with errors within the tolerance of the configuration.
         recovered_s: Time from the shove until the error stays below a limit [s]; NaN without a shove, inf if never.
     """
 
@@ -149,9 +149,9 @@ def run_trial(
     Args:
         config: Configuration of the controller.
         variation: How the world differs from its model.
-        loop: Times of the loop; the default ones without it.
-        shove_at_s: When the box is shoved by 3 cm and 30 degrees [s]; never without it.
-        make_controller: Makes another controller for the plant; without it, one of the configuration.
+        loop: Times of the loop; by default those of the package.
+        shove_at_s: Time at which the box is shoved by 3 cm and 30 degrees [s]; None for no shove.
+        make_controller: Makes the controller for the plant; by default that of the configuration.
         recovered_below: Error below which the box has recovered [m].
         max_s: Time after which the trial ends [s].
     """
@@ -188,9 +188,9 @@ def run_trial(
 
 
 def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generator) -> None:
-    """Moves the box by 3 cm in a random direction and turns it by 30 degrees to a random side, at once.
+    """Teleports the box by 3 cm in a random direction and by 30 degrees to a random side.
 
-    The hand does not give way: a box that would lie in the pusher is put before it.
+    A box that would penetrate the pusher is put in front of it.
     """
     world, pose = plant.world, plant.slider_pose()
     direction, side = random.uniform(-math.pi, math.pi), random.choice((-1.0, 1.0))

@@ -19,7 +19,7 @@ from rpbi_mpc.pushing.planar.slider import SliderConfig
 
 FRAME = "rpbi/world"
 SPACING = 0.005
-"""Distance of the points of the path in RViz [m]."""
+"""Distance between points of the path in RViz [m]."""
 SHOWN_EVERY = 4
 """Number of predicted poses from one outline to the next."""
 PLAN, REFERENCE, SEEN = ColorRGBA(0.1, 0.55, 0.9, 0.9), ColorRGBA(0.2, 0.7, 0.3, 0.9), ColorRGBA(0.93, 0.53, 0.14, 0.9)
@@ -44,7 +44,7 @@ class PushingDisplay:
         self._path.publish(self._path_message(path.poses(times)))
 
     def show(self, plan: ControlPlan | None, sensed: Sensed) -> None:
-        """Publishes a plan, the seen slider, and the reference."""
+        """Publishes a plan, the measured slider, and the reference."""
         if plan is None or sensed.values is None:
             return
         self._prediction.publish(self._path_message(plan.states[:, :3]))

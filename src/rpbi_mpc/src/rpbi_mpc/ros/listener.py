@@ -1,4 +1,4 @@
-"""The newest pose of the slider, and positions of the hand at the time of the pose."""
+"""The newest pose of the slider, and the position of the hand at the same time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
 
 SLACK_S = 1e-4
-"""Difference of stamps below which they are the same [s]: less than a tick, more than rounding."""
+"""Difference below which stamps count as equal [s]: less than a tick, more than rounding."""
 TF = "/tf"
 KEPT = 1000
 """Number of joint states that are kept."""
@@ -42,7 +42,7 @@ class SceneListener:
 
     Args:
         config: Topics.
-        hand: The hand whose joints they are.
+        hand: Kinematics of the hand.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
@@ -103,20 +103,20 @@ class SceneListener:
 
 
 class TickSceneListener(SceneListener):
-    """Takes poses from TF, where a simulator sends everything of a tick in one message.
+    """Takes poses from TF, where a simulator sends all poses of a tick in one message.
 
-    A hidden slider is then one that the message of a tick does not have. The topic of the tracker would not show it: a
-    hidden slider sends nothing there, as if its message were late.
+    A slider is hidden if this message lacks it. The tracker's topic cannot distinguish a hidden slider from a late
+    message.
 
     Args:
         config: Topics; the frame on TF has the name of the tracker's topic.
-        hand: The hand whose joints they are.
+        hand: Kinematics of the hand.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
         self._frame = config.vicon.lstrip("/")
         self._simulator = ""
-        """The node that sends the joint states; others send TF, too."""
+        """Name of the node that sends the joint states; other nodes send TF, too."""
         self._sent_s: dict[str, float] = {}
         """Newest stamp on TF by node [s]."""
         super().__init__(config, hand)

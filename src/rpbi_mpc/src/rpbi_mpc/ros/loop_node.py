@@ -1,4 +1,4 @@
-"""A loop in lock-step as a node: services start it, stop it, or have it run one cycle."""
+"""A loop in lock-step as a node: services start it, stop it, or make it run one cycle."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rpbi_mpc.plant import Plant
 from rpbi_mpc.records import write_records
 
 IDLE_S = 0.04
-"""Time between two commands to a timed plant that stands [s]."""
+"""Time between two commands to a stopped timed plant [s]."""
 MAX_MEAN_PERIODS = 1.2
-"""Largest mean duration of the newest cycles of a timed plant, in periods; beyond it a warning is logged."""
+"""Mean duration of the newest cycles of a timed plant, in periods, beyond which a warning is logged."""
 MEAN_CYCLES = 25
 """Number of cycles of this mean."""
 WARNING_PERIOD_S = 10.0
@@ -32,7 +32,7 @@ Answer = tuple[bool, str]
 
 
 class LoopNode:
-    """Runs a loop in the main thread; services and buttons start it, stop it, or have it run one cycle.
+    """Runs a loop in the main thread; services and buttons start it, stop it, or make it run one cycle.
 
     Parameters are `~start_on_init`, `~out`, the folder of its records, and `~end`, whether the node ends with the task.
 
@@ -56,13 +56,13 @@ class LoopNode:
         self._status.publish(MpcStatus(status="ready", running=self._running))
 
     def show(self, cycle: Cycle) -> None:
-        """Shows a cycle, besides its status."""
+        """Publishes a cycle, in addition to its status."""
 
     def on_stop(self) -> None:
-        """Is called when the loop was stopped by the service."""
+        """Called after the service has stopped the loop."""
 
     def write_report(self, folder: Path) -> str:
-        """Writes the records of all cycles to a folder, and returns a line on them.
+        """Writes the records of all cycles to a folder, and returns a one-line summary.
 
         Raises:
             OSError: If the folder cannot be written.
@@ -167,7 +167,7 @@ class LoopNode:
             self._changed.notify_all()
 
     def _end(self) -> None:
-        """Stands, and writes the report."""
+        """Stops the plant, and writes the report."""
         with self._changed:
             self._running = False
         self._loop.plant.stand()

@@ -25,26 +25,26 @@ from .simulator import SteppedSimulator
 PATIENCE_S = 30.0
 """Longest wait for the first joint states [s]."""
 LATE_S = 5.0
-"""Wait for the messages of a tick [s] by the wall clock after which a warning is logged."""
+"""Wall time of waiting for the messages of a tick after which a warning is logged [s]."""
 
 
 class HandPlant(Plant):
-    """A hand whose velocity in the plane is commanded, by targets of the robot's joints.
+    """A hand with a commanded velocity in the plane, moved by targets of the robot's joints.
 
     Args:
         config: Topics and rates.
         hand: Inverse kinematics of the hand.
-        listener: Has poses and joints.
+        listener: Source of poses and joints.
 
     Raises:
-        InterfaceError: If no joint states arrive, or the hand is not where its targets can begin.
+        InterfaceError: If no joint states arrive, or the hand is out of its plane.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand, listener: SceneListener) -> None:
         self._config, self._hand, self._listener = config, hand, listener
         self._velocity = np.zeros(2)
         self._place: np.ndarray | None = None
-        """Where the hand is sent [m]; None until it has been sent somewhere."""
+        """Target of the hand [m]; None before the first one."""
         self._joints = hand.posture
 
     def sense(self) -> Sensed:
@@ -71,7 +71,7 @@ class HandPlant(Plant):
         self._velocity = np.zeros(2)
 
     def begin_at_the_robot(self) -> None:
-        """Has the next target begin where the robot is measured, for instance after it was halted."""
+        """Makes the next targets begin at the measured position, for instance after a stop of the robot."""
         self._place = None
 
     def advance(self, duration_s: float) -> None:
@@ -87,11 +87,11 @@ class HandPlant(Plant):
         try:
             self._joints, self._place = self._hand.solve(self._joints, place), place
         except InterfaceError as error:
-            rospy.logwarn_throttle(60.0, f"the hand stands: {error}")
+            rospy.logwarn_throttle(60.0, f"the hand stops: {error}")
         return JointState(name=list(self._hand.joint_names), position=self._joints.tolist())
 
     def _begin(self) -> None:
-        """Begins with the targets where the robot is."""
+        """Begins the targets at the robot's measured position."""
         end_s = time.monotonic() + PATIENCE_S
         while (joints := self._listener.joints()) is None and time.monotonic() < end_s and not rospy.is_shutdown():
             self._wait_for_joints()
@@ -107,14 +107,14 @@ class HandPlant(Plant):
 
     @abstractmethod
     def _pass(self, step_s: float, target: JointState) -> None:
-        """Sets a target and lets a time pass [s]."""
+        """Sets a target and waits for a time [s]."""
 
     @abstractmethod
     def _wait_for_joints(self) -> None: ...
 
 
 class SteppedPlant(HandPlant):
-    """A simulator that stands still between the steps, so that no decision depends on the speed of the computer."""
+    """A simulator that is stepped, so that no decision depends on the speed of the computer."""
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
         self._ticks = TickSceneListener(config, hand)
@@ -122,20 +122,20 @@ class SteppedPlant(HandPlant):
         self._simulator = SteppedSimulator(config.robot)
 
     def sense(self) -> Sensed:
-        """Returns the newest measurement that was sent until the last tick, however long its messages take.
+        """Returns the newest measurement up to the last tick; waits for its messages.
 
         Raises:
-            InterfaceError: If the simulator does not answer meanwhile.
+            InterfaceError: If the simulator stops answering.
         """
         while (late := self._ticks.wait_for_tick(self._simulator.time_s, LATE_S)) and not rospy.is_shutdown():
             rospy.logwarn(f"{late}: no message of the tick at {self._simulator.time_s:.3f} s yet, expected one")
-            self._simulator.step(0)  # an error if it is gone
+            self._simulator.step(0)  # raises an error if it has ended
         return super().sense()
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
         """Returns the scene after each command of each candidate, see `PushRollouts`.
 
-        A candidate whose hand gets out of reach cannot be simulated.
+        A candidate with a place out of reach cannot be simulated.
         """
         robot, slider, cycles = self._config.robot, self._config.slider, velocities.shape[1]
         ticks = RolloutTicks.of(cycles, period_s, delay_s, self._simulator.dt_s)
@@ -197,7 +197,7 @@ class SteppedPlant(HandPlant):
 
 
 class TimedPlant(HandPlant):
-    """A robot whose time passes by itself: hardware, its stand-in, or a world that runs."""
+    """A robot in real time: hardware, its stand-in, or a running world."""
 
     is_timed = True
 

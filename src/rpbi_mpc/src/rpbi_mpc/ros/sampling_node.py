@@ -1,4 +1,4 @@
-"""`sampling_mpc_node.py`: commands a robot by the best of its predicted futures."""
+"""`sampling_mpc_node.py`: commands a robot by the best of simulated candidates."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TARGET = "/target"
 
 
 class PredictedRobot(Plant):
-    """A robot in a simulator that is stepped, and predicts by `rpbi/predict`.
+    """A robot in a stepped simulator, with predictions by `rpbi/predict`.
 
     Args:
         config: The targets of a robot that are commanded.
@@ -47,7 +47,7 @@ class PredictedRobot(Plant):
         self._simulator.set_target(JointState(name=list(self.names), position=command.tolist()))
 
     def stand(self) -> None:
-        """Leaves the last target, at which the robot holds."""
+        """Keeps the last target, at which the robot holds."""
 
     def advance(self, duration_s: float) -> None:
         self._simulator.step(whole_ticks(duration_s, self._simulator.dt_s))

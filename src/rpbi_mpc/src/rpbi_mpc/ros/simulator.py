@@ -1,4 +1,4 @@
-"""A simulator that stands still between the steps that are requested, and predicts."""
+"""A simulator that advances only in requested steps, and makes predictions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class SteppedSimulator:
         self._step_n = get_srv_handler("rpbi/step_n", StepN, persistent=True)
         self._predict = get_srv_handler("rpbi/predict", Predict, persistent=True)
         self._set_target = get_srv_handler(f"rpbi/{robot}/set_target", SetJointState, persistent=True)
-        get_srv_handler("rpbi/stop", Trigger)()  # it may stand already
+        get_srv_handler("rpbi/stop", Trigger)()  # it may be stopped already
         self.step(1)
         before_s = self.time_s
         self.step(1)
@@ -52,7 +52,7 @@ class SteppedSimulator:
         self.time_s = float(answer.stamp.to_sec())
 
     def set_target(self, target: JointState) -> None:
-        """Sets targets of joints, which count from the next tick on.
+        """Sets targets of joints, which act from the next tick on.
 
         Raises:
             InterfaceError: If the simulator refuses.
@@ -67,7 +67,7 @@ class SteppedSimulator:
         every: int = 0,
         cost: str = "",
     ) -> list[Prediction]:
-        """Returns what would happen with each candidate, see `World.predict`.
+        """Returns the predicted states for each candidate, see `World.predict`.
 
         Raises:
             InterfaceError: If the simulator refuses.
@@ -85,7 +85,7 @@ def _accepted(service: str, answer: Any) -> Any:
     """Returns the answer of a service.
 
     Raises:
-        InterfaceError: If it is a refusal.
+        InterfaceError: If the request was refused.
     """
     if not answer.success:
         raise InterfaceError(f"{service}: {answer.message}")

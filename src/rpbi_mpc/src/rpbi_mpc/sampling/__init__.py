@@ -1,4 +1,6 @@
-"""Model predictive control by sampling: candidates are simulated in forks of the world, and the best one acts."""
+"""Model predictive control by sampling: candidates are simulated in forks of the world, and the best one is
+executed.
+"""
 
 from .controller import SamplingConfig as SamplingConfig
 from .controller import SamplingController as SamplingController

@@ -1,4 +1,4 @@
-"""A controller that simulates candidates from the present state, and takes the best."""
+"""A controller that simulates candidates from the present state, and executes the best."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Rollouts(Protocol):
 class SamplingConfig(ConfigModel):
     """Options of the controller."""
 
-    horizon: Seconds = Field(0.5, description="Time that is looked ahead.")
+    horizon: Seconds = Field(0.5, description="Horizon.")
     knots: Annotated[int, Field(ge=2)] = Field(
         2, description="Knots of a plan, between which commands are linear; more need more candidates."
     )
@@ -53,9 +53,9 @@ class SamplingConfig(ConfigModel):
 
 
 class SamplingController(MpcController):
-    """Plans by simulation of candidates; see `SAMPLERS` for the ways to choose among them.
+    """Plans by simulation of candidates, chosen by one of `SAMPLERS`.
 
-    The numbers of chance come from the seed and the cycle alone.
+    Random numbers depend only on the seed and the cycle.
 
     Args:
         rollouts: Simulates the candidates.
@@ -140,5 +140,5 @@ class SamplingController(MpcController):
         return commands
 
     def _at(self, plan: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Returns a plan at some times from its start [s], times x m; after its end it stays."""
+        """Returns the commands of a plan at times from its start [s], times x m; after its end, the last one."""
         return np.stack([np.interp(times, self._times, column) for column in plan.T], axis=1)

@@ -1,4 +1,4 @@
-"""Samplers: they draw candidates around a nominal plan, and improve the plan by their costs.
+"""Samplers draw candidates around a nominal plan, and improve the plan from their costs.
 
 A plan is a matrix of knots, k x m: m numbers of the command at k equidistant times, each as a share of its range from
 0 (lower limit) to 1 (upper limit).
@@ -20,14 +20,14 @@ class SamplerConfig(ConfigModel):
     """Options that all samplers have."""
 
     candidates: Annotated[int, Field(ge=2)] = Field(16, description="Plans that are simulated in each iteration.")
-    iterations: Annotated[int, Field(ge=1)] = Field(1, description="Times that the plan is improved in a cycle.")
+    iterations: Annotated[int, Field(ge=1)] = Field(1, description="Number of improvements of the plan in a cycle.")
     noise: Annotated[float, Field(gt=0, le=1)] = Field(
         0.1, description="Standard deviation of each knot, as a share of the range of its number."
     )
 
 
 class Sampler(ABC):
-    """Draws candidates around a nominal plan, and improves the plan by their costs.
+    """Draws candidates around a nominal plan, and improves the plan from their costs.
 
     Args:
         config: Its options.
@@ -40,7 +40,7 @@ class Sampler(ABC):
         self.config = config
         self.shape = shape
 
-    def begin(self) -> None:  # noqa: B027 (only some have something to begin)
+    def begin(self) -> None:  # noqa: B027 (optional)
         """Begins a cycle."""
 
     def draw(self, nominal: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -70,7 +70,7 @@ class PredictiveSampler(Sampler):
 class CemConfig(SamplerConfig):
     """Options of the cross-entropy method."""
 
-    iterations: Annotated[int, Field(ge=1)] = Field(3, description="Times that the plan is improved in a cycle.")
+    iterations: Annotated[int, Field(ge=1)] = Field(3, description="Number of improvements of the plan in a cycle.")
     elites: Annotated[int, Field(ge=1)] = Field(4, description="Best candidates, whose mean is the plan.")
     least_noise: Annotated[float, Field(gt=0, le=1)] = Field(0.01, description="Least standard deviation.")
 
@@ -105,7 +105,7 @@ class MppiConfig(SamplerConfig):
     """Options of MPPI."""
 
     temperature: Annotated[float, Field(gt=0)] = Field(
-        0.1, description="Cost at which a candidate counts 1/e of the best one, as a share of the spread of all costs."
+        0.1, description="Difference in cost for a weight of 1/e, as a share of the spread of all costs."
     )
 
 
@@ -113,7 +113,7 @@ class MppiSampler(Sampler):
     """Model predictive path integral control: the mean of all candidates, weighted by exp(-cost / temperature).
 
     Weights are those of Williams et al., Information-Theoretic MPC, IEEE T-RO 34 (2018), algorithm 2, without the cost
-    of control; the temperature is relative to the spread of the costs, so that it fits any unit.
+    of control; the temperature is relative to the spread of the costs, and thus independent of their unit.
     """
 
     Config = MppiConfig
@@ -135,4 +135,4 @@ SAMPLERS: PluginTable[Sampler] = PluginTable(
         "mppi": "rpbi_mpc.sampling.samplers:MppiSampler",
     },
 )
-"""Ways to choose among candidates, by name."""
+"""Samplers by name."""

@@ -1,4 +1,4 @@
-"""A world in this process as a plant, whose forks simulate candidates."""
+"""A world in this process as a plant; its forks simulate candidates."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def whole_ticks(duration_s: float, dt_s: float) -> int:
     """Returns a duration [s] in ticks.
 
     Raises:
-        InterfaceError: If it is no whole number of ticks.
+        InterfaceError: If it is not a whole number of ticks.
     """
     ticks = round(duration_s / dt_s)
     if abs(ticks * dt_s - duration_s) > 1e-9:
@@ -81,7 +81,7 @@ class RolloutTicks(NamedTuple):
         """Returns the ticks of some commands of a period [s], the first of which acts after a delay [s].
 
         Raises:
-            InterfaceError: If period or delay is no whole number of ticks.
+            InterfaceError: If period or delay is not a whole number of ticks.
         """
         period, delay = whole_ticks(period_s, dt_s), whole_ticks(delay_s, dt_s)
         starts, every = delay + period * np.arange(commands), math.gcd(period, delay)
@@ -89,7 +89,7 @@ class RolloutTicks(NamedTuple):
 
 
 class ForkedWorld(Plant):
-    """A `World` that waits for its controller, and whose forks simulate candidates.
+    """A `World` that waits for its controller; its forks simulate candidates.
 
     Args:
         world: The world.
@@ -115,7 +115,7 @@ class ForkedWorld(Plant):
         self.world.put(self._config.input, dict(zip(self.names, command.tolist(), strict=True)))
 
     def stand(self) -> None:
-        """Leaves the last command, at which a robot holds."""
+        """Keeps the last command, at which a robot holds."""
 
     def advance(self, duration_s: float) -> None:
         for _ in range(whole_ticks(duration_s, self.world.clock.dt_s)):

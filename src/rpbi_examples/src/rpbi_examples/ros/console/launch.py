@@ -209,7 +209,8 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 def _make_way(file: Path, options: argparse.Namespace) -> None:
     """Refuses a launch file that would stop a running simulator, unless it is to replace it.
 
-    Raises: InterfaceError: If it would stop one, or if another one already publishes the clock of this master.
+    Raises:
+        InterfaceError: If it would stop one, or if another one already publishes the clock of this master.
     """
     master = master_of(options.port)
     if options.ns is not None and (clock := clocks(master)):

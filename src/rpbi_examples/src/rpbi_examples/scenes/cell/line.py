@@ -68,7 +68,8 @@ class Belt:
     Args:
         scene: The scene that it is in.
         slot: Input of its targets.
-        joint: Its joint. way_m: Length of its path [m].
+        joint: Its joint.
+        way_m: Length of its path [m].
         speed: Its speed [m/s].
         acceleration: Its acceleration, which parts follow by friction [m/s^2].
 

@@ -73,7 +73,8 @@ def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:
     Args:
         count: Number of lanes; they are parallel to y, and about the origin.
         length: Length of a lane [m].
-        pitch: Distance between lanes [m]. step: Distance between places [m], rounded to divide the path.
+        pitch: Distance between lanes [m].
+        step: Distance between places [m], rounded to divide the path.
 
     Returns:
         Shape (n, 2) [m].

@@ -1,1 +1,1 @@
-"""Slider and pusher in the plane: sizes, quasi-static motion, paths, and the estimate of where they are."""
+"""Slider and pusher in the plane: sizes, quasi-static motion, paths, and the estimate of their poses."""

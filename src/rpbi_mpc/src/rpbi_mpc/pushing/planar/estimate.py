@@ -1,4 +1,4 @@
-"""Where slider and pusher are, from measurements that are late and noisy, and will be when a command acts."""
+"""Estimate of slider and pusher from late and noisy measurements, predicted to the time of the next command."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ from .motion import PlanarScene, moved, rotation
 from .slider import SliderConfig
 
 KEPT_S = 2.0
-"""Time for which commands are kept [s]; a measurement that is older counts as new."""
+"""Time for which commands are kept [s]; an older measurement is treated as new."""
 
 DRIFT_S = 1.0
-"""Time over which the motion unlike the model is smoothed [s]."""
+"""Time constant of the filter of the difference from the model [s]."""
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class EstimatorConfig(ConfigModel):
-    """Share of the difference between measurement and prediction that is corrected in a cycle.
+    """Gains of the estimator: shares of the difference between measurement and prediction that are corrected in a
+    cycle.
 
     Attributes:
         position: Of the position.
         yaw: Of the yaw.
-        jump: Distance between measurement and prediction beyond which the measurement counts alone [m].
+        jump: Distance between measurement and prediction beyond which the measurement replaces the estimate [m].
         jump_rad: The same for yaw [rad].
     """
 
     position: Share = Field(0.4, description="Share of a difference in position that is corrected in a cycle.")
     yaw: Share = Field(0.4, description="Share of a difference in yaw that is corrected in a cycle.")
     jump: Annotated[float, Field(gt=0.0)] = Field(
-        0.012, description="Distance beyond which a measurement counts alone."
+        0.012, description="Distance beyond which a measurement replaces the estimate."
     )
     jump_rad: Annotated[float, Field(gt=0.0)] = Field(0.15, description="The same for yaw.")
 
 
 class SceneEstimator:
-    """Corrects the motion that the model expects by measurements (an observer of fixed gain, D. Luenberger, 1964).
+    """Corrects the predictions of the model by measurements (an observer of fixed gain, D. Luenberger, 1964).
 
     Args:
         config: Gains.
@@ -50,7 +51,7 @@ class SceneEstimator:
         radius: Radius of the pusher [m].
 
     Attributes:
-        drift: Twist by which the slider moves unlike the model, in its axes, smoothed [m/s, m/s, rad/s].
+        drift: Filtered difference of the slider's twist from the model, in its axes [m/s, m/s, rad/s].
     """
 
     def __init__(self, config: EstimatorConfig, slider: SliderConfig, radius: float) -> None:
@@ -58,23 +59,23 @@ class SceneEstimator:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets measurements and commands."""
+        """Discards measurements and commands."""
         self._estimate: PlanarScene | None = None
         self._time_s = -math.inf
         self.drift = np.zeros(3)
         self._commands: list[tuple[float, np.ndarray]] = []
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
-        """Takes note of the velocity of the pusher from a time on; None is rest."""
+        """Records the velocity of the pusher from a time on; None is rest."""
         self._commands.append((time_s, np.zeros(2) if command is None else np.asarray(command)))
         while len(self._commands) > 2 and self._commands[1][0] < time_s - KEPT_S:
             del self._commands[0]
 
     def update(self, sensed: Sensed, ahead_s: float) -> PlanarScene:
-        """Returns the scene to be expected at a time, with a measurement (x, y, yaw, pusher_x, pusher_y).
+        """Returns the predicted scene at a time, corrected by a measurement (x, y, yaw, pusher_x, pusher_y).
 
         Args:
-            sensed: The measurement, which is complete.
+            sensed: A complete measurement.
             ahead_s: The time of the scene [s].
         """
         measured_s = sensed.time_s - sensed.age_s
@@ -100,7 +101,7 @@ class SceneEstimator:
         return PlanarScene(expected.slider + gains * difference, measured.pusher)
 
     def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:
-        """Returns a scene after the commands between two times."""
+        """Returns the scene after the commands between two times."""
         edges = [*(time_s for time_s, _ in self._commands), math.inf]
         for (start_s, velocity), stop_s in zip(self._commands, edges[1:]):
             duration_s = min(stop_s, end_s) - max(start_s, begin_s)

@@ -66,10 +66,10 @@ def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tup
 
 
 def complementarity(control: Vector, slider: SliderConfig) -> Any:
-    """Returns how far an input is from sticking or sliding [m^2/s^2]; 0 if it is one of them.
+    """Returns the violation of the contact modes by an input [m^2/s^2]; 0 if it sticks or slides.
 
     The contact slides to the left only at the left edge of the friction cone, and to the right only at the right one.
-    Inside of the cone the sum is not negative. It is penalised rather than constrained to 0, in the spirit of the
+    Inside the cone the sum is not negative. It is penalised instead of constrained to 0, similar to the
     relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar manipulation via
     trajectory optimization with complementarity constraints", ICRA 2022.
     """
@@ -80,11 +80,11 @@ def complementarity(control: Vector, slider: SliderConfig) -> Any:
 def response(
     state: Vector, velocity: Vector, slider: SliderConfig
 ) -> tuple[tuple[float, float, float], tuple[float, float], float]:
-    """Returns the motion that a velocity of the pusher at the contact causes.
+    """Returns the motion caused by a velocity of the pusher at the contact.
 
-    The contact sticks if the force that this takes is in the friction cone, which is the case within the motion cone
-    (M. Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986); otherwise it slides at the
-    edge of the cone. A pusher that moves away leaves the slider alone.
+    The contact sticks if the required force is in the friction cone, which is the case within the motion cone (M.
+    Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986); otherwise it slides at the edge of
+    the cone. A pusher that moves away does not move the slider.
 
     Args:
         state: (x, y, yaw, contact).

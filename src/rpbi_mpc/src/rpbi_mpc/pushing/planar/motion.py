@@ -1,4 +1,6 @@
-"""Motion of slider and round pusher in the plane, in contact or apart, and the way of the pusher to the slider."""
+"""Motion of slider and round pusher in the plane, with or without contact, and the approach of the pusher to the
+slider.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,7 @@ class PlanarScene(NamedTuple):
 
     @classmethod
     def of(cls, values: np.ndarray) -> PlanarScene:
-        """Returns the scene of the numbers x, y, yaw, pusher_x, pusher_y."""
+        """Returns the scene for the numbers x, y, yaw, pusher_x, pusher_y."""
         return cls(np.array(values[:3], dtype=float), np.array(values[3:5], dtype=float))
 
     @property
@@ -54,7 +56,7 @@ def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
 def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
     """Returns the distance between pusher and face, and the place of the pusher along the face [m, m].
 
-    The distance is that of a face without ends, and negative if the pusher is in the slider.
+    The face counts as infinitely long; the distance is negative if the pusher penetrates the slider.
     """
     x, y = pusher_in_slider(scene)
     return -x - slider.face - radius, y
@@ -66,7 +68,7 @@ def moved(
     """Returns the scene after the pusher has moved at a velocity for a time, by the quasi-static model.
 
     Args:
-        scene: Before.
+        scene: Scene before.
         velocity: Velocity of the pusher in the axes of the table [m/s].
         duration_s: The time [s].
         slider: The slider.
@@ -88,13 +90,13 @@ def moved(
 
 
 class ApproachConfig(ConfigModel):
-    """Motion of a pusher that does not touch.
+    """Motion of a pusher without contact.
 
     Attributes:
         speed: Its speed [m/s].
         clearance: Distance from the face at which the pusher passes along it [m].
         gap: Distance from the face below which the pusher counts as touching [m]; while pushing, three times as much.
-        rate: Rate at which it approaches points, which slows it down before them [1/s].
+        rate: Rate at which it approaches points: its speed is at most this rate times the distance [1/s].
     """
 
     speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Speed of the pusher.")
@@ -104,14 +106,14 @@ class ApproachConfig(ConfigModel):
 
 
 def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:
-    """Returns whether the pusher is where it can push.
+    """Returns whether the pusher is at a place from which it can push.
 
     Args:
         gap: Distance from the face [m], negative inside.
         contact: Place along the face [m].
         slider: The slider.
         config: Distances.
-        pushes: Whether it did so before; then a larger distance is accepted.
+        pushes: Whether it pushed before; then a larger distance is accepted.
     """
     slack = 3.0 if pushes else 1.0
     beside = slider.width / 2 if pushes else slider.reach
@@ -119,9 +121,9 @@ def is_pushable(gap: float, contact: float, slider: SliderConfig, config: Approa
 
 
 def approach_velocity(scene: PlanarScene, slider: SliderConfig, radius: float, config: ApproachConfig) -> np.ndarray:
-    """Returns the velocity of a pusher on its way to the face, in the axes of the table [m/s].
+    """Returns the velocity of a pusher that approaches the face, in the axes of the table [m/s].
 
-    A pusher beside the slider moves back first, then along the face at some distance, and then on to the face.
+    A pusher at the side of the slider moves back first, then along the face at some distance, and then to the face.
     """
     gap, contact = gap_and_contact(scene, slider, radius)
     beyond = contact - np.clip(contact, -slider.reach / 2, slider.reach / 2)

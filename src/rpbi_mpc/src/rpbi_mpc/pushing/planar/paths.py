@@ -1,4 +1,4 @@
-"""Paths on a table: poses by the distance along them."""
+"""Paths on a table: poses as functions of the distance along the path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel, ListOf, Positive, PositiveMetres, Unit
 
 SPACING = 0.0005
-"""Distance of the points by which a path is stored [m]."""
+"""Distance between stored points of a path [m]."""
 
 Point = tuple[float, float]
 
@@ -80,18 +80,18 @@ class PushPath:
         return self._points
 
     def poses(self, times_s: Any) -> np.ndarray:
-        """Returns where the slider should be, N x 3 [m, m, rad]; at the start before 0, and at the end after it."""
+        """Returns reference poses of the slider, N x 3 [m, m, rad]; clipped to the start and the end of the path."""
         along = np.clip(np.atleast_1d(np.asarray(times_s, dtype=float)) * self.speed, 0.0, self.length)
         columns = (self._points[:, 0], self._points[:, 1], self._yaws)
         return np.stack([np.interp(along, self._distances, column) for column in columns], axis=1)
 
     def distance(self, point: Any) -> float:
-        """Returns the distance of a point (x, y) from the path, wherever along it [m]."""
+        """Returns the least distance of a point (x, y) from the path [m]."""
         return float(np.hypot(*(self._points - np.asarray(point, dtype=float)).T).min())
 
 
 def _even(points: np.ndarray) -> np.ndarray:
-    """Returns points along a path, all as far apart."""
+    """Returns equidistant points along a path."""
     distances = np.concatenate([[0.0], np.hypot(*np.diff(points, axis=0).T).cumsum()])
     if not distances[-1] > 0.0:
         raise ValueError(f"points: expected at least two different ones, got {len(points)}")

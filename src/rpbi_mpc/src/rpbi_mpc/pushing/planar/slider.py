@@ -1,4 +1,4 @@
-"""The slider: its size, its friction, and the limit surface of what it stands on."""
+"""The slider: its size, its friction, and the limit surface of its support."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel, PositiveMetres
 
 QUADRATURE = 64
-"""Points along each side of the rectangle over which the pressure is integrated; 1e-4 of the exact value."""
+"""Points along each side of the rectangle for the integral of the pressure; the relative error is 1e-4."""
 
 
 class SliderConfig(ConfigModel):
-    """A box on a table, which is pushed at its face at -x.
+    """A box on a table, pushed at its face at -x.
 
-    The frame of the slider lies in its middle, x forwards, y to the left.
+    The origin of its frame is in its middle; x is forwards, y to the left.
 
     Attributes:
         length: Size along x [m].
@@ -25,7 +25,7 @@ class SliderConfig(ConfigModel):
         friction: Coefficient of friction between pusher and slider.
         support: Where the weight rests: `uniform` over the area, or on the `corners`, as in a simulator whose contacts
             of two boxes are four points.
-        margin: Distance from the ends of the face within which the pusher stays [m].
+        margin: Least distance of the pusher from the ends of the face [m].
     """
 
     length: PositiveMetres = Field(0.1, description="Size along x, the direction of pushing.")
@@ -34,7 +34,7 @@ class SliderConfig(ConfigModel):
     support: Literal["uniform", "corners"] = Field(
         "corners", description="Where the weight rests: over the area, or on the corners as in PyBullet."
     )
-    margin: PositiveMetres = Field(0.01, description="Distance from the ends of the face that the pusher keeps.")
+    margin: PositiveMetres = Field(0.01, description="Least distance of the pusher from the ends of the face.")
 
     @property
     def face(self) -> float:
