@@ -65,7 +65,7 @@ class Reader:
 
 
 class DeviceConformance:
-    """Tests that any device passes.
+    """Tests that every device passes.
 
     A subclass names the device and moves it from outside, either the real one or an emulator of its hardware, never
     through its Python object. A subclass leaves out whatever its device cannot do: `moves`, `can_be_unplugged`,
@@ -129,7 +129,7 @@ class DeviceConformance:
 
     @pytest.fixture
     def reader(self, device: Device) -> Reader:
-        """A reader whose device is open and whose axes are known to be at rest."""
+        """A reader with an open device whose axes are known to be at rest."""
         reader = Reader(self.device_name, device)
         reader.until(lambda: bool(reader.readings), "the device is open")
         self.settle(reader)

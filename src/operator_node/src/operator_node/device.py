@@ -96,7 +96,7 @@ class Device(ABC):
         return Reading((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
     def cue(self, force: Sequence[float]) -> None:  # noqa: B027 (most devices have nothing to feel)
-        """Renders a force as far as the device can, for example by rumbling.
+        """Renders a force as well as the device can, for example by rumbling.
 
         Args:
             force: x, y, z, each in [-1, 1], as a share of the largest force of the device.

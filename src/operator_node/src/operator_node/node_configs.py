@@ -101,5 +101,5 @@ class InteractiveTargetConfig(ConfigModel):
 class MvnTopicsConfig(ConfigModel):
     """Private parameters of the node that publishes people from MVN."""
 
-    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame in which MVN's world stands.")
+    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame of MVN's world.")
     recording_folder: Text = Field("~/mvn", description="Folder for the files that `mvn/record` writes.")

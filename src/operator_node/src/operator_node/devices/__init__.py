@@ -1,4 +1,4 @@
-"""The devices; a new one is a class in a file of its own and a line here."""
+"""The devices; a new one is a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 from operator_node.device import Device

@@ -106,7 +106,7 @@ class Mouse(Device):
     def _move(self, event: "Event[Misc]") -> None:
         if self._origin is None or self._window is None:
             return
-        if not int(event.state) & DRAGGING:  # another program, such as a screen lock, has received the release
+        if not int(event.state) & DRAGGING:  # another program, such as a screen lock, received the release
             self._reset()
             return
         half_width, half_height = self._half_size()

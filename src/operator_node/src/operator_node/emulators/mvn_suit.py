@@ -158,7 +158,7 @@ class BadNetwork:
         self._held: Sent | None = None
 
     def transmit(self, datagrams: Iterable[bytes]) -> Iterator[Sent]:
-        """Yields the datagrams that are sent for the given ones; a swapped one follows the next."""
+        """Yields the datagrams that are sent in place of the given ones; a swapped one follows the next."""
         for data in datagrams:
             number, fault = self._random.random(), ""
             for name, chance in self._chances.items():
@@ -252,7 +252,7 @@ def main() -> int:
 
 
 def _person(options: argparse.Namespace, number: int) -> WalkingPerson | ArmHeldOut:
-    """Returns one of the people; each stands beside the last and is a little smaller."""
+    """Returns one of the people, who is next to the previous one and a little smaller."""
     height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -APART_M * number)
     if options.arm_held_out:
         return ArmHeldOut(height_m, options.seed, start, options.t_pose)

@@ -29,7 +29,7 @@ of joints are those of Drillis and Contini (1966), as in Winter, Biomechanics an
 joints of the back are spread between them.
 """
 STANCE = 0.62
-"""Share of a stride during which a foot stands."""
+"""Share of a stride during which a foot is on the floor."""
 LIFT = 0.06
 """Height to which a foot is lifted [heights]."""
 REACHING_S, REACH_PERIOD_S = 2.5, 5.0
@@ -42,7 +42,7 @@ BOB = 0.006
 
 
 class WalkingPerson:
-    """Motion of a person as a function of time; feet do not slide, bones are rigid, and knees bend forward.
+    """Motion of a person as a function of time: feet do not slide, bones are rigid, and knees bend forwards.
 
     Args:
         height_m: Body height [m].

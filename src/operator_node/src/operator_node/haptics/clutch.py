@@ -43,7 +43,7 @@ class Clutch:
         self._kept, self.deviation, self.engaged = self.way, ZERO, False
 
     def set_way(self, way: Vector) -> None:
-        """Sets the displacement of the tool [m] and disengages; the handle continues from there."""
+        """Sets the displacement of the tool [m] and disengages; the next motion of the handle continues from it."""
         self._kept, self.engaged, self.deviation = way, False, ZERO
 
 

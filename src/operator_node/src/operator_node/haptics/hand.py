@@ -1,4 +1,4 @@
-"""A hand on a handle, modelled as a mass on a spring: for emulated devices and experiments."""
+"""A hand on a handle, modelled as a mass on a spring, for emulated devices and experiments."""
 
 from typing import NamedTuple
 

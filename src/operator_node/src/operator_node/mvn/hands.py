@@ -14,7 +14,7 @@ _ARMS = np.array([[INDEX[f"{side}{bone}"] for bone in ("UpperArm", "ForeArm", "H
 
 
 class HandAxes:
-    """Displacement of the hands forward, left and up since they were engaged.
+    """Displacements of the hands forwards, left and up since they were engaged.
 
     They are relative to the pelvis and its heading, in arm lengths.
     """

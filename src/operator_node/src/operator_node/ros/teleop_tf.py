@@ -92,7 +92,7 @@ class TeleopTf:
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
-        """Broadcasts unless ROS time stands still: TF ignores a second transform with the same stamp, and warns."""
+        """Broadcasts unless ROS time is paused: TF ignores a second transform with the same stamp, and warns."""
         if rospy.Time.now() != self._broadcast_at:
             self._broadcast()
 

@@ -1,4 +1,4 @@
-"""The haptic devices; a new one is a class in a file of its own and a line here."""
+"""The haptic devices; a new one is a class in its own file and a line here."""
 
 from custom_ros_tools.plugins.table import PluginTable
 from operator_node.haptics.device import HapticDevice

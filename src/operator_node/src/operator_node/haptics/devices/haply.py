@@ -27,7 +27,7 @@ PATIENCE_S = 1.0
 """Time without an answer after which the connection counts as lost [s]."""
 PERIOD_S = 0.001
 MAX_FRAME_BYTES = 1 << 18
-TRIED = 50
+MAX_UNFELT = 50
 """Number of consecutive forces without effect after which the other key is tried."""
 FELT_N = 0.3
 """Force below which the reported force is not evaluated [N]."""
@@ -39,7 +39,7 @@ class HaplyConfig(HapticConfig):
 
     max_force_n: Positive = Field(8.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
-    url: Text = Field("ws://localhost:10001", description="The service's websocket; port 10000 before 3.1.")
+    url: Text = Field("ws://localhost:10001", description="Websocket of the service; port 10000 before 3.1.")
     device_id: str = Field("", description="Id of the Inverse3, if there are several; empty selects the first one.")
     centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the device's own axes [m].")
     force_key: Literal["auto", "vector", "values"] = Field(
@@ -171,7 +171,7 @@ class ForceKey:
             self._unfelt, self._may_change = 0, False
             return True
         self._unfelt += 1
-        if self._unfelt < TRIED:
+        if self._unfelt < MAX_UNFELT:
             return True
         self._unfelt = 0
         if self._may_change:

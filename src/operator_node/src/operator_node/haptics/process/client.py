@@ -78,7 +78,7 @@ class LoopClient:
             self._send(self._orders._replace(is_on=True, switched=self._orders.switched + 1))
 
     def stop(self) -> None:
-        """Sends zero force, closes the device, and returns when that is done."""
+        """Sends zero force and closes the device; returns when both are done."""
         with self._lock:
             self._send(self._orders._replace(is_on=False, switched=self._orders.switched + 1))
             wanted = self._orders.switched
@@ -133,7 +133,7 @@ class LoopClient:
         self._send(self._orders)
 
     def _run(self) -> None:
-        """Hands on reports, and restarts the process when it has ended, until the client is closed."""
+        """Forwards reports, and restarts the process after its end, until the client is closed."""
         failures = 0
         while True:
             self._link.wait(SEND_PERIOD_S)

@@ -79,7 +79,7 @@ class AvatarNode:
         if now < self._last_stamp:  # the simulation was restarted
             self._begins, self._last_stamp = True, rospy.Time()
         if now <= self._last_stamp:
-            return  # simulated time stands still, or has not begun: TF with wall time would hide all later transforms
+            return  # simulated time is paused, or has not begun: TF with wall time would hide all later transforms
         if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:
             return
         if self._begins or self._retargeting is None:

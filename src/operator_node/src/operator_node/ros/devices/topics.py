@@ -1,4 +1,4 @@
-"""Topics of a device beside `joy`."""
+"""Topics of a device other than `joy`."""
 
 from collections.abc import Callable
 
@@ -19,4 +19,4 @@ class DeviceTopics:
         self.device, self.post = device, post
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes the part of a reading beside axes and buttons."""
+        """Publishes the parts of a reading other than axes and buttons."""

@@ -67,7 +67,7 @@ class HandlePublisher:
         self._joy.publish(Joy(header, axes, reading.buttons))
         if (
             header.stamp != self._stamp
-        ):  # otherwise ROS time stands still, and TF ignores a second transform with one stamp
+        ):  # otherwise ROS time is paused, and TF ignores a second transform with the same stamp
             self._stamp = header.stamp
             self._broadcast(header, snapshot, start)
 

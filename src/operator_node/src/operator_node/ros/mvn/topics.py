@@ -181,7 +181,7 @@ class _Person:
             self._markers.publish(self._drawing.message(frame))
 
     def publish(self, message: Message, stamp: rospy.Time) -> None:
-        """Publishes another message about the person."""
+        """Publishes a message about the person that is not a frame."""
         header = Header(stamp=stamp, frame_id=self._parent)
         if isinstance(message, PersonInfo):
             self.name = message.fields.get("name", self.name)
