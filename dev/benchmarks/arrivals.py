@@ -1,4 +1,4 @@
-"""What the arrivals of stamped messages tell."""
+"""Rates, latencies and losses from the arrivals of stamped messages."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Arrivals(NamedTuple):
 
 
 def load(path: Path) -> dict[str, Arrivals]:
-    """Reads what `programs/watch.py` wrote, by topic."""
+    """Reads the output of `programs/watch.py`, by topic."""
     with np.load(path) as data:
         topics = {name.split(" ")[0] for name in data.files}
         return {

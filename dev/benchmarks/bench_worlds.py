@@ -1,4 +1,4 @@
-"""The worlds that are measured: the example's arm on the example's floor, and more."""
+"""The measured worlds: the example's arm on the example's floor, and others."""
 
 from __future__ import annotations
 

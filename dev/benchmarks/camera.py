@@ -1,6 +1,6 @@
 """Joint states at 1 kHz beside a camera of 640x480 pixels at 30 Hz, with images and with point clouds.
 
-The floor publishes, or draws, and does nothing else.
+The reference only publishes, or only draws.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Cost of the contacts of many boxes, beside a bare step of the same world; both in one process, by turns."""
+"""Cost of the contacts of many boxes, beside a bare step of the same world; both in one process, alternating."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TICKS = 100
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures processor time, which counts little of what else the machine does; medians over all turns."""
+    """Measures processor time, which depends little on other processes; medians over all repetitions."""
     turns = 10 if quick else 60
     with _boxes() as bare, _boxes() as silent, _boxes(contacts={"hz": HZ, "arrows_hz": 0}) as sensed:
         steps: dict[str, tuple[Callable[[], Any], list[float]]] = {

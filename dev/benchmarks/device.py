@@ -8,7 +8,7 @@ from result import Result, Target
 from session import Session
 
 ROUNDS = 4
-"""Echo, device and mapping take turns, so that what else the computer does befalls all."""
+"""Echo, device and mapping alternate, so that the load of the computer affects all equally."""
 JOY, SIGNAL = "/joy", "/operator_node/signal"
 SENT, ECHOED = "/sent", "/echoed"
 OPTIONS = ("_full_scale:=1000", "_static_count_threshold:=1000", "_autorepeat_rate:=0")

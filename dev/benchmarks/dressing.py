@@ -1,4 +1,4 @@
-"""Whether a sleeve is drawn past people's elbows, what their arms feel, and how long retargeting takes."""
+"""Success of drawing a sleeve past people's elbows, forces on their arms, and time of retargeting."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from rpbi_examples.scenes import SCENES
 LAUNCH = Path(replace_package("{rpbi_examples}/launch"))
 LEFT_OUT = {
     "mvn": "has no world",
-    "sampling_mpc": "has a world that stands still while its candidates are simulated",
+    "sampling_mpc": "has a world that waits while its candidates are simulated",
     "soft_body": "has soft bodies",
     "teleop": "is moved by a person",
     "telepresence": "has soft bodies",

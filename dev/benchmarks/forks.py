@@ -82,7 +82,7 @@ def _exact(seeds: int) -> list[Result]:
 
 
 def _session(seed: int) -> tuple[bool, dict[str, bool]]:
-    """Returns whether a body sleeps when a session is saved, and by way whether it goes on in the same way."""
+    """Returns whether a body sleeps when a session is saved, and by method whether it continues identically."""
     with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
         world = script.build(Path(folder), seed)
         script.run(world, seed, int(np.random.default_rng(seed).integers(SHORTEST, LONGEST)))
@@ -114,7 +114,7 @@ def _hash_later(world: World) -> str:
 
 
 def _predictions(chosen: int) -> list[Result]:
-    """Predicts candidates, takes one of them, and compares what happens with its prediction."""
+    """Predicts candidates, executes one of them, and compares the result with its prediction."""
     random, durations, same = np.random.default_rng(FIRST_SEED), [], 0
     cold_s, prepared_s = _first(random, 0.0), _first(random, PREPARED_S)
     world = World.from_file(KUKA)

@@ -1,6 +1,6 @@
-"""Processor time of a step through the node, as fast as it goes, beside the same PyBullet calls in a bare loop.
+"""Processor time of a step through the node, as fast as possible, compared with the same PyBullet calls in a bare loop.
 
-It is that of the thread that steps. On a quiet machine it is the time that a step takes.
+It is the time of the stepping thread. On an idle machine it equals the duration of a step.
 """
 
 from __future__ import annotations

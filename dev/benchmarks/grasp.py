@@ -24,7 +24,7 @@ MOVE_S, FINGERS_S = 2.0, 1.0
 
 
 class Grasp:
-    """The world of the example, driven by what its services and topics do."""
+    """The world of the example, driven by the actions of its services and topics."""
 
     def __init__(self, box: PlanarPose) -> None:
         self.world = World.from_file(str(CONFIGS / "grasp_example" / "config.yaml"))

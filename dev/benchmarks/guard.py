@@ -1,6 +1,6 @@
 """How long the guard takes for a decision on a seven-joint arm, with all checks of joints and shapes.
 
-Alone, and through ROS at 500 Hz; there the floor is a rospy echo of the same messages, in turns.
+Alone, and through ROS at 500 Hz; there the reference is a rospy echo of the same messages, alternating.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _through_ros(seconds: float) -> list[Result]:
     echoed, commanded, shares = [], [], []
     options = {"start_from": "target", "period_s": ROS_PERIOD_S, "limits": LIMITS}
     with Session(use_sim_time=False) as ros:
-        # lateness is what is measured
+        # lateness is measured
         more = {"environment": {"world": _world(ros.folder)}, "staleness": {"timeout_s": 1.0}}
         options |= {"silence_s": 1.0, "checks": {**CHECKS, **more}}
         ros.program("echo", "/sent", "/echoed")

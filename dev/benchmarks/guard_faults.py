@@ -1,4 +1,6 @@
-"""How long after a fault the guard goes on moving a robot: 200 faults of sources, messages, time and the ROS master."""
+"""Time after a fault for which the guard still moves a robot: 200 faults of sources, messages, time and the ROS
+master.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,7 @@ def run(quick: bool) -> list[Result]:
 
 def _outcomes_ms(count: int, options: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Returns by fault when the last motion was, and the last braking, n x 2 [ms] after it."""
-    # in real time, where that is allowed: what is asked is when the guard stops, not when others get a processor
+    # with real-time priority if permitted: the time of the guard is measured, not that of the scheduler
     realtime = ["chrt", "-f", "10"] if shutil.which("chrt") and not _fails(["chrt", "-f", "10", "true"]) else []
     program = [*realtime, sys.executable, str(PROGRAMS / "guard_faults.py"), str(count), *options]
     printed = subprocess.run(program, check=True, stdout=subprocess.PIPE, text=True).stdout

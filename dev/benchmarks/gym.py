@@ -1,4 +1,4 @@
-"""Steps of environments per second, beside PyBullet and the renderer alone; and what resets and workers bring.
+"""Steps of environments per second, beside PyBullet and the renderer alone; and the effect of resets and workers.
 
 Times of one process are those of its processor, since others may have it meanwhile. Two workers need two processors to
 themselves.
@@ -61,7 +61,7 @@ def _steps(name: str, episodes: int) -> Result:
         end = _motion(env)
         env.reset(seed=seed)
         floors.append(ACTIONS / _duration(partial(_simulate, env, calls)))
-        assert _motion(env) == end, f"{name}: PyBullet alone goes another way"
+        assert _motion(env) == end, f"{name}: PyBullet alone gives a different motion"
     env.close()
     value, floor = statistics.median(speeds), statistics.median(floors)
     return Result("gym", f"{name}: actions a second", value, "1/s", floor, Target(0.8, at_least=True, of_floor=True))
@@ -91,7 +91,7 @@ def _act(env: WorldEnv, actions: Any) -> None:
 
 
 def _simulate(env: WorldEnv, calls: list[list[Call]]) -> None:
-    """Does with PyBullet alone what an episode does: sets motors, steps, and reads the joints once for each action."""
+    """Simulates an episode with PyBullet alone: sets motors, steps, and reads the joints once for each action."""
     pb, robot = env.world.pb, env.world.bodies[env.task.config.robot]
     step, ticks = pb.stepSimulation, range(env.task.config.action_ticks)
     for each in calls:

@@ -1,4 +1,6 @@
-"""How punctual the 1 kHz loop of a haptic device is beside the simulator; the floor is a bare loop beside it."""
+"""How punctual the 1 kHz loop of a haptic device is beside the simulator; the reference is a bare loop beside the
+simulator.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many reachable poses solvers of inverse kinematics reach, in what time, and how far joints jump on a path."""
+"""Share of reachable poses that inverse kinematics solvers reach, their times, and jumps of joints along a path."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ class Arm(NamedTuple):
 
     @property
     def options(self) -> dict[str, Any]:
-        """What solvers of its tip are told."""
+        """Options of solvers for its tip."""
         return {"urdf_filename": str(self.urdf), "base_link": self.base, "tip_link": self.tip}
 
     @property
     def task_options(self) -> dict[str, Any]:
-        """What `tasks` is told for the same."""
+        """Options of `tasks` for the same problem."""
         pose = {"name": "tip", "type": "frame_pose", "frame": self.tip, "required": True}
         return {"urdf_filename": str(self.urdf), "base_frame": self.base, "costs": [pose]}
 
@@ -77,7 +77,7 @@ def run(quick: bool) -> list[Result]:
     """Measures all solvers with all arms; the floor is one bare call of KDL, which may fail and leave limits.
 
     Args:
-        quick: Whether a tenth of the poses will do.
+        quick: Whether to use only a tenth of the poses.
     """
     results = []
     for arm_name, arm in ARMS.items():
@@ -100,7 +100,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def _targets(name: str, arm_name: str, arm: Arm, start: str) -> tuple[Target | None, Target | None]:
-    """Returns what share of the poses to reach, and in what time."""
+    """Returns the target share of reached poses, and the target time."""
     share = REACHED.get(name) if len(arm.elbow) == 7 else None
     mean_ms = MEAN_MS.get((arm_name, name)) if start == "far" else None
     return Target(share, at_least=True) if share else None, Target(mean_ms) if mean_ms else None
@@ -158,7 +158,7 @@ def _path(kdl: KdlSolver, solver: Solver, arm: Arm, steps: int) -> tuple[float, 
 
 
 def _bare(kdl: KdlSolver) -> Callable[[IKProblem], object]:
-    """Returns a bare call of the library that `kdl` stands on."""
+    """Returns a bare call of the library that `kdl` uses."""
     bare = PyKDL.ChainIkSolverPos_LMA(kdl.chain.kdl)
     begin, end = PyKDL.JntArray(len(kdl.joint_names)), PyKDL.JntArray(len(kdl.joint_names))
 

@@ -13,13 +13,13 @@ from session import Session
 HZ = 500
 FASTEST_HZ = 1000
 ROUNDS = 6
-"""Echo and solver take turns, so that what else the computer does befalls both."""
+"""Echo and solver alternate, so that the load of the computer affects both equally."""
 PROBLEM, TARGET = "/ik", "/joint_states/target"
 SENT, ECHOED = "/sent", "/echoed"
 
 
 class Answers(NamedTuple):
-    """What came back of a stream of messages.
+    """Answers to a stream of messages.
 
     Attributes:
         share: Share of them that was answered; of those that wait, the solver node takes the newest alone [%].

@@ -91,7 +91,7 @@ def _sessions(name: str, make: Any, build: Any, inputs: Inputs, seeds: int) -> l
 
 
 def _after_keyframe(world: World, script: Any, inputs: Inputs, seed: int) -> dict[str, bool]:
-    """Makes a keyframe, goes on with further commands, and returns by way whether it goes on in the same way."""
+    """Makes a keyframe, continues with further commands, and returns by method whether it continues identically."""
     random = np.random.default_rng(seed)
     for tick in range(ticks := int(random.integers(SHORTEST, LONGEST)) + SINCE):
         if tick == ticks - SINCE:
@@ -151,7 +151,7 @@ def _hour(seconds: float) -> list[Result]:
     results = [
         Result("keyframes", f"{pauses}: median", float(np.median(found["pauses"])), "s"),
         Result("keyframes", f"{pauses}: longest", max(found["pauses"]), "s", None, Target(MOST_PAUSE_S)),
-        Result("keyframes", f"{late}: exact, of {count} ways", exact, "", None, Target(count, at_least=True)),
+        Result("keyframes", f"{late}: exact, of {count} methods", exact, "", None, Target(count, at_least=True)),
     ]
     for way, (wall_s, processor_s, _) in ways.items():
         results += (

@@ -1,6 +1,6 @@
 """From a target published to the first joint state in which the joint moves; the floor is a rospy echo and a tick.
 
-Echo and simulator are measured by turns, alone and beside busy loops.
+Echo and simulator are measured alternately, alone and with busy loops.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def _echo_ms(trials: int, busy: int) -> npt.NDArray[np.float64]:
-    """Returns the latencies of a node that answers [ms], beside so many busy loops."""
+    """Returns the latencies of a node that answers [ms], with a number of busy loops."""
     with Session(use_sim_time=False) as ros:
         _start_busy(ros, busy)
         ros.program("echo", TARGET, JOINT_STATES)
@@ -54,7 +54,7 @@ def _echo_ms(trials: int, busy: int) -> npt.NDArray[np.float64]:
 
 
 def _arm_ms(trials: int, busy: int) -> npt.NDArray[np.float64]:
-    """Returns the latencies of the arm [ms], beside so many busy loops."""
+    """Returns the latencies of the arm [ms], with a number of busy loops."""
     with Session() as ros:
         _start_busy(ros, busy)
         ros.simulator(arm_world(ros.folder, HZ))

@@ -47,7 +47,7 @@ def _results(name: str, runs: list[dict[str, Any] | None], share: float) -> list
 
 
 def _session(seed: int, operator: str, environment: dict[str, str]) -> dict[str, Any] | None:
-    """Returns what summary.json has of the execution, None if there was none."""
+    """Returns the entry of the execution in summary.json; None without one."""
     with Session() as ros:
         out = ros.folder / "lfd"
         arguments = [f"operator:={operator}", f"seed:={seed}", "rounds:=1", "headless:=true", f"out:={out}"]

@@ -1,4 +1,4 @@
-"""The loop at 1 kHz with all that can weigh on it at once, beside a bare rospy publisher."""
+"""The loop at 1 kHz with all loads at once, compared with a bare rospy publisher."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ CLOCK_SUBSCRIBERS = 3
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures what is kept: 30 objects on TF, a recorder, subscribers of /clock, one stopped, and the camera."""
+    """Measures the rate that is kept with 30 objects on TF, a recorder, subscribers of /clock, a stopped one, and the
+    camera.
+    """
     seconds = 8.0 if quick else 30.0
     floor = publisher_alone(HZ, seconds / 2)
     with Session() as ros:

@@ -1,4 +1,4 @@
-"""Joint states at the rate of the loop, as another process receives them, beside a bare rospy publisher."""
+"""Joint states at the rate of the loop, as received by another process, compared with a bare rospy publisher."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def publisher_alone(hz: float, seconds: float) -> Arrivals:
-    """Returns what a subscriber receives from a bare rospy publisher of joint states."""
+    """Returns the joint states that a subscriber receives from a bare rospy publisher."""
     with Session(use_sim_time=False) as ros:
         ros.program("publish", JOINT_STATES, hz)
         return ros.watch(JOINT_STATES, seconds=seconds).arrivals()[JOINT_STATES]

@@ -1,4 +1,4 @@
-"""What it costs to receive people from MVN and publish them; the floor is a bare loop that only receives."""
+"""Processor time to receive people from MVN and publish them; the reference is a bare loop that only receives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Force feedback in virtual time: does a handle ever give out more energy than was put in, whatever the simulator does?
+"""Force feedback in virtual time: checks that a handle never gives out more energy than was put in, for any simulator.
 
 The controller is the one of the haptic node, tick by tick. A hand on a handle wanders into a wall that a simulator has,
 at a rate of its own, behind a delay and a loss in each direction. Beside it, energy is counted anew from what the hand
@@ -36,7 +36,7 @@ RESOLUTIONS_M = (5e-6, 20e-6)
 
 
 def leak_j(resolution_m: float) -> float:
-    """Returns the energy that the handle may give out beyond what was put in, see docs/haptics.md."""
+    """Returns the energy that the handle may give out beyond the energy put in, see docs/haptics.md."""
     return MAX_FORCE_N * (MAX_ACCELERATION * DT_S**2 + 2.5 * math.sqrt(3.0) * resolution_m)
 
 
@@ -65,7 +65,7 @@ class SetUp(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How it went.
+    """Result of a run.
 
     Attributes:
         least_j: The least energy that there was in the handle [J].
@@ -177,7 +177,7 @@ def run_set_up(case: SetUp, ticks: int = TICKS, passivity: bool = True, is_resol
     before = two_before = hand.position
     for tick in range(ticks):
         now_s = tick * DT_S
-        # what the simulator does: a tool that follows the handle, and a wall below 0
+        # the simulator: a tool that follows the handle, and a wall below 0
         received = there.received(now_s)
         tool = tool if received is None else received
         if now_s >= next_step_s:
@@ -189,10 +189,10 @@ def run_set_up(case: SetUp, ticks: int = TICKS, passivity: bool = True, is_resol
                 controller.observe_tool((0.0, 0.0, felt), now_s)
             else:
                 controller.observe_wrench((0.0, 0.0, felt), now_s)
-        # what the haptic node does
+        # the haptic node
         force = controller.tick(now_s, HapticReading(measured(hand.position, case.resolution_m)))
         there.send(controller.snapshot.way[2], now_s)
-        # what the hand does, and the energy that goes into the handle: force before times displacement
+        # the hand, and the energy put into the handle: previous force times displacement
         largest_n = max(largest_n, math.hypot(*force))
         hand.step(wanted(now_s), force, DT_S)
         x, y, z = hand.position

@@ -15,7 +15,7 @@ TOLD = {"contacts": {"hz": 100, "arrows_hz": 0}}
 
 
 def floor_force(world: World, seconds: float) -> float:
-    """Returns the mean force on the floor over so long, downwards [N]."""
+    """Returns the mean downward force on the floor over a time [N]."""
     forces = []
     for _ in range(round(seconds / world.config.timeStep)):
         forces += [each.force[2] for each in world.step() if isinstance(each, ContactsSample) and each.name == "floor"]
@@ -23,7 +23,7 @@ def floor_force(world: World, seconds: float) -> float:
 
 
 def resting() -> Table:
-    """How deep a box of 1 kg rests in the floor, and what the floor feels."""
+    """Penetration of a resting box of 1 kg in the floor, and the force on the floor."""
     depths, forces = [], []
     steps_s = (1 / 240, 0.002, 0.001)
     for time_step_s in steps_s:
@@ -39,7 +39,9 @@ def resting() -> Table:
 
 
 def stiffness() -> Table:
-    """How deep a ball and a box rest with `contactStiffness`; a box has four contacts, of which each has it."""
+    """Penetration of a ball and a box at rest with `contactStiffness`; a box has four contacts with this stiffness
+    each.
+    """
     rows = []
     for name, contacts in (("ball", 1), ("box", 4)):
         for value in (1e3, 1e4, 1e5):
@@ -76,7 +78,7 @@ def stacking() -> Table:
 
 
 def loading() -> Table:
-    """How deep a light box of 1 kg is pressed into the floor by a heavy one on it, after 3 s."""
+    """Penetration of a light box of 1 kg under a heavy one in the floor, after 3 s."""
     rows = []
     settings: dict[str, tuple[float, dict[str, Any]]] = {
         "1 ms": (0.001, {}),

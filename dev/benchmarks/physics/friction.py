@@ -50,7 +50,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 class Slide(NamedTuple):
-    """What braked a sliding box.
+    """Deceleration of a sliding box.
 
     Attributes:
         force: Mean deceleration over that of Coulomb's law.
@@ -71,7 +71,7 @@ def slide(
     box_keys: dict[str, Any] | None = None,
     engine: dict[str, Any] | None = None,
 ) -> Slide:
-    """Has a box slide over a floor and returns what braked it, over up to 0.2 s."""
+    """Slides a box over a floor and returns its deceleration, over up to 0.2 s."""
     x, y = math.cos(math.radians(direction_deg)), math.sin(math.radians(direction_deg))
     start = {"linearVelocity": [speed_m_s * x, speed_m_s * y, 0.0]}
     keys = {"resetBaseVelocity": start, "changeDynamics": {"lateralFriction": FRICTION}, **(box_keys or {})}
@@ -90,7 +90,7 @@ def slide(
 
 
 def sliding() -> Table:
-    """Direction of sliding by yaw of the box, as PyBullet has it and in maximal coordinates."""
+    """Direction of sliding by yaw of the box, by default and in maximal coordinates."""
     rows = []
     for direction in DIRECTIONS_DEG:
         cells = []

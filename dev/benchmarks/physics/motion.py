@@ -28,7 +28,7 @@ from .scene import (
 
 TIME_STEPS_S = (1 / 240, 0.002, 0.001)
 PYBULLET_DAMPING = 0.04
-"""What PyBullet gives to whatever does not say otherwise, but not in maximal coordinates."""
+"""Defaults of PyBullet, except in maximal coordinates."""
 LENGTH_M = 0.5
 SWING = 0.5
 """Amplitude of the pendulum [rad]."""

@@ -1,4 +1,4 @@
-"""Small worlds to measure physics in, and the tables of what was measured."""
+"""Small worlds for measurements of physics, and tables of the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAXIMAL = {"useMaximalCoordinates": True}
 """What an object's YAML says to be in maximal coordinates."""
 UNDAMPED = {"linearDamping": 0.0, "angularDamping": 0.0}
 CLOSED_FORM = "closed form"
-"""The column of a table that tells what is right."""
+"""The column of a table with the correct value."""
 
 
 class Span(NamedTuple):
