@@ -119,7 +119,7 @@ def test_chunk_larger_than_its_declared_size_is_damaged(write_bag: WriteBag) -> 
     data = path.read_bytes()
     at = data.index(b"size=") + len(b"size=")
     path.write_bytes(data[:at] + (1000).to_bytes(4, "little") + data[at + 4 :])
-    assert "damaged: a chunk unfolds to more than it says" in _refused(path)
+    assert "damaged: a chunk unfolds to more than its stated size" in _refused(path)
 
 
 def test_an_index_that_names_a_message_many_times_is_damaged(tmp_path: Path) -> None:

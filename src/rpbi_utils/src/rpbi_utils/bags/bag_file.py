@@ -32,7 +32,7 @@ Fields = dict[bytes, bytes]
 
 
 class Connection(NamedTuple):
-    """One publisher of a topic, with the type of its messages and the definition of that."""
+    """One publisher of a topic, with type and definition of its messages."""
 
     topic: str
     datatype: str
@@ -68,9 +68,9 @@ class BagFile:
         counts: Messages of each connection.
 
     Raises:
-        NotABagError: If it does not begin as a bag does.
-        ValueError, struct.error, KeyError: If it has no index, or a broken one; a LimitError if it has more connections
-            than anybody needs.
+        NotABagError: If it does not begin like a bag.
+        ValueError, struct.error, KeyError: If it has no index, or a broken one; a LimitError if it has too many
+            connections.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -110,7 +110,7 @@ class BagFile:
         return sum(each.size for each in self.chunks)
 
     def clock_of(self, connections: Collection[int]) -> SetBack:
-        """Returns by how much the times of recording of some connections run back, in the order of the file."""
+        """Returns the largest step back in the recording times of some connections, in the order of the file."""
         index = self._index_of(connections)
         index = index[np.lexsort((index["offset"], index["chunk"]))]
         return set_back(index["time_ns"] / 1e9)
@@ -141,7 +141,7 @@ class BagFile:
         return data
 
     def _sized(self, most: int) -> bytes:
-        """Reads bytes behind their number."""
+        """Reads a block of bytes that follows its size."""
         (size,) = _UINT32.unpack(self._read(4))
         if size > most:
             raise ValueError(f"expected a header of at most {most} bytes, got {size}")
@@ -160,7 +160,7 @@ class BagFile:
         return _uint32(header, b"conn"), Connection(header[b"topic"].decode(), *texts)
 
     def _chunk_info(self) -> tuple[int, int]:
-        """Reads where a chunk is and of how many connections it has messages."""
+        """Reads the offset of a chunk and its number of connections."""
         header = self._record_header(_CHUNK_INFO)
         (size,) = _UINT32.unpack(self._read(4))
         count = _uint32(header, b"count")
@@ -176,13 +176,13 @@ class BagFile:
         (compressed_size,) = _UINT32.unpack(self._read(4))
         start = self._file.tell()
         if start + compressed_size > self._size:
-            raise ValueError("a chunk ends behind the end of the file")
+            raise ValueError("a chunk ends after the end of the file")
         compression = header[b"compression"].decode()
         size = compressed_size if compression == "none" else _uint32(header, b"size")
         return Chunk(compression, size, start, compressed_size)
 
     def _index_record(self, chunk: int) -> int:
-        """Reads where messages of one connection lie in a chunk; returns how many there are."""
+        """Reads the offsets of one connection's messages in a chunk; returns their number."""
         header = self._record_header(_INDEX)
         count = _uint32(header, b"count")
         (size,) = _UINT32.unpack(self._read(4))
@@ -196,7 +196,7 @@ class BagFile:
         return count
 
     def _unfold(self, chunk: Chunk) -> bytes:
-        """Returns the uncompressed data of a chunk, at most as much as its header states."""
+        """Returns the uncompressed data of a chunk, at most the size in its header."""
         self._file.seek(chunk.start)
         data = self._read(chunk.compressed_size)
         if chunk.compression == "none":
@@ -208,7 +208,7 @@ class BagFile:
         else:
             raise ValueError(f"expected compression none, bz2 or lz4, got '{chunk.compression:.60}'")
         if len(unfolded) > chunk.size:
-            raise ValueError("a chunk unfolds to more than it says")
+            raise ValueError("a chunk unfolds to more than its stated size")
         return unfolded
 
 
@@ -253,7 +253,7 @@ def _message(data: bytes, offset: int) -> tuple[int, bytes, int]:
         (size,) = _UINT32.unpack_from(data, offset)
         start, offset = offset + 4, offset + 4 + size
         if offset > len(data):
-            raise ValueError("a message ends behind the end of its chunk")
+            raise ValueError("a message ends after the end of its chunk")
         if fields[b"op"][0] != _CONNECTION:
             break
     if fields[b"op"][0] != _MESSAGE:

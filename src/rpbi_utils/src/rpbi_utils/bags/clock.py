@@ -13,7 +13,9 @@ from .row_plan import RECORD_TIME
 Array = NDArray[Any]
 
 MAX_BACK_S = 1.0
-"""Largest time by which stamps may run back against the order of recording [s]; publishers are never quite in step."""
+"""Largest time by which stamps may run back against the order of recording [s]; publishers are never exactly
+synchronous.
+"""
 
 
 class SetBack(NamedTuple):
@@ -37,7 +39,7 @@ class SetBack(NamedTuple):
 
 
 def set_back(times: Array) -> SetBack:
-    """Returns by how much times run back.
+    """Returns the largest step back of times.
 
     Args:
         times: In the order of recording, shape (n,) [s].
@@ -51,7 +53,7 @@ def set_back(times: Array) -> SetBack:
 
 
 def clock_of(table: pd.DataFrame) -> SetBack:
-    """Returns by how much the stamps of a table run back against the order of recording.
+    """Returns the largest step back of a table's stamps against the order of recording.
 
     Args:
         table: As `bag_to_dataframes` returns it. Stamps of different TF frames are not compared.

@@ -1,4 +1,4 @@
-"""Serialised images to arrays, free of ROS."""
+"""Serialised images to arrays, without ROS."""
 
 from __future__ import annotations
 

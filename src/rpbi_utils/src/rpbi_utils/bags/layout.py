@@ -42,11 +42,11 @@ class Leaf(NamedTuple):
 
     @property
     def span(self) -> tuple[int, int]:
-        """Offsets of its first byte and of the byte behind it."""
+        """Offsets of its first byte and of the byte after it."""
         return self.start, self.start + self.size
 
     def text(self, raw: bytes) -> str:
-        """Returns the string that lies here in a message."""
+        """Returns the string at this place of a message."""
         return raw[self.start : self.start + self.size].decode("utf-8", "replace")
 
 
@@ -123,7 +123,7 @@ class _Cursor:
         self.layout.fixed.append((start, self.at))
         (length,) = struct.unpack_from("<I", self.raw, start)
         left = len(self.raw) - self.at
-        if length > left:  # no element is shorter than a byte; a false length must not run away
+        if length > left:  # each element has at least a byte: limits the loop for a false length
             raise ValueError(f"a length of {length} at byte {start}, with {left} bytes left")
         return int(length)
 

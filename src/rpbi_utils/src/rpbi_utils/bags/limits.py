@@ -37,7 +37,7 @@ TIME_PER_MB_S = 2.0
 
 
 class LimitError(ValueError):
-    """Something is larger than its limit; readers add the bag and the topic."""
+    """A size is above its limit; readers add the bag and the topic."""
 
     @classmethod
     def over(cls, limit: str, got: str) -> LimitError:
@@ -65,7 +65,7 @@ class Budget:
         self._all_cells = 0
 
     def check_time(self, topic: str) -> None:
-        """Raises a BagError if the time is over, while a topic is read."""
+        """Raises a BagError if the time is used up while a topic is read."""
         if not self._unlimited and self._clock() > self._end_s:
             self._refuse(topic, f"{self._time_s:.0f} s of processor time", "a bag that needs more")
 

@@ -1,4 +1,4 @@
-"""Times as integers: which sample belongs to a row is decided in nanoseconds, as stamps have them."""
+"""Times as integers: samples are assigned to rows in nanoseconds, like stamps."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MAX_LINES = 20
 """Largest number of lines of a panel with a legend; with more there is none."""
 MAX_POINTS = 20_000
-"""Largest number of points of a line; of more, evenly spaced ones are drawn."""
+"""Largest number of points of a line; longer lines are drawn with evenly spaced points."""
 _AXES = "xyz"
 _QUANTITIES = {
     "position": "position [rad or m]",

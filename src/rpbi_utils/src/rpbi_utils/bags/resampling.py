@@ -147,7 +147,9 @@ def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
 
 
 def _snapped(times: Array, known: Array, resolution: int) -> Array:
-    """Returns times [ns], each moved to the known one that floats of that resolution cannot distinguish from it."""
+    """Returns times [ns]; each that floats of that resolution cannot distinguish from a known time is replaced by
+    it.
+    """
     if not len(known):
         return times
     newest = known[np.searchsorted(known, times + resolution, side="right") - 1]
@@ -224,7 +226,9 @@ def _linear(known: Array, samples: Array, wanted: Array) -> Resampled:
 
 
 def _slerp(start: Array, end: Array, share: Array) -> Array:
-    """Rotates on the shortest way between unit quaternions, shape (n, 4); the signs are those of `start`."""
+    """Interpolates along the shortest rotation between unit quaternions, shape (n, 4); the signs are those of
+    `start`.
+    """
     first = Rotation.from_quat(start)
     whole = (first.inv() * Rotation.from_quat(end)).as_rotvec()
     quats = (first * Rotation.from_rotvec(share[:, None] * whole)).as_quat()

@@ -1,4 +1,4 @@
-"""Mapping of a message to rows and columns: one row per message, except for the types listed in `PLANS`."""
+"""Mapping of a message to rows and columns: one row per message, except for the types in `PLANS`."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -45,7 +45,7 @@ def plan_rows(message_type: MessageType, raw: bytes, is_plain: bool = False) -> 
     layout = lay_out(message_type, raw)
     try:
         rows, names, notes = (_one_row if is_plain else PLANS.get(message_type.name, _one_row))(layout, raw)
-    except (KeyError, ValueError):  # a value is not where the usual definition has it, or in too long an array
+    except (KeyError, ValueError):  # a value is at another place than in the usual definition, or in a long array
         rows, names, notes = _one_row(layout, raw)
         notes = [*notes, f"not as {message_type.name} usually is: one row a message"]
     for row in rows:
@@ -83,7 +83,7 @@ def _joint_state(layout: Layout, raw: bytes) -> Plan:
     columns = {path: leaf for path, leaf in leaves.items() if path.startswith("header/")}
     for array in ("position", "velocity", "effort"):
         count = counts[array]
-        if names and count not in (0, len(names)):  # which value belongs to which joint cannot be known
+        if names and count not in (0, len(names)):  # values cannot be assigned to joints
             notes.append(f"{count} values of '{array}' for {len(names)} joints: left out")
             continue
         for index in range(count):
@@ -93,7 +93,7 @@ def _joint_state(layout: Layout, raw: bytes) -> Plan:
 
 
 def _transforms(layout: Layout, raw: bytes) -> Plan:
-    """One row a transform, each with its own stamp."""
+    """One row per transform, each with its own stamp."""
     leaves, rows = layout.leaves, []
     for index in range(layout.counts["transforms"]):
         prefix = f"transforms/{index}/"
@@ -105,7 +105,7 @@ def _transforms(layout: Layout, raw: bytes) -> Plan:
 
 
 def _contacts(layout: Layout, raw: bytes) -> Plan:
-    """One row a contact, with stamp and sum of forces of its message; where nothing touches, one row with these."""
+    """One row per contact, with stamp and sum of forces of its message; without contacts, one row with these alone."""
     message = {path: leaf for path, leaf in layout.leaves.items() if not path.startswith("points/")}
     points: list[Columns] = [{} for _ in range(layout.counts["points"])]
     for path, leaf in layout.leaves.items():
@@ -116,7 +116,7 @@ def _contacts(layout: Layout, raw: bytes) -> Plan:
 
 
 def _diagnostics(layout: Layout, raw: bytes) -> Plan:
-    """One row a status, with a column for each of its keys."""
+    """One row per status, with a column for each of its keys."""
     leaves, counts, rows, keys = layout.leaves, layout.counts, [], []
     for index in range(counts["status"]):
         prefix = f"status/{index}/"

@@ -1,4 +1,4 @@
-"""Serialised messages to pandas tables, many at a time and free of ROS; and tables to files."""
+"""Serialised messages to pandas tables, many at a time and without ROS; and tables to files."""
 
 import logging
 import re
@@ -56,8 +56,8 @@ class _Block(NamedTuple):
 class TableBuilder:
     """Collects the serialised messages of one topic and turns them into one table.
 
-    Messages are read in batches, those of one layout (see `rpbi_utils.bags.layout`) at once. Strings and numbers
-    come out as they went in; a value that a message does not have is NaN (None in columns of text).
+    Messages are read in batches, those of one layout (see `rpbi_utils.bags.layout`) at once. Strings and numbers are
+    unchanged; a value that a message lacks is NaN (None in columns of text).
 
     Args:
         topic: Name of the topic, for the log.
@@ -269,7 +269,7 @@ def _text(cell: Array) -> str:
 
 
 def _join(pieces: list[_Piece], rows: int) -> Array:
-    """Returns a column of its pieces, shape (rows,); where there is no value it is NaN, or None in text and bool."""
+    """Returns a column joined from its pieces, shape (rows,); missing values are NaN, or None in text and bool."""
     dtypes = {values.dtype for _, values in pieces}
     is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
     dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
@@ -304,7 +304,7 @@ def file_stems(topics: Iterable[str]) -> dict[str, str]:
 
 
 def write_table(table: pd.DataFrame, path: Path) -> None:
-    """Writes a table with its index; the ending of the file, `.parquet`, `.csv` or `.hdf5`, says how.
+    """Writes a table with its index; the format follows from the ending of the file, `.parquet`, `.csv` or `.hdf5`.
 
     A column of several types (two types of message on one topic) is written as text in a Parquet or HDF5 file. An HDF5
     file has a data set a column, with `/` as the separator of groups, and the index as `time`.
@@ -368,7 +368,7 @@ def _rows_of(cells: list[Array]) -> Array:
 
 
 def _encoding(column: pd.Series) -> str | None:
-    """Returns how Parquet is to hold a column of Python objects, or None for a column of numbers."""
+    """Returns the Parquet encoding of a column of Python objects, or None for a column of numbers."""
     if column.dtype != np.dtype(object):
         return None
     kinds = {type(value) for value in column if value is not None}

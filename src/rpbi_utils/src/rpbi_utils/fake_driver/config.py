@@ -40,12 +40,12 @@ class DriverJointLimits(ConfigModel):
     upper: Angle = Field(description="Highest position.")
     velocity: Annotated[Positive, Unit("rad/s or m/s")] = Field(description="Highest commanded speed.")
     acceleration: Annotated[Positive, Unit("rad/s^2 or m/s^2")] = Field(
-        description="Highest commanded acceleration; a reflex stop brakes with it."
+        description="Largest commanded acceleration; also the deceleration of a reflex stop."
     )
     jerk: Annotated[Positive, Unit("rad/s^3 or m/s^3")] = Field(description="Highest commanded jerk.")
-    torque: Annotated[Positive, Unit("N m or N")] = Field(description="Effort of its motor that is a reflex.")
+    torque: Annotated[Positive, Unit("N m or N")] = Field(description="Effort of its motor that triggers a reflex.")
     step: PositiveAngle | None = optional(
-        "Longest way between two commands; without it, what three times `velocity` covers in one cycle."
+        "Largest distance between two commands; by default, that of three times `velocity` in one cycle."
     )
     following_error: PositiveAngle = Field(0.2, description="Largest distance of the joint from its set point.")
 
@@ -63,17 +63,17 @@ class NoiseConfig(ConfigModel):
     velocity: Annotated[NonNegative, Unit("rad/s or m/s")] = Field(0.0, description="That of velocities.")
     effort: Annotated[NonNegative, Unit("N m or N")] = Field(0.0, description="That of efforts.")
     delay_s: NoNegativeTime = Field(0.0, description="Age of states when they are published.")
-    seed: Count = Field(0, description="The same seed makes the same noise.")
+    seed: Count = Field(0, description="Seed of the noise.")
 
 
 class FakeDriverConfig(ConfigModel):
-    """A robot's controller as it behaves at its topics."""
+    """Behaviour of a robot's controller at its topics."""
 
-    robot: Name = Field(description="The robot in the simulator beside it, `rpbi/NAME`.")
+    robot: Name = Field(description="The robot in the simulator of the same namespace, `rpbi/NAME`.")
     limits: Text = Field(description=f"Whose limits it has: {', '.join(ROBOTS)}, or a YAML file of such limits.")
     joint_limits: dict[Text, dict[Text, Any]] = Field({}, description="Limits that differ from those, by joint.")
     driver: RemapConfig = Field(
-        RemapConfig(), description="Names, units and order of its joints, as the nodes that remap to it have them."
+        RemapConfig(), description="Names, units and order of its joints, as in the nodes that remap to it."
     )
     command_hz: Hz = Field(100.0, description="Rate of the controller; it expects one command per cycle.")
     rate_tolerance: Annotated[Fraction, Field(gt=0)] = Field(

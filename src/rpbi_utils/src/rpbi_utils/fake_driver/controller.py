@@ -12,7 +12,7 @@ from typing import NamedTuple
 from .config import DriverJointLimits, FakeDriverConfig
 
 RATE_WINDOW_S = 1.0
-"""Over this time the rate of commands is measured [s]."""
+"""Time over which the rate of commands is measured [s]."""
 REST_SHARE = 0.02
 """Share of its limit below which a velocity counts as rest when commands end."""
 EFFORT_SHARE = 0.999
@@ -122,7 +122,7 @@ class RobotController:
 
     @property
     def is_braking(self) -> bool:
-        """Whether a reflex stop is on its way."""
+        """Whether a reflex stop is in progress."""
         return self.mode is Mode.REFLEX and any(self._sent.velocity)
 
     @property
@@ -184,10 +184,10 @@ class RobotController:
         return points
 
     def recover(self, position: Sequence[float]) -> str | None:
-        """Ends a reflex; returns why it cannot, None if it could.
+        """Ends a reflex; returns the reason if it cannot, None if it could.
 
         Args:
-            position: Where the joints are; from there on the robot is held [rad or m].
+            position: Positions of the joints, at which the robot is held then [rad or m].
         """
         if self.mode is not Mode.REFLEX:
             return "there is no reflex to recover from"
@@ -212,7 +212,7 @@ class RobotController:
         return None
 
     def _note_arrival(self, now_s: float) -> Reflex | None:
-        """Counts a command; returns what is wrong with their rate."""
+        """Counts a command; returns the fault of the rate of commands, if any."""
         config, arrivals_s = self._config, self._arrivals_s
         if self.mode is Mode.IDLE:
             arrivals_s.clear()
@@ -236,7 +236,7 @@ class RobotController:
         return self._beyond_limits(motion.position, self._sent.position)
 
     def _refuse(self, motion: _Motion) -> Reflex | None:
-        """Returns the first limit that the step to a command breaks."""
+        """Returns the first limit that the step to a command violates."""
         last = self._motion.position
         for name, limits, start, end in zip(self._names, self._limits, last, motion.position):
             step = 3.0 * limits.velocity * self._cycle_s if limits.step is None else limits.step
@@ -287,7 +287,7 @@ class RobotController:
         return None
 
     def _silent(self, now_s: float) -> Reflex | None:
-        """Returns that commands have ceased in the middle of a motion; at rest they may."""
+        """Returns a reflex if commands have ceased during a motion; at rest they may."""
         if self.mode is not Mode.MOVE or now_s - self._arrivals_s[-1] <= self._config.timeout_s or self._waiting:
             return None
         shares = [abs(v) / limits.velocity for v, limits in zip(self._motion.velocity, self._limits)]
@@ -321,7 +321,7 @@ class RobotController:
         return max(planned_s + SPACING_GAIN * (now_s - planned_s), self._planned_s + MIN_SPACING * self._cycle_s)
 
     def _brake(self, now_s: float, cycle_s: float) -> list[SetPoint]:
-        """Slows every joint down by its acceleration; returns the new set point, none at rest."""
+        """Decelerates every joint by its acceleration; returns the new set point, none at rest."""
         if not self.is_braking:
             return []
         position, velocity = [], []

@@ -11,7 +11,7 @@ from .config import NoiseConfig
 
 
 class Measurement:
-    """Delays states and adds noise to them; the same states at the same times become the same measurements."""
+    """Delays states and adds noise to them; equal states at equal times result in equal measurements."""
 
     def __init__(self, config: NoiseConfig) -> None:
         self._config = config

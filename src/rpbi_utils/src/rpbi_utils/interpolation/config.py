@@ -42,7 +42,7 @@ _LowerCase = BeforeValidator(lambda value: value.lower() if isinstance(value, st
 
 
 class WaypointError(ValueError):
-    """Waypoints that cannot be followed; the message names the key, what was expected and what came."""
+    """Waypoints that cannot be followed; the message names the key, the expected and the actual value."""
 
 
 class InterpolationParameters(ConfigModel):
@@ -84,7 +84,7 @@ class RotationConfig(ConfigModel):
         "Rows: `[i]` for `theta`; first row and the one after the last for the others."
     )
     shortest_path: Switch = Field(
-        False, description="Whether `theta` and `euler` turn the shorter way, rather than as far as their numbers say."
+        False, description="Whether `theta` and `euler` turn by the shorter rotation, not by their full angles."
     )
 
     @property
@@ -192,7 +192,7 @@ class InterpolationConfig(ConfigModel):
     """Interpolation between waypoints."""
 
     use_interpolation: Switch = Field(
-        True, description="Otherwise waypoints are published as they are, at their times."
+        True, description="Whether to interpolate; otherwise waypoints are published unchanged, at their times."
     )
     inter_dt: Seconds = Field(0.01, description="Time between two samples.")
     nochange_window_length: Count = Field(0, description="Number of coming samples that new waypoints do not change.")

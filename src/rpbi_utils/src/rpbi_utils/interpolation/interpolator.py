@@ -16,13 +16,13 @@ from .rotation import RotationKnot, RotationPath, angular_rates
 from .waypoints import Array, Waypoints, estimated_rates
 
 MAX_TRIES = 50
-"""Number of times that a motion is slowed down further until it keeps its limits."""
+"""Largest number of iterations that slow a motion down until it keeps its limits."""
 KEPT = 1.0 + 1e-9
-"""Factor up to which a motion need not be slowed down, for rounding."""
+"""Factor up to which a motion is not slowed down, for rounding."""
 LEAST_STRETCH = 1.02
 """Least factor by which it is then slowed down."""
 ROUNDING_S = 1e-9
-"""Time by which a sample may be later than the present, for rounding [s]."""
+"""Time by which a sample may be in the future, for rounding [s]."""
 
 
 class TargetSample(NamedTuple):
@@ -53,13 +53,13 @@ class Plan(NamedTuple):
     knots_s: tuple[float, ...]
 
     def spliced(self, new: Plan, at_s: float) -> Plan:
-        """Returns this plan until a time [s], and another one from then on."""
+        """Returns this plan until a time [s], continued by another one."""
         path = None if self.path is None or new.path is None else self.path.spliced(new.path, at_s)
         kept = tuple(time_s for time_s in self.knots_s if time_s <= at_s)
         return Plan(self.scalars.spliced(new.scalars, at_s), path, (*kept, *(t for t in new.knots_s if t > at_s)))
 
     def since(self, time_s: float) -> Plan:
-        """Returns the same plan without what is over at a time [s]."""
+        """Returns the same plan without the parts before a time [s]."""
         path = None if self.path is None else self.path.since(time_s)
         return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
 
@@ -79,7 +79,7 @@ class Added(NamedTuple):
 
 
 class Interpolator:
-    """Samples of a motion that new waypoints change while it lasts.
+    """Samples of a motion that new waypoints may change at any time.
 
     Samples are at the times of a grid with steps of `inter_dt`, from the first waypoint on, and at the very end. New
     waypoints take over after the protected samples, with the position and velocity of that moment; waypoints before
@@ -158,22 +158,22 @@ class Interpolator:
         return self._at(plan, time_s)
 
     def pause(self, now_s: float) -> None:
-        """Stops the motion where it is."""
+        """Pauses the motion."""
         if self._paused_s is None:
             self._paused_s = now_s
 
     def resume(self, now_s: float) -> None:
-        """Continues the motion where it stopped."""
+        """Continues the paused motion."""
         if self._paused_s is not None:
             self.delay_s += now_s - self._paused_s
             self._paused_s = None
 
     def forget(self) -> None:
-        """Ends the motion; the next one begins at its first waypoint, wherever the target is."""
+        """Ends the motion; the next one begins at its first waypoint, independently of the target."""
         self._plan, self._sent_s = None, -math.inf
 
     def _own_s(self, now_s: float) -> float:
-        """Returns the time of the plan, which stands still during pauses."""
+        """Returns the time of the plan, which does not advance during pauses."""
         return (now_s if self._paused_s is None else self._paused_s) - self.delay_s
 
     def _on_grid(self, time_s: float) -> float:

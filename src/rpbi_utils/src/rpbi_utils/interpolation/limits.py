@@ -1,4 +1,4 @@
-"""Limits of a motion through waypoints: its peaks, and by how much it has to be slowed down to keep them."""
+"""Limits of a motion through waypoints: its peaks, and the factor by which it is slowed down to keep the limits."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rpbi.control.trajectories.trajectory import Trajectory
 from .rotation import RotationPath
 
 POINTS = np.linspace(0.0, 1.0, 65)
-"""Shares of a segment at which peaks of numbers are looked for; they are at most 0.1 % higher in between."""
+"""Shares of a segment at which peaks of numbers are evaluated; they are at most 0.1 % higher in between."""
 TURN_POINTS = 17
-"""Number of points of a segment at which peaks of orientations are looked for."""
+"""Number of points of a segment at which peaks of orientations are evaluated."""
 MARGIN = 1e-3
-"""Share of a limit that is kept free."""
+"""Margin to a limit, as a share of it."""
 UNITS = {
     "velocity": "m/s or rad/s",
     "acceleration": "m/s^2 or rad/s^2",
@@ -33,7 +33,7 @@ Each = Positive | ListOf[Positive]
 
 
 class MotionLimitsConfig(ConfigModel):
-    """Limits of a motion through waypoints; those that are missing are not kept."""
+    """Limits of a motion through waypoints; missing ones do not apply."""
 
     velocity: Annotated[Each, Unit("m/s, rad/s")] | None = optional(
         "Largest speed of each row that is interpolated as a number: one for all, or a list. For joints, the largest "

@@ -113,7 +113,7 @@ def interpolate_cubic_hermite_spline_source_code(
 def plot_interpol_results(
     intertime_seq: ArrayLike, interpos_seq: ArrayLike, time_seq: ArrayLike, pos_seq: ArrayLike, plot_title: str
 ) -> None:
-    """Opens a window with samples and the values between which they are."""
+    """Opens a window with samples and the values that they interpolate."""
     import matplotlib.pyplot as plt  # only plots need it
 
     plt.figure()
@@ -200,7 +200,9 @@ class TCubicHermiteSpline:
         return periods, start + rest
 
     def EvaluateC(self, t: float, pi: tuple[float, float] | None = None) -> float:  # noqa: N802
-        """Returns the value at a time [s] of the curve that repeats itself, each time from its last value on."""
+        """Returns the value at a time [s] of the periodic curve; each period begins at the last value of the one
+        before.
+        """
         periods, within = self.PhaseInfo(t) if pi is None else pi
         first, last = self.Evaluate(self._times_s[0]), self.Evaluate(self._times_s[-1])
         return self.Evaluate(within) + periods * (last - first)

@@ -65,7 +65,7 @@ class RotationKnot(NamedTuple):
 
 
 class RotationSegment(NamedTuple):
-    """The stretch between two knots.
+    """The segment between two knots.
 
     Attributes:
         start_s: Where it begins [s].
@@ -81,7 +81,8 @@ class RotationSegment(NamedTuple):
 class RotationPath:
     """Orientations through knots; immutable.
 
-    Two knots are joined the shorter way: with a constant angular velocity if one of them has an orientation alone, by a
+    Two knots are joined by the shorter rotation: with a constant angular velocity if one of them has an orientation
+        alone, by a
     cubic if both have angular velocities, by a quintic if both have angular accelerations as well. Before the first
     knot and after the last it rests.
 

@@ -1,4 +1,4 @@
-"""Waypoints, as messages have them."""
+"""Waypoints in messages."""
 
 from __future__ import annotations
 

@@ -21,23 +21,23 @@ from .models import ObjectModel, models_of
 GAP_M = 0.005
 """Distance of objects that are about to fall."""
 LIFT_M = 0.02
-"""Step by which an object is lifted until it touches nothing."""
+"""Step by which an object is lifted until it has no contact."""
 REST_SPEED, REST_TURN = 0.005, 0.1
 """Speeds below which an object is at rest [m/s, rad/s]."""
 LOOK_S = 0.1
-"""Time between two looks whether all are at rest."""
+"""Time between two checks of rest."""
 PATIENCE_S = 10.0
-"""Longest time that objects get to come to rest."""
+"""Longest time for objects to come to rest."""
 ATTEMPTS = 5
-"""Arrangements that are tried until one comes to rest."""
+"""Largest number of arrangements until one comes to rest."""
 ELEVATION_DEG = (25.0, 75.0)
 """Least and largest elevation of the camera."""
 DISTANCE = (0.6, 1.2)
-"""Least and largest distance of the camera, as a share of that from which the area fills the image."""
+"""Least and largest distance of the camera, relative to that at which the area fills the image."""
 CLEAR_M = 0.1
 """Least distance of the camera from the boxes around the links of robots [m]."""
 MAX_VIEWS = 100
-"""Largest number of views that are drawn until no robot is in the way."""
+"""Largest number of random views until no robot obstructs one."""
 SHIFT = 0.25
 """Largest shift of the point that the camera looks at, as a share of the area's radius."""
 
@@ -112,7 +112,7 @@ class Arrangement:
         No robot is within `CLEAR_M` of the camera, or between the camera and the point that it looks at.
 
         Raises:
-            InterfaceError: If robots are in the way of each of `MAX_VIEWS` views.
+            InterfaceError: If robots obstruct each of `MAX_VIEWS` views.
         """
         for _ in range(MAX_VIEWS):
             eye, target = self._line_of_sight(random, intrinsics)
@@ -122,7 +122,7 @@ class Arrangement:
 
     def _line_of_sight(self, random: np.random.Generator, intrinsics: Intrinsics) -> tuple[Array, Array]:
         """Returns a random place of a camera, and the point that it looks at [m]."""
-        sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # so that all directions are as likely
+        sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # so that all directions are equally likely
         azimuth = random.uniform(-math.pi, math.pi)
         cosine = math.sqrt(1.0 - sine**2)
         direction = np.array([cosine * math.cos(azimuth), cosine * math.sin(azimuth), sine])
@@ -144,7 +144,7 @@ class Arrangement:
         return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
-        """Puts the objects at random places of the area, each as low as it touches nothing."""
+        """Puts the objects at random places of the area, each as low as possible without contact."""
         names = [str(name) for name in random.permutation(list(self.models))]
         there = [body for body in self._world.bodies.values() if body.name not in self.models]
         for name in names:

@@ -1,7 +1,7 @@
 """The folder of a data set in the BOP format.
 
 BOP is the format of the Benchmark for 6D Object Pose Estimation (Hodan et al., ECCV 2018); its description is
-`docs/bop_datasets_format.md` of https://github.com/thodan/bop_toolkit. Labels of detectors stand in
+`docs/bop_datasets_format.md` of https://github.com/thodan/bop_toolkit. Labels for detectors are in
 `scene_gt_coco.json`, in the format of COCO, as that toolkit makes them.
 """
 
@@ -48,16 +48,16 @@ class Label(NamedTuple):
 
     @property
     def visible_fraction(self) -> float:
-        """Share of its silhouette that is seen; what is beyond the image is not."""
+        """Visible share of its silhouette; parts beyond the image are not visible."""
         return float(self.visible.sum()) / self.whole.pixels
 
 
 class LabelledImage(NamedTuple):
-    """An image and what is in it.
+    """An image and its labels.
 
     Attributes:
         colour: Red, green and blue, uint8, shape (height, width, 3).
-        depth: Distances along the optical axis [m], 0 where nothing is, shape (height, width).
+        depth: Distances along the optical axis [m], 0 without depth, shape (height, width).
         camera: Pose of the world in the optical frame [m], shape (4, 4).
         labels: The objects with a pixel or more.
     """
@@ -72,7 +72,7 @@ class BopFolder:
     """A data set that grows.
 
     Args:
-        path: Its folder, which is there and empty.
+        path: Its folder, which exists and is empty.
         name: Its name.
         models: The models.
         intrinsics: Those of its camera.

@@ -23,7 +23,7 @@ from .bop import BopFolder, Label, LabelledImage
 from .silhouettes import Silhouettes
 
 VIEWS = 20
-"""Views of an arrangement that are tried until one shows an object."""
+"""Largest number of views of an arrangement until one shows an object."""
 
 
 class Written(NamedTuple):
@@ -58,7 +58,7 @@ def write_labelled_images(
     complete.
 
     Args:
-        world: The world, or its main file. A world is reset: objects that came into it at run time go.
+        world: The world, or its main file. A world is reset: objects added at run time are removed.
         out: Folder of the data set; it is empty, or does not exist.
         count: Number of images.
         seed: Seed, at least 0.
@@ -79,7 +79,7 @@ def write_labelled_images(
     if target.exists() and not (target.is_dir() and next(target.iterdir(), None) is None):
         raise InterfaceError(f"{target}: expected a new or an empty folder, got one with files in it")
     try:
-        shutil.rmtree(part, ignore_errors=True)  # of a call that was killed
+        shutil.rmtree(part, ignore_errors=True)  # left by a killed call
         with nullcontext(world) if isinstance(world, World) else closing(_opened(world)) as given:
             part.mkdir(parents=True)
             written = _write(given, part, target.absolute().name, count, seed, camera, report)

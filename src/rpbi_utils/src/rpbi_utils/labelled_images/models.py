@@ -1,4 +1,4 @@
-"""Kinds of objects, and their surfaces as models of a data set."""
+"""Kinds of objects, with their surfaces as models of a data set."""
 
 from __future__ import annotations
 
@@ -136,5 +136,5 @@ def _diameter(points: Array) -> float:
     try:
         points = points[ConvexHull(points).vertices]
     except QhullError:
-        pass  # they are flat, and as a rule few
+        pass  # flat, and usually few
     return float(pdist(points).max())

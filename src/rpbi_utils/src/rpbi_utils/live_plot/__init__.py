@@ -1,1 +1,1 @@
-"""Numeric fields of running topics as lines over time, free of ROS and Qt."""
+"""Numeric fields of running topics as lines over time, without ROS and Qt."""

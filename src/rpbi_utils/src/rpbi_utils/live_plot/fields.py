@@ -14,7 +14,7 @@ from rpbi_utils.bags.message_type import SCALAR, Field, MessageType
 from rpbi_utils.bags.row_plan import STAMP, plan_rows
 
 MAX_LINES = 16
-"""Largest number of lines of one name, which may stand for all numbers of an array or of a part of a message."""
+"""Largest number of lines of one name, which may denote all numbers of an array or of a part of a message."""
 MAX_OFFERED = 12
 """Largest number of fields that a message lists."""
 _INDEX = re.compile(r"\[(\d+)\]")
@@ -23,7 +23,7 @@ _TIMES = ("time", "duration")
 
 @dataclass(eq=False)
 class FieldError(InterfaceError):
-    """A name is none of a numeric field of a topic's messages."""
+    """A name does not denote a numeric field of a topic's messages."""
 
     topic: str
     type: str
@@ -181,7 +181,8 @@ def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
 
 def _path_below(field: Field, path: str) -> str | None:
     """Returns the path from an element of a field on; None if a path leads elsewhere. All fields but headers are below
-    the empty path."""
+    the empty path.
+    """
     if not path:
         return None if field.name == "header" else ""
     name, _, rest = path.partition("/")

@@ -1,4 +1,4 @@
-"""Lines that grow while messages come, and the part of them that is shown."""
+"""Lines that grow as messages arrive, and the visible part of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[Any]
 MAX_SAMPLES = 120_000
 """Number of newest samples that a line keeps; at 1 kHz those of two minutes."""
 ANEW_S = 1.0
-"""Time by which stamps have to go back to begin anew [s]; samples that are less late are dropped."""
+"""Time by which stamps have to go back for a restart [s]; samples that are less late are dropped."""
 
 _UNITS = {
     "position": "rad or m",
@@ -98,10 +98,10 @@ class LivePlot:
         self.count = 0
         """Number of values that came."""
         self.changes = 0
-        """Number of changes of what there is to show."""
+        """Number of changes of the data to show."""
 
     def add(self, name: str, time_s: float, value: float, rank: int = 0) -> None:
-        """Appends a sample to a line, which begins with its first one; all begin anew if time goes back.
+        """Appends a sample to a line, which begins with its first one; all lines restart if time goes back.
 
         Args:
             name: Name of the line.
@@ -150,7 +150,7 @@ class LivePlot:
 
 
 def thinned(times: Array, values: Array, start_s: float, end_s: float, columns: int) -> tuple[Array, Array]:
-    """Returns points that look the same on a picture: of many in one column only the lowest and the highest.
+    """Returns points that look the same in a picture: only the lowest and the highest of each column of pixels.
 
     Args:
         times: Ascending [s].

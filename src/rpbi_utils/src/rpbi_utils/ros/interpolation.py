@@ -38,9 +38,9 @@ WAYPOINTS = "ros_pybullet_interface/waypt_traj"
 STREAMING = "/stream_interpolated_motion_flag"
 """Parameter that pauses the motion while it is not true."""
 LOOKS_HZ = 5.0
-"""Rate at which that parameter is looked at [Hz of wall time]."""
+"""Rate at which that parameter is checked [Hz of wall time]."""
 MORE = 1.5
-"""Factor by which a peak without limit is larger than the last one that was reported, to be reported again."""
+"""Least ratio of a peak without limit to the last reported one for another report."""
 QUEUE_SIZE = 100
 NS_PER_S = 1_000_000_000
 
@@ -154,7 +154,7 @@ class InterpolationNode:
             self._warn_of_no_limits(added.peaks.without_limit(self._limits))
 
     def _warn_of_no_limits(self, peaks: dict[str, float]) -> None:
-        """Warns of peaks without limit, unless peaks almost as large were reported before."""
+        """Warns of peaks without limit, unless similar peaks were reported before."""
         if all(peak <= MORE * self._unlimited.get(key, 0.0) for key, peak in peaks.items()):
             return
         self._unlimited |= peaks
@@ -174,7 +174,7 @@ class InterpolationNode:
             rospy.loginfo("the motion %s", "begins" if moves else "has ended")
 
     def _reset(self, _: TriggerRequest) -> TriggerResponse:
-        """Ends the motion; the next one begins at its first waypoint, wherever the target is."""
+        """Ends the motion; the next one begins at its first waypoint, independently of the target."""
         self._arrived.append(None)
         return TriggerResponse(True, "the motion ends; the next one begins at its first waypoint")
 

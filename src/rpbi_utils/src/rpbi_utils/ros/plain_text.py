@@ -1,4 +1,4 @@
-"""Texts of other people in Qt windows: Qt would show those that look like HTML as such, with files that they name."""
+"""Untrusted texts in Qt windows: Qt would render HTML in them, with the files that it refers to."""
 
 from html import escape
 
@@ -7,12 +7,12 @@ from PyQt5.QtWidgets import QLabel
 
 
 def plain_label(text: str = "") -> QLabel:
-    """Returns a label that shows all texts as they are."""
+    """Returns a label that shows texts unformatted."""
     label = QLabel(text)
     label.setTextFormat(Qt.TextFormat.PlainText)
     return label
 
 
 def plain_tip(text: str) -> str:
-    """Returns the text of a tool tip that shows a text as it is; tool tips have no format."""
+    """Returns the escaped text of a tool tip; tool tips cannot switch off formatting."""
     return f"<qt>{escape(text)}</qt>" if "<" in text else text

@@ -6,7 +6,7 @@ import os
 
 
 def missing_for_windows() -> str:
-    """Returns what a window of Qt lacks here, in words; empty if nothing."""
+    """Returns a missing requirement of Qt windows in words; empty if none is missing."""
     try:
         import PyQt5.QtWidgets  # noqa: F401
     except ImportError:

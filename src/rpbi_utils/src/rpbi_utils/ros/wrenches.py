@@ -39,7 +39,7 @@ MAX_TF_AGE_S = 0.5
 
 
 class SilentError(ValueError):
-    """No wrench arrives."""
+    """No wrench has arrived."""
 
 
 class CalibrateWrenchNode:
@@ -56,7 +56,7 @@ class CalibrateWrenchNode:
         self._frame_id = ""
         self._lock = threading.Lock()
         self._mean: RestingMean | None = None
-        """The mean that is being made, None if none is."""
+        """The mean in progress; None without one."""
         self._is_complete = threading.Condition(self._lock)
         self._arrived_s = time.monotonic()
         self._warn = ThrottledWarning()
@@ -104,7 +104,7 @@ class CalibrateWrenchNode:
         self._calibrated.publish(message)
 
     def _pose(self, header: Header) -> Pose | None:
-        """Returns the sensor's pose in the gravity frame when it was read; None if TF does not have it."""
+        """Returns the sensor's pose in the gravity frame at the time of a reading; None if TF does not have it."""
         self._frame_id = self._parameters.sensor_frame or header.frame_id.strip("/")
         frames = self._parameters.gravity_frame, self._frame_id
         try:
@@ -132,7 +132,7 @@ class CalibrateWrenchNode:
 
         Raises:
             MovedError: If the sensor moved.
-            SilentError: If wrenches stay away, or another mean is being made.
+            SilentError: If no wrenches arrive, or another mean is in progress.
         """
         if self._mean is not None:
             raise SilentError("another service is reading the sensor; try again")
@@ -148,7 +148,9 @@ class CalibrateWrenchNode:
             self._mean = None
 
     def _zero(self, _: TriggerRequest | None) -> TriggerResponse:
-        """Makes the present wrench, less the payload's weight, the zero; the sensor has to rest and touch nothing."""
+        """Sets the zero to the present wrench, less the payload's weight; the sensor has to be at rest without
+        contact.
+        """
         with self._lock:
             try:
                 mean, pose = self._rest()
@@ -164,7 +166,7 @@ class CalibrateWrenchNode:
         return TriggerResponse(True, message)
 
     def _sample(self, _: TriggerRequest) -> TriggerResponse:
-        """Adds the present pose and wrench to those that a payload is identified from; the sensor has to rest."""
+        """Adds the present pose and wrench to the samples for identification; the sensor has to be at rest."""
         with self._lock:
             try:
                 mean, pose = self._rest()

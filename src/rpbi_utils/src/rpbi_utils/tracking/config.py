@@ -31,7 +31,7 @@ FAMILY_SIZE = 587
 
 
 class TrackedObjectConfig(ConfigModel):
-    """An object, by what sees it: either Vicon or AprilTags."""
+    """An object, tracked either by Vicon or by AprilTags."""
 
     name: FrameId = Field(description="TF frame of the object that is broadcast.")
     vicon: Text | None = optional("Subject and segment, as `SUBJECT/SEGMENT`; the topic is `vicon/SUBJECT/SEGMENT`.")
@@ -39,10 +39,10 @@ class TrackedObjectConfig(ConfigModel):
     topics: ListOf[TopicName] = Field(
         ("tag_detections",), description="Topics of the detectors that see its tags, one for each camera."
     )
-    frame_id: FrameId | None = optional("TF frame that its poses are in; without it, the one that messages name.")
+    frame_id: FrameId | None = optional("TF frame of its poses; without it, the frame in the messages.")
     unit: Literal["m", "mm"] = Field("m", description="Unit of the received positions.")
-    position: Position = Field((0.0, 0.0, 0.0), description="The object's frame in what is tracked.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation there, x, y, z, w.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Position of the object's frame in the tracked frame.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation, x, y, z, w.")
 
     @model_validator(mode="after")
     def _one_source(self) -> TrackedObjectConfig:
@@ -63,12 +63,12 @@ class TrackedObjectConfig(ConfigModel):
 
     @property
     def offset(self) -> Pose:
-        """Pose of the object's frame in what is tracked."""
+        """Pose of the object's frame in the tracked frame."""
         return Pose(self.position, self.orientation)
 
 
 class TrackingNodeConfig(ConfigModel):
-    """Objects that a tracking system sees, and what is made of their poses."""
+    """Objects of a tracking system, and the processing of their poses."""
 
     frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
     timeout_s: Seconds = Field(

@@ -45,7 +45,7 @@ def write_tag(number: int, size: float, folder: Path) -> Path:
     Args:
         number: Id of the tag.
         size: Side of the black square [m]; the white margin is another eighth on each side.
-        folder: Where to; it is made if need be.
+        folder: Target folder; it is created if missing.
 
     Returns:
         The path of the mesh.

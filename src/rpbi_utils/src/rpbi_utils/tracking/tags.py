@@ -77,10 +77,10 @@ class TagDetector:
         )
 
     def detect(self, grey: Image) -> list[DetectedTag]:
-        """Returns the tags in an image (rows x columns), each once; what is seen twice is left out."""
+        """Returns the tags in an image (rows x columns), each once; tags with two detections are left out."""
         corners, ids, _ = self._find(grey)
         numbers = [] if ids is None else ids.ravel().tolist()
-        # OpenCV begins with what is the bottom right of the upright tag, and goes clockwise
+        # OpenCV starts at the bottom right of the upright tag, and continues clockwise
         found = (
             DetectedTag(number, found.reshape(4, 2)[[1, 0, 3, 2]].astype(float) - PIXEL_CENTRE)
             for number, found in zip(numbers, corners)
@@ -90,7 +90,7 @@ class TagDetector:
 
 
 def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float64]) -> Pose | None:
-    """Returns the pose of a tag in the optical frame, None if there is none before the camera.
+    """Returns the pose of a tag in the optical frame, None if there is none in front of the camera.
 
     The tag's frame has x to the right, y up and z out of the tag.
 
@@ -103,7 +103,7 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
     # In the order that SOLVEPNP_IPPE_SQUARE wants: top left, top right, bottom right, bottom left
     square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
     pixels = tag.corners[[3, 2, 1, 0]]
-    # The first finds both poses that a tag may look to have, but fails for tags that are parallel to the image
+    # The first finds both candidate poses of a tag, but fails for tags that are parallel to the image
     solutions = [
         (float(error), rotation, translation)
         for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE)

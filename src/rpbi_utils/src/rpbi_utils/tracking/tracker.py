@@ -30,7 +30,7 @@ class OutlierConfig(ConfigModel):
 
 
 class OutlierError(ValueError):
-    """A pose where the object cannot be."""
+    """A pose that the object cannot have."""
 
 
 class PoseTracker:
@@ -56,10 +56,10 @@ class PoseTracker:
         Returns None for a pose that is not later than the previous one: a repetition, or messages out of order.
 
         Raises:
-            OutlierError: If the object cannot be there; the pose is dropped.
+            OutlierError: If the object cannot have that pose; the pose is dropped.
         """
         age_s = math.inf if self._stamp_s is None else stamp_s - self._stamp_s
-        if age_s > self._timeout_s or age_s < -self._timeout_s:  # seen again, or another clock
+        if age_s > self._timeout_s or age_s < -self._timeout_s:  # visible again, or another clock
             self._forget()
         elif age_s <= 0.0:
             return None
@@ -85,7 +85,7 @@ class PoseTracker:
         self._forget()
 
     def _impossible(self, start: Pose, end: Pose, dt_s: float) -> str | None:
-        """Returns why no object goes from one pose to another in a time, None if it may."""
+        """Returns why a motion between two poses in a time is impossible; None if it is possible."""
         limits = self._outliers
         way = math.dist(start.position, end.position)
         turn = math.hypot(*rotation_between(start.quat_xyzw, end.quat_xyzw))

@@ -1,1 +1,1 @@
-"""Calibration of force-torque sensors: their zero, and the weight of what they carry."""
+"""Calibration of force-torque sensors: their zero, and the weight of their payload."""

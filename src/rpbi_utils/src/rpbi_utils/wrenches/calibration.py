@@ -60,8 +60,8 @@ class PayloadConfig(ConfigModel):
 class CalibrationParameters(ConfigModel):
     """Private parameters of `calibrate_wrench_node.py`."""
 
-    max_samples: Annotated[Count, Field(ge=1)] = Field(100, description="Number of messages that a mean is made of.")
-    sensor_frame: FrameId | None = optional("TF frame of the sensor; without it, the one that messages name.")
+    max_samples: Annotated[Count, Field(ge=1)] = Field(100, description="Number of messages in a mean.")
+    sensor_frame: FrameId | None = optional("TF frame of the sensor; without it, the frame in the messages.")
     gravity_frame: FrameId = Field("rpbi/world", description="TF frame in which gravity points along -z.")
     gravity: Annotated[Positive, Unit("m/s^2")] = Field(9.81, description="Gravity.")
     max_force_spread: Newton = Field(1.0, description="Largest standard deviation of a force while the sensor rests.")
@@ -77,7 +77,7 @@ class RestingMean:
     """The mean of a number of wrenches of a sensor at rest.
 
     Args:
-        limits: How much wrenches and pose may differ.
+        limits: Largest deviations of wrenches and pose.
     """
 
     def __init__(self, limits: CalibrationParameters) -> None:
@@ -142,7 +142,7 @@ class WrenchCalibration:
         self.offset: Array | None = None if payload is None else payload.offset
 
     def zero(self, mean: Array, gravity: Vector | None) -> None:
-        """Makes the mean of a sensor that touches nothing, less the payload's weight, the zero."""
+        """Sets the zero to the mean of a sensor without contact, less the payload's weight."""
         self.offset = mean - self._weight(gravity)
 
     def use(self, payload: PayloadConfig) -> None:

@@ -71,7 +71,7 @@ class Identification(NamedTuple):
 
 
 def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameters) -> Identification:
-    """Returns the payload that explains wrenches at rest best.
+    """Returns the payload that fits wrenches at rest best.
 
     Raises:
         UndeterminedError: If there are too few poses or they are too alike, if the sensor carries nothing, or if no

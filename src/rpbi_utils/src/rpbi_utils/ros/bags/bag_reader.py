@@ -22,7 +22,7 @@ MAX_COMPRESSION = 255
 
 
 class BagMessage(NamedTuple):
-    """A serialised message of a bag, and when it was recorded [ns], in ROS time."""
+    """A serialised message of a bag, and its recording time [ns], in ROS time."""
 
     topic: str
     type: MessageType
@@ -102,7 +102,7 @@ class BagReader:
             yield BagMessage(topic, message_type, raw, record_time_ns)
 
     def clock_of(self, topic: str) -> SetBack:
-        """Returns by how much the times of recording of a topic run back, in the order of the file."""
+        """Returns the largest step back in the recording times of a topic, in the order of the file."""
         return self._bag.clock_of([number for number, each in self._types.items() if each[0] == topic])
 
     def _open(self) -> BagFile:
@@ -147,7 +147,7 @@ class BagReader:
             self.counts[topic] = self.counts.get(topic, 0) + self._bag.counts[number]
 
     def _refuse_bombs(self) -> None:
-        """Raises a BagError if it unfolds to more than it may."""
+        """Raises a BagError if its unpacked size is above the limit."""
         unfolded, size = self._bag.unfolded_bytes, self.path.stat().st_size
         if unfolded > max(MAX_UNPACKED_BYTES, MAX_COMPRESSION * size):
             message = (

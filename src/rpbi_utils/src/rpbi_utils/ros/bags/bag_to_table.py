@@ -1,4 +1,4 @@
-"""The command `bag_to_table`: a bag to one file a topic."""
+"""The command `bag_to_table`: converts a bag to one file per topic."""
 
 import argparse
 import logging

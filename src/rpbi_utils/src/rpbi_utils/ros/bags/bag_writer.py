@@ -36,7 +36,7 @@ _HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
 
 
 class _Arrival(NamedTuple):
-    """A message as it came; its time is zero before the first /clock."""
+    """A received message; its time is zero before the first /clock."""
 
     topic: str
     time: genpy.Time
@@ -62,7 +62,7 @@ class BagWriter:
         self._simulated_time = genpy.Time()
 
     def end(self) -> None:
-        """Has `run` write what has arrived, close the bag, and return."""
+        """Makes `run` write the received messages, close the bag, and return."""
         self._is_ended.set()
 
     def run(self, topics: Sequence[str]) -> None:
@@ -88,7 +88,7 @@ class BagWriter:
 
     def _write_all(self, bag: rosbag.Bag) -> None:
         flushed_s = time.monotonic()
-        untimed: list[_Arrival] = []  # they came before the first /clock, and get the time of the next message
+        untimed: list[_Arrival] = []  # received before the first /clock: they get the time of the next message
         while not (self._is_ended.is_set() and self._arrivals.empty()):
             try:
                 arrival = self._arrivals.get(timeout=_POLL_S)
@@ -110,7 +110,7 @@ class BagWriter:
         """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
         header = arrival.message._connection_header
         key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
-        known = bag._topic_connections  # by itself, Bag.write has one connection a topic, whatever comes on it
+        known = bag._topic_connections  # by default, Bag.write has one connection per topic
         known.pop(arrival.topic, None)
         if key in self._connections:
             known[arrival.topic] = self._connections[key]

@@ -17,10 +17,11 @@ _OUTBOUND = "o"
 
 
 def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
-    """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
+    """Returns the topics that a node has not subscribed to at the master, and the publishers that do not send to it
+    yet.
 
-    When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
-    publish. One that is registered but gone is not counted; one that does not answer is: as `"/publisher (/topic)"`.
+    When it has subscribed to all, the publishers are asked, since only they know whether a subscriber is connected. A
+    registered publisher that has ended is not counted; one that does not answer is, as `"/publisher (/topic)"`.
 
     Raises:
         OSError: If the master cannot be reached.
@@ -38,12 +39,12 @@ def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], lis
     silent = []
     for publisher, published in wanted.items():
         try:
-            uri = master.lookupNode(publisher)  # outside of the next try: a master that refuses is no publisher's end
+            uri = master.lookupNode(publisher)  # an error here is of the master
         except rosgraph.MasterError:  # it has just ended
             continue
         try:
             connected = _topics_sent(uri, node)
-        except ConnectionRefusedError:  # it ended without a word
+        except ConnectionRefusedError:  # it ended without an answer
             continue
         silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
     return [], silent

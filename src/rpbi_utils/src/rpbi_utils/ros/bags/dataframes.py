@@ -1,4 +1,4 @@
-"""Bags to pandas tables."""
+"""Converts bags to pandas tables."""
 
 import logging
 import re

@@ -121,11 +121,11 @@ class Recorder:
             raise RecordingError(self.path, f"no ROS master at {rosgraph.get_master_uri()}")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.unlink(missing_ok=True)  # so that it cannot be taken for the new one
+            self.path.unlink(missing_ok=True)  # so that it is not mistaken for the new one
         except OSError as error:
             raise RecordingError(self.path, f"cannot be written: {error}") from None
         self._output = tempfile.TemporaryFile()
-        # SIGTERM has it close the bag; SIGINT is blocked in children of nodes
+        # it closes the bag on SIGTERM; SIGINT is blocked in children of nodes
         environment = {key: value for key, value in os.environ.items() if key != "ROS_NAMESPACE"}
         options: dict[str, Any] = {"stdout": self._output, "stderr": subprocess.STDOUT, "env": environment}
         options["pass_fds"] = self._handles
@@ -183,9 +183,9 @@ class Recorder:
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
 
     def _wait_until_received(self) -> None:
-        """Waits for all that was sent before: TCP may rest for seconds after the recorder got no processor time.
+        """Waits for all messages sent before: TCP may pause for seconds after the recorder got no processor time.
 
-        It waits as long as messages arrive, and a while longer for a process that does not even answer.
+        It waits as long as messages arrive, and longer for a process that does not answer.
         """
         wanted, last = self.published(), -1
         answer_end = time.monotonic() + self._timeout_s
@@ -243,7 +243,7 @@ class Recorder:
         return f": {lines[-1]}" if lines else ""
 
     def _lines(self) -> list[str]:
-        """Returns what the recorder has written to its terminal."""
+        """Returns the lines that the recorder has printed."""
         file = self._output.fileno()  # the recorder shares its position, so that it must not be moved
         text = os.pread(file, os.fstat(file).st_size, 0).decode("utf-8", "replace")
         return [line for line in _DECORATION.sub("", text).splitlines() if line.strip()]

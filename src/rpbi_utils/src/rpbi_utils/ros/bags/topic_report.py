@@ -20,7 +20,7 @@ _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "
 
 
 class TopicReport(pd.DataFrame):
-    """A table that is printed whole, however wide the terminal is; what is made of it is an ordinary table."""
+    """A table that is printed completely, on a terminal of any width; tables derived from it are ordinary."""
 
     def __repr__(self) -> str:
         return self.to_string()

@@ -18,7 +18,7 @@ def attach(
     max_force: Annotated[float, Argument("N", parse=number)] = 0.0,
     ns: Namespace = None,
 ) -> str:
-    """Holds one thing to another where they are now, until it is detached or breaks off.
+    """Attaches one thing to another at their present poses, until it is detached or breaks off.
 
         ./rpbi attach box panda/panda_hand --max-force 20
         ./rpbi detach box

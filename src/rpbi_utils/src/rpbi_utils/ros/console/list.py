@@ -6,7 +6,7 @@ from .running_simulator import Namespace, RunningSimulator
 
 
 def list(*, ns: Namespace = None) -> str:
-    """Lists what is in the running world, with types.
+    """Lists the objects in the running world, with types.
 
     Args:
         ns: of the simulator, if it was started in one

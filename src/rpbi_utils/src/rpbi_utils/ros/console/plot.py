@@ -23,7 +23,7 @@ def plot(
     window: Annotated[bool, Argument("")] = False,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> str:
-    """Draws what a bag has: joint states, wrenches, paths of frames, contacts, rates and latencies.
+    """Draws the data of a bag: joint states, wrenches, paths of frames, contacts, rates and latencies.
 
     It prints the files that it writes. The time axes start at the first message.
 

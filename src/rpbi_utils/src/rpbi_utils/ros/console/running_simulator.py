@@ -1,4 +1,4 @@
-"""A simulator that runs: what is in it, how its services are called, and arguments of the commands for it."""
+"""A running simulator: its objects, calls of its services, and arguments of the commands for it."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ListObjects, RobotInfo
 
 LIST = "rpbi/list_objects"
-"""A service that every simulator has, and nobody else."""
+"""A service that every simulator has, and no other node."""
 OBJECTS = "objects"
-"""Offer of completion: what is in the running world."""
+"""Completions: the objects in the running world."""
 Namespace = Annotated[str | None, Argument("NAMESPACE")]
 
 
@@ -61,7 +61,7 @@ class RunningSimulator:
         """Calls one of its services and returns the answer.
 
         Raises:
-            InterfaceError: If nobody answers, or the answer is that it did not succeed.
+            InterfaceError: If no node answers, or the call did not succeed.
         """
         full_name = self.full_name(name)
         try:
@@ -78,11 +78,11 @@ class RunningSimulator:
         return dict(zip(listed.names, listed.types))
 
     def require(self, body: str, name: str, what: str) -> str:
-        """Returns a topic or service of a body, `rpbi/BODY/NAME`, which not every body has.
+        """Returns an optional topic or service of a body, `rpbi/BODY/NAME`.
 
         Raises:
             UnknownNameError: If there is no such body.
-            InterfaceError: If it has none; the message has `what` such a body would be.
+            InterfaceError: If it has none; `what` describes a suitable body in the message.
         """
         wanted = f"rpbi/{body}/{name}"
         if self.full_name(wanted) not in self._services | self._subscribed:

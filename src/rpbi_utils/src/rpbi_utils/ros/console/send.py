@@ -17,7 +17,7 @@ from .running_simulator import OBJECTS, Namespace, RunningSimulator, joint_value
 
 SEND_HZ = 50.0
 CONNECT_S = 5.0
-"""Time that the simulator has to connect to the topic [s]; after it the command fails."""
+"""Time within which the simulator has to connect to the topic [s]; otherwise the command fails."""
 Numbers = list[float] | None
 _PLURALS = {"position": "positions", "velocity": "velocities", "effort": "efforts"}
 
@@ -79,7 +79,7 @@ def send(
 
 
 def _check_mode(simulator: RunningSimulator, robot: str, quantity: str) -> None:
-    """Raises an InterfaceError if a robot's control mode takes no targets of that quantity."""
+    """Raises an InterfaceError if a robot's control mode does not accept targets of that quantity."""
     if simulator.objects().get(robot) == "visual_robot":
         mode = "POSITION_CONTROL"
     else:

@@ -24,8 +24,8 @@ Numbers = list[float] | None
 
 
 def kinds() -> Iterator[str]:
-    """Yields the types of things that can come into a world."""
-    from rpbi.bodies import BODY_TYPES  # slow to import, and seldom needed
+    """Yields the types of things that can be added to a world."""
+    from rpbi.bodies import BODY_TYPES  # slow to import, and rarely needed
 
     yield from BODY_TYPES
     yield CAMERA
@@ -89,8 +89,8 @@ def spawn(
 def kind_in(data: Mapping[str, Any]) -> str:
     """Returns the type of thing that a YAML describes.
 
-    The model of that type requires no key that is missing. Among such models it has most of the keys that are there,
-    then requires most of them, then has fewest others.
+    The model of that type requires no key that is missing. Of such models, it has the most of the given keys; ties are
+    broken by the most required keys, then by the fewest others.
     """
     from rpbi.bodies import BODY_TYPES
     from rpbi.config.sensors import RgbdSensorConfig
@@ -114,7 +114,7 @@ def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
 
 
 def _placement(data: Mapping[str, Any], at: Numbers, rpy: Numbers) -> dict[str, Any]:
-    """Returns the keys that put an object somewhere, where its type has them."""
+    """Returns the keys that place an object, as far as its type has them."""
     keys: dict[str, Any] = {} if at is None else {"basePosition": at}
     if rpy is not None:
         keys["baseOrientation"] = quat_of(rpy).tolist()

@@ -1,4 +1,4 @@
-"""The running simulator as the window sees it: from topics and the ROS master, without Qt."""
+"""The window's access to the running simulator: topics and the ROS master, without Qt."""
 
 import threading
 import time
@@ -18,9 +18,9 @@ from ros_pybullet_interface.msg import SimulationState
 from rpbi_utils.ros.console.running_simulator import LIST, RunningSimulator
 
 LOOK_S = 1.0
-"""Time between two looks at the ROS master [s]."""
+"""Period of queries of the ROS master [s]."""
 MAX_FAILED_LOOKS = 3
-"""Number of failed looks in a row after which nobody counts as offering anything: one may fail on a busy machine."""
+"""Number of consecutive failed queries after which all names count as missing: one may fail on a busy machine."""
 SILENCE_S = 2.5
 """Time without any message after which a simulator counts as gone [s]; /diagnostics comes once a second."""
 IMAGE = "/colour/image/compressed"
@@ -34,7 +34,7 @@ class SimulatorSnapshot:
     Attributes:
         is_alive: Whether it publishes, and has its services.
         is_running: Whether its world runs.
-        names: Topics and services of its namespace that somebody offers, without the namespace, such as `rpbi/step`.
+        names: Topics and services of its namespace that a node offers, without the namespace, such as `rpbi/step`.
         topics: All published topics, with full names.
         objects: Types of objects and cameras by name.
         state: Its newest state; None if it publishes none.
@@ -50,7 +50,7 @@ class SimulatorSnapshot:
     warning: str = ""
 
     def has(self, name: str) -> bool:
-        """Returns whether it offers a service or topic now."""
+        """Returns whether it now offers a service or topic."""
         return self.is_alive and name in self.names
 
     @property
@@ -86,7 +86,7 @@ class Newest:
         self._subscriber: rospy.Subscriber | None = None
 
     def follow(self) -> None:
-        """Subscribes to the topic that is wanted, which may take time, and to no other."""
+        """Subscribes to the selected topic alone; may take time."""
         if self._topic == self.wanted:
             return
         if self._subscriber is not None:
@@ -127,18 +127,18 @@ class SimulatorLink:
         threading.Thread(target=self._run, name="link", daemon=True).start()
 
     def look(self) -> None:
-        """Has the master looked at soon, without waiting for it."""
+        """Requests a query of the master, without waiting for it."""
         self._served = None
         self._wake.set()
 
     def follow(self, newest: Newest, topic: str) -> None:
-        """Changes the topic of `joints` or `image` soon, without waiting for it."""
+        """Requests another topic for `joints` or `image`, without waiting for it."""
         if newest.wanted != topic:
             newest.wanted, newest.message = topic, None
             self._wake.set()
 
     def snapshot(self) -> SimulatorSnapshot:
-        """Returns what is known now."""
+        """Returns the present state."""
         if time.monotonic() - self._heard_s > SILENCE_S or LIST not in self._names:
             return SimulatorSnapshot(topics=self._topics)
         return SimulatorSnapshot(
@@ -173,7 +173,7 @@ class SimulatorLink:
         served = frozenset(map(_entry, serving)), self._names
         if not self.snapshot().is_alive:
             self._served = None
-        elif served != self._served:  # something came or went
+        elif served != self._served:  # topics or services have changed
             self._served = served
             try:
                 self._objects = MappingProxyType(RunningSimulator().objects())

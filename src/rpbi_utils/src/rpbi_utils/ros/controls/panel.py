@@ -30,11 +30,11 @@ class Panel(QGroupBox):
         self._needed: dict[QWidget, tuple[str, Condition]] = {}
 
     def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
-        """Runs a function beside the window; its outcome is shown, and `then` called with it in the window's thread."""
+        """Runs a function in the background; shows its result, and calls `then` with it in the window's thread."""
         self._requests.ask(name, function, then, limit_s)
 
     def require(self, service: str, *widgets: QWidget, when: Condition = lambda _: True) -> None:
-        """Disables widgets as long as a service is missing, or a condition is not met."""
+        """Disables widgets while a service is missing, or a condition is not met."""
         self._needed.update(dict.fromkeys(widgets, (service, when)))
 
     def refresh(self, snapshot: SimulatorSnapshot) -> None:
@@ -58,7 +58,7 @@ class ScrolledDown(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Sees all events of the content."""
+        """Receives all events of the content."""
         if event.type() == QEvent.Type.LayoutRequest:
             bar = self.verticalScrollBar()
             self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar.width() * bar.isVisible())

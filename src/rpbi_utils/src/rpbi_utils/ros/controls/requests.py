@@ -1,4 +1,4 @@
-"""Requests that run beside the window, each with a time limit."""
+"""Requests that run in the background, each with a time limit."""
 
 import threading
 import time
@@ -61,7 +61,7 @@ class BackgroundRequests:
                 results.append((function(), ""))
             except InterfaceError as error:
                 results.append((None, str(error)))
-            except Exception as error:  # of rospy, or of whatever answers
+            except Exception as error:  # of rospy, or of the answering node
                 results.append((None, f"{type(error).__name__}: {error}"))
             done.set()
 

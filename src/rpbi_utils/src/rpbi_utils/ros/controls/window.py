@@ -29,7 +29,7 @@ class Signals(QObject):
 
 
 class ControlsWindow(QMainWindow):
-    """Panels with buttons, RViz's view beside them, and the newest message below.
+    """Panels with buttons, RViz's view next to them, and the newest message below.
 
     Args:
         link: The simulator.
@@ -81,7 +81,7 @@ class ControlsWindow(QMainWindow):
             panel.refresh(snapshot)
 
     def end(self) -> None:
-        """Ends what the panels have going on."""
+        """Ends running actions of the panels."""
         self._timer.stop()
         for panel in self._panels:
             panel.close()

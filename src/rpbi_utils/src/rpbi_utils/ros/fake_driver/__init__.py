@@ -1,1 +1,1 @@
-"""The node that stands in for the driver of a robot."""
+"""The node that emulates the driver of a robot."""

@@ -1,4 +1,4 @@
-"""Feeds a plot with fields of topics that may come later, change their type, and go."""
+"""Feeds a plot with fields of topics, which may appear later, change their type, and disappear."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rpbi_utils.live_plot.fields import FieldError, FieldReader, split_name
 from rpbi_utils.live_plot.plot import LivePlot
 
 LOOK_S = 1.0
-"""Time between two looks at the ROS master [s]."""
+"""Period of queries of the ROS master [s]."""
 PATIENCE_S = 3.0
-"""Time after which a topic that is missing is logged [s]; two nodes that start together need some."""
+"""Time after which a missing topic is logged [s]; nodes that start together need some."""
 
 
 class FieldSource:
@@ -119,7 +119,7 @@ class _Topic:
         self._subscriber.unregister()
 
     def is_published(self, is_published: bool) -> None:
-        """Notes why there are no messages, if there are none."""
+        """Records why there are no messages, if there are none."""
         for name, _ in self.fields:
             if not is_published:
                 self._plot.note(name, "nobody publishes it")
@@ -162,7 +162,7 @@ class _Topic:
         return self._types[key]
 
     def _fail(self, names: Iterable[str], text: str) -> None:
-        """Notes and logs an error once, unless values came before, as of joints that are in some messages only."""
+        """Records and logs an error once, unless values arrived before, as for joints that only some messages have."""
         for name in names:
             if name not in self._drawn and self._errors.get(name) != text:
                 self._errors[name] = text

@@ -64,7 +64,7 @@ class Chart(NamedTuple):
 
 
 class Canvas(QWidget):
-    """Draws lines over the last seconds, as fast as they come: a chart for each unit."""
+    """Draws lines over the last seconds, as fast as samples arrive: a chart for each unit."""
 
     def __init__(self, plot: LivePlot, seconds: float) -> None:
         super().__init__()
@@ -80,11 +80,11 @@ class Canvas(QWidget):
 
     @property
     def is_paused(self) -> bool:
-        """Whether the view stands still; samples are collected on."""
+        """Whether the view is paused; samples are still collected."""
         return self._frozen is not None
 
     def pause(self) -> None:
-        """Holds the view, or lets it go on."""
+        """Pauses the view, or continues it."""
         self._frozen = self._plot.view(MAX_SECONDS) if self._frozen is None else None
         self.update()
 
@@ -101,7 +101,7 @@ class Canvas(QWidget):
         self.update()
 
     def look(self) -> None:
-        """Draws anew if there is something new."""
+        """Redraws if there are new data."""
         if self._frozen is None and self._plot.changes != self._shown:
             self.update()
 
@@ -130,7 +130,7 @@ class Canvas(QWidget):
         painter.end()
 
     def _charts(self, end_s: float, lines: list[Line]) -> list[Chart]:
-        """Returns the charts from above; reasons of missing lines are in the first one."""
+        """Returns the charts from top to bottom; reasons of missing lines are in the first one."""
         of_unit: dict[str, list[Line]] = {}
         for line in lines:
             if not line.note:
@@ -269,7 +269,7 @@ class LivePlotWindow(QMainWindow):
         button: QPushButton = _named(QPushButton(title), title.lower())
         button.setToolTip(plain_tip(key))
         button.setShortcut(key)
-        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else Space would press the one that was used last
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # otherwise Space would press the last used button
         button.clicked.connect(lambda: action())
         layout.addWidget(button)
         return button
@@ -285,7 +285,7 @@ class LivePlotWindow(QMainWindow):
         self._message.setText("cleared")
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
-        """Writes what is shown into a new file, beside its name first."""
+        """Writes the visible data to a new file, first under a temporary name."""
         path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -326,7 +326,7 @@ def _legend_row(line: Line) -> tuple[str, QColor]:
 
 
 def _range(values: list[np.ndarray]) -> tuple[float, float]:
-    """Returns ends of the vertical axis at round numbers, so that they change seldom."""
+    """Returns the ends of the vertical axis at round numbers, so that they change rarely."""
     filled = [each for each in values if len(each)]
     low = min((float(each.min()) for each in filled), default=0.0)
     high = max((float(each.max()) for each in filled), default=1.0)
@@ -339,7 +339,7 @@ def _range(values: list[np.ndarray]) -> tuple[float, float]:
 
 
 def _polygon(x: np.ndarray, y: np.ndarray) -> QPolygonF:
-    """Returns points as Qt has them, by one copy instead of an object for each."""
+    """Returns points as a Qt polygon, by one copy instead of an object for each."""
     polygon = QPolygonF(len(x))
     if len(x):
         memory: Any = polygon.data().asarray(16 * len(x))

@@ -47,7 +47,7 @@ def read_recording(
         namespace: Namespace of the simulator; other simulators in the bag are ignored.
         any_size: Whether to read a bag that exceeds the limit on unpacked bytes, see `BagReader`.
         earlier: A bag of `rpbi/commands` before the recording, if there is one.
-        relocate: Returns the world's description with other names of its files.
+        relocate: Returns the world's description with other names for its files.
         names: These names, for the files in keyframes, by their own.
         needs_states: Whether states to compare have to be in the bag, as for a replay.
 
@@ -75,7 +75,7 @@ def read_recording(
             else:
                 _add_commands(message, commands)
     if len(set(descriptions)) != 1:
-        raise BagError(path, "the simulator was started anew during the recording; expected a bag of one session")
+        raise BagError(path, "the simulator was restarted during the recording; expected a bag of one session")
     if needs_states and not any(checkpoint.tick for checkpoint in checkpoints):
         raise BagError(path, "no hashes in rpbi/state to compare (state_hash_hz in the main file is their rate)")
     try:

@@ -27,7 +27,7 @@ LUMA = np.array([0.299, 0.587, 0.114])
 
 
 def grey_image(message: ImageMessage) -> Image:
-    """Returns an image of bytes as grey, rows x columns; raises a ValueError if it is another one."""
+    """Returns an image as grey bytes, rows x columns; raises a ValueError for other encodings or sizes."""
     channels = CHANNELS.get(message.encoding)
     if channels is None:
         raise ValueError(f"expected an image in {', '.join(CHANNELS)}, got '{message.encoding}'")
@@ -43,7 +43,7 @@ def grey_image(message: ImageMessage) -> Image:
 
 
 class AprilTagNode:
-    """Publishes what it finds in each image of `image_rect`, by the calibration on `camera_info`.
+    """Publishes the tags in each image of `image_rect`, with the calibration on `camera_info`.
 
     Raises:
         ConfigError: If the configuration is wrong.

@@ -31,7 +31,7 @@ LOOKS_HZ = 10.0
 
 
 class TrackedObject:
-    """An object, and whether it is seen."""
+    """A tracked object, and whether it is visible."""
 
     def __init__(self, config: TrackedObjectConfig, node: TrackingNodeConfig) -> None:
         self.config = config
@@ -41,7 +41,7 @@ class TrackedObject:
         self._is_seen = False
 
     def note_seen(self) -> None:
-        """Notes that it is seen now."""
+        """Records that it is visible now."""
         self._seen_s = time.monotonic()
         if not self._is_seen:
             self._is_seen = True
@@ -117,7 +117,9 @@ class TrackedObjectNode:
             self._publisher.publish(TFMessage([transform]))
 
     def _in_world(self, frame_id: str, stamp: rospy.Time) -> Pose:
-        """Returns where a source's frame was when it saw something; where it is now if TF does not reach that far."""
+        """Returns the pose of a source's frame at the time of a detection; its present pose if TF does not cover that
+        time.
+        """
         if frame_id == self._frame_id:
             return Pose()
         try:
@@ -132,7 +134,7 @@ def _key(ids: Sequence[int]) -> tuple[int, ...]:
 
 
 def _pose_in(message: PoseMessage, unit: str) -> Pose:
-    """Returns the pose in a message in metres; raises a ValueError if it is none."""
+    """Returns the pose in a message in metres; raises a ValueError if it is invalid."""
     scale = 0.001 if unit == "mm" else 1.0
     p, q = message.position, message.orientation
     return check_pose(Pose((scale * p.x, scale * p.y, scale * p.z), (q.x, q.y, q.z, q.w)))

@@ -17,7 +17,7 @@ NONE = "none"
 
 
 class CamerasPanel(Panel):
-    """The colour image of the camera that is chosen; nothing is drawn as long as none is."""
+    """The colour image of the selected camera; nothing is drawn without a selection."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Cameras", link, requests)
@@ -46,7 +46,7 @@ class CamerasPanel(Panel):
         self.link.follow(self.link.image, "" if is_none else rospy.resolve_name(f"rpbi/{camera}{IMAGE}"))
         message = self.link.image.message
         if message is None:
-            self._image.setText("" if is_none else "no image yet; a world that stands still sends none")
+            self._image.setText("" if is_none else "no image yet; a stopped world sends none")
             self._shown = None
         elif message is not self._shown:
             self._shown = message

@@ -38,7 +38,7 @@ MOVED = "font-weight: bold"
 class JointRow:
     """The slider, target and position of one joint.
 
-    A slider that nobody has moved follows the joint.
+    A slider that was not moved follows the joint.
 
     Args:
         info: The joint.
@@ -82,7 +82,7 @@ class JointRow:
             self._set(position)
 
     def release(self) -> None:
-        """Has the slider follow the joint again."""
+        """Makes the slider follow the joint again."""
         self._mark(False)
 
     def _on_slider(self, step: int) -> None:
@@ -137,7 +137,7 @@ class RobotTab(QWidget):
         self._send = _button("Send", "Moves the joints whose sliders were moved", self._on_send)
         self._home = _button("Home", "Moves all joints to where they started", self._on_home)
         self._halt = _button("Halt", "Ends a motion; the joints hold where they are", self._on_halt)
-        self._back = _button("Discard", "Has the sliders follow the joints again", self._on_discard)
+        self._back = _button("Discard", "Makes the sliders follow the joints again", self._on_discard)
         line = QHBoxLayout()
         line.addWidget(plain_label("In"))
         for widget in (self._duration, self._send, self._home, self._halt, self._back):
@@ -145,7 +145,7 @@ class RobotTab(QWidget):
         layout.addLayout(line)
 
     def refresh(self, snapshot: SimulatorSnapshot, state: JointState | None) -> None:
-        """Shows positions, and which buttons work."""
+        """Shows positions, and enables buttons."""
         if not self._is_known:
             self._ask_for_joints()
         positions = dict(zip(state.name, state.position)) if state is not None else {}
@@ -157,7 +157,7 @@ class RobotTab(QWidget):
         self._show_moved()
 
     def _show_moved(self) -> None:
-        """Shows which buttons work; called at once when a slider is moved, too."""
+        """Enables buttons; also called at once when a slider is moved."""
         snapshot = self._snapshot
         is_moved = any(row.is_moved for row in self._rows.values())
         moves = snapshot.has(self._service("move_to_joint_state"))
@@ -197,7 +197,7 @@ class RobotTab(QWidget):
         state = JointState(name=[*moved], position=[*moved.values()])
         if self._snapshot.has(self._service("move_to_joint_state")):
             self._move("move_to_joint_state", "Send", state, self._release(moved))
-        else:  # a visual robot is wherever its joints are put
+        else:  # a visual robot takes any joint positions
             call = partial(_call, self._service("set_joint_state"), SetJointState, state)
             self._panel.ask(f"Send of {self._robot}", call, self._release(moved))
 

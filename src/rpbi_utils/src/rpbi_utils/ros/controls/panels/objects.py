@@ -25,11 +25,11 @@ ADD_LIMIT_S = 120.0
 
 
 class ObjectsPanel(Panel):
-    """Everything in the world, with its type; files are added, what is selected is removed."""
+    """All objects in the world, with their types; adds files, and removes the selected object."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Objects", link, requests)
-        self._table = named(QTableWidget(0, 2), "objects", "What is in the world")
+        self._table = named(QTableWidget(0, 2), "objects", "Objects in the world")
         self._table.setHorizontalHeaderLabels(["Name", "Type"])
         self._table.verticalHeader().hide()
         self._table.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + 6)
@@ -46,7 +46,7 @@ class ObjectsPanel(Panel):
         self._add = named(QPushButton("Add"), "add", "Puts the object of the file into the world")
         self._add.clicked.connect(self._on_add)
         self._file.returnPressed.connect(self._on_add)
-        self._remove = named(QPushButton("Remove"), "remove", "Takes what is selected out of the world")
+        self._remove = named(QPushButton("Remove"), "remove", "Removes the selected object from the world")
         self._remove.clicked.connect(self._on_remove)
         self.require("rpbi/add_pybullet_object", self._add, when=lambda _: bool(self._file.text().strip()))
         self.require("rpbi/remove_pybullet_object", self._remove, when=lambda _: bool(self._chosen()))

@@ -21,7 +21,7 @@ DASH = "–"
 
 
 class RunPanel(Panel):
-    """Start, stop, steps, reset and pace, and how the world is doing."""
+    """Start, stop, steps, reset and pace, and the state of the world."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Simulation", link, requests)
@@ -29,9 +29,9 @@ class RunPanel(Panel):
         for column, button in enumerate(
             (
                 self._button("Start", "rpbi/start", "Lets the world run", _stands),
-                self._button("Step", "rpbi/step", "Goes one tick on", _stands),
-                self._button("Stop", "rpbi/stop", "Lets the world stand still", _runs),
-                self._button("Reset", "rpbi/reset", "Makes the world what it was at its start", lambda _: True),
+                self._button("Step", "rpbi/step", "Advances by one tick", _stands),
+                self._button("Stop", "rpbi/stop", "Stops the world", _runs),
+                self._button("Reset", "rpbi/reset", "Resets the world to its start", lambda _: True),
             )
         ):
             grid.addWidget(button, 0, column)
@@ -40,7 +40,7 @@ class RunPanel(Panel):
         self._count.setRange(1, MAX_STEPS)
         self._count.setValue(100)
         self._count.setGroupSeparatorShown(True)
-        self._steps = named(QPushButton("N steps"), "n_steps", "Goes that many ticks on, as fast as possible")
+        self._steps = named(QPushButton("N steps"), "n_steps", "Advances by this number of ticks, as fast as possible")
         self._steps.clicked.connect(lambda: self._go(self._count.value()))
         self.require("rpbi/step_n", self._count)
         self.require("rpbi/step_n", self._steps, when=_stands)
@@ -85,7 +85,7 @@ class RunPanel(Panel):
                 label.setText(DASH)
             self._asked = None
             return
-        if state.real_time_factor_asked != self._asked:  # at the start, or changed by somebody
+        if state.real_time_factor_asked != self._asked:  # at the start, or changed by another node
             self._asked = state.real_time_factor_asked
             self._factor.setValue(state.real_time_factor_asked)
         texts = {
@@ -119,7 +119,7 @@ class RunPanel(Panel):
 
     def _look_again(self, outcome: RequestResult) -> None:
         if outcome.name == "Reset" and not outcome.error:
-            self.link.look()  # a reset brings back what was removed
+            self.link.look()  # a reset adds removed objects again
 
     def _go(self, steps: int) -> None:
         self.ask("N steps", partial(_call, "rpbi/step_n", StepN, steps), limit_s=STEPS_LIMIT_S)
