@@ -172,7 +172,7 @@ def test_interrupted_farm_continues_from_its_episodes(world, alone, run, tmp_pat
     assert 2 <= len(there) < EPISODES and there.items() < digests(alone).items()
     if way == signal.SIGINT:
         assert farm.returncode == 130 and EpisodeFolder(folder).partial() == []
-        assert f"{len(there)} of {EPISODES} episodes are in {folder}; the same command goes on from there" in text
+        assert f"{len(there)} of {EPISODES} episodes are in {folder}; the same command continues from there" in text
         assert "Traceback" not in text
     code, text = run("episodes", folder, "--repair")
     assert code == 1 and "these are of a farm: it makes them again itself" in text

@@ -12,7 +12,7 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @dataclass(eq=False)
 class EpisodeError(InterfaceError):
-    """An episode, or a folder of episodes, is not as expected."""
+    """An episode, or a folder of episodes, is invalid."""
 
     path: Path
     message: str

@@ -1,4 +1,4 @@
-"""Content of an `episode.yaml`, whoever wrote it: types, limits, and texts that are safe on a terminal."""
+"""Content of an untrusted `episode.yaml`: types, limits, and texts that are safe on a terminal."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Digest = Annotated[str, Field(pattern="^([0-9a-f]{64})?$"), Expects("64 hex digi
 
 
 def _path(text: str) -> str:
-    """Returns an absolute path without `..`, which may not lead above the root."""
+    """Returns an absolute path without `..`; rejects paths above the root."""
     parts: list[str] = []
     for part in text.split("/"):
         if part == ".." and not parts:
@@ -97,7 +97,7 @@ def facts_in(text: str, file: str) -> dict[str, Any]:
 
 
 def checked_label(label: str) -> str:
-    """Returns a label that somebody gives to an episode.
+    """Returns a checked label of an episode.
 
     Raises:
         InterfaceError: If it is too long, or has control characters.

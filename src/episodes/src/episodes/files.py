@@ -72,7 +72,7 @@ def store_files(
 
 
 def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[Path], bool]:
-    """Returns whether a file belongs to a world whose description may come from anybody.
+    """Returns whether a file may belong to a world with an untrusted description.
 
     These are the files in ROS packages, in the folder of the main file if one is there, in the data of robots, and in
     further folders. In the former, names of files and folders that begin with a dot are left out.
@@ -105,7 +105,7 @@ class _Copies:
 
     @property
     def all_faults(self) -> list[str]:
-        """The sentences, with one on files that are not copied."""
+        """The faults, with one on files that are not copied."""
         if not self._foreign:
             return self.faults
         more = f" and {len(self._foreign) - _NAMED} more" if len(self._foreign) > _NAMED else ""
@@ -209,7 +209,7 @@ def stored_path(store: Path, path: str, digest: str) -> Path:
 
 
 def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[str]:
-    """Yields a sentence for each copy that is missing or has another content than when it was stored."""
+    """Yields a sentence for each copy that is missing or was changed since it was stored."""
     known: dict[str, str] = {}
     for each in files:
         if not each["sha256"]:
@@ -227,7 +227,7 @@ def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[s
 
 
 def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Yields a sentence for each file that is there, with another content than was stored."""
+    """Yields a sentence for each existing file whose content differs from the stored copy."""
     for each in files:
         with suppress(OSError):  # it is not there any more
             data = read_file(each["path"], MAX_FILE_BYTES)
@@ -236,7 +236,7 @@ def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def stored_names(files: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, str]:
-    """Returns the paths of the copies that `with_stored_files` lays out, by those of the files.
+    """Returns the paths of the copies that `with_stored_files` creates, by the paths of the files.
 
     Raises:
         ConfigError: If the name of a file leaves the folder.

@@ -1,4 +1,4 @@
-"""A folder of episodes: its layout, and what is stored with each episode."""
+"""A folder of episodes: its layout, and the data stored with each episode."""
 
 from __future__ import annotations
 
@@ -91,7 +91,9 @@ class Episode:
 
     @property
     def lost(self) -> dict[str, int]:
-        """Messages by topic that were sent to the recorder and are not in the bag; topics without loss are left out."""
+        """Numbers of messages by topic that were sent to the recorder but are missing in the bag; topics without loss
+        are left out.
+        """
         recorded = {topic: each["messages"] for topic, each in self.topics.items()}
         lost = {topic: sent - recorded.get(topic, 0) for topic, sent in self.published.items()}
         return {topic: count for topic, count in lost.items() if count > 0}
@@ -147,7 +149,7 @@ class EpisodeFolder:
         return sorted(_numbers(self.path, _COMPLETE))
 
     def taken(self) -> set[int]:
-        """Returns the numbers of all finished episodes, of discarded ones too."""
+        """Returns the numbers of all finished episodes, including discarded ones."""
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
@@ -178,7 +180,7 @@ class EpisodeFolder:
         return self.path / f".episode_{number:06d}.part"
 
     def begin(self, number: int | None = None, **facts: Any) -> tuple[Episode, Path]:
-        """Makes the temporary folder of a new episode.
+        """Creates the temporary folder of a new episode.
 
         Args:
             number: Its number; by default the next one. Numbers of discarded episodes are not used again.
@@ -216,7 +218,7 @@ class EpisodeFolder:
         return part.rename(self.folder_of(episode.number))
 
     def partial(self) -> list[Path]:
-        """Returns the temporary folders, of an episode that is being recorded or whose recorder was killed."""
+        """Returns the temporary folders of episodes that are being recorded or whose recorder was killed."""
         return sorted(map(self.part_of, _numbers(self.path, _PARTIAL)))
 
     def discard(self, number: int) -> Path:

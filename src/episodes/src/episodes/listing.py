@@ -8,7 +8,7 @@ _HEADER = ("episode", "label", "seconds", "simulated", "messages", "joint states
 
 
 def table_of(episodes: Iterable[Episode]) -> str:
-    """Returns a table with a line an episode."""
+    """Returns a table with one line per episode."""
     rows = [_HEADER, *map(_row, episodes)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADER))]
     return "\n".join(
@@ -35,7 +35,7 @@ def _row(episode: Episode) -> tuple[str, ...]:
 
 
 def _simulated(episode: Episode) -> str:
-    """Returns the seconds of the world's time that an episode has."""
+    """Returns the simulated duration of an episode as text [s]."""
     return "-" if episode.simulated_s is None else f"{episode.simulated_s:.1f}"
 
 
@@ -45,7 +45,7 @@ def clock_note(set_back_s: float) -> str:
 
 
 def details_of(episode: Episode) -> str:
-    """Returns all that is stored of an episode, but for the list of its files."""
+    """Returns all stored data of an episode, except for the list of its files."""
     lines = [f"{episode.name}: {episode.state}{f', {episode.note}' if episode.note else ''}"]
     lines += [
         f"label    {episode.label or '-'}",

@@ -1,1 +1,1 @@
-"""Episodes as data sets of other projects: formats, what is stored with each of them, and checks."""
+"""Episodes as data sets in formats of other projects: writing, provenance, and checks."""

@@ -1,4 +1,4 @@
-"""Coarse images, which are stored beside videos, and the faults of videos that they show."""
+"""Coarse images, stored with videos, and the faults of videos that they reveal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ MEDIANS = 5.0
 """That multiple."""
 MIN_GAIN = 0.5
 """Another order of frames or colours, or another camera, is reported if it leaves less than this share of squared
-differences."""
+differences.
+"""
 MIN_MOTION = 1e-2
 """Mean squared difference, of 255 squared, below which neither another order nor another camera is reported."""
 MIN_COLOUR_DIFFERENCE = 4.0
@@ -66,7 +67,7 @@ def coarse(pixels: Array) -> Array:
 
 
 def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterator[str]:
-    """Yields a sentence if the frames of a video are not the images that were exported.
+    """Yields a sentence if the frames of a video differ from the exported images.
 
     Args:
         key: The camera.
@@ -135,7 +136,7 @@ def _brightness(images: Array) -> Array:
 
 
 def _order_of_colours(found: Array, exported: Array) -> list[str]:
-    """Returns the exported colours that are red, green and blue in the frames; none if each is itself."""
+    """Returns the exported colours that appear as red, green and blue in the frames; none if they are unchanged."""
     rest = _mean_square(found - exported)
     if rest < MIN_COLOUR_DIFFERENCE:
         return []
@@ -159,7 +160,7 @@ def _frozen(found: Array, own: Array) -> Array:
 
 
 def _long_runs(is_so: Array, least: int) -> Array:
-    """Returns where at least so many values in a row are true."""
+    """Returns the runs of at least a number of consecutive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_so, [False]]).astype(int)))
     found = np.zeros(len(is_so), bool)
     for start, stop in edges.reshape(-1, 2):

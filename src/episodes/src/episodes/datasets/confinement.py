@@ -1,4 +1,4 @@
-"""Foreign data sets: their folder is looked at before it is read, and they are read in a process with limits.
+"""Foreign data sets: their folder is checked first, and then read in a process with limits.
 
 The libraries that read Parquet, HDF5, videos and SQLite were not made for hostile files. If one of them ends the
 process, that is reported.
@@ -43,7 +43,7 @@ class Tree(NamedTuple):
 
 
 class CheckLine(NamedTuple):
-    """A line from the process that reads: its kind, a word, and its text."""
+    """A line from the reading process: its kind, a word, and its text."""
 
     kind: str
     text: str
@@ -54,7 +54,7 @@ FAULT, SUMMARY, ERROR = "fault", "summary", "error"
 
 
 def look_at(folder: Path) -> Tree:
-    """Looks at all entries of a data set, without opening a file."""
+    """Checks all entries of a data set, without opening a file."""
     faults: list[str] = []
     size = count = 0
     waiting = [(folder, 0)]
@@ -118,7 +118,7 @@ def confined(task: Callable[[], Iterable[CheckLine]], size: int, any_size: bool 
 
 
 def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[int, int] | None) -> None:
-    """Runs the task in this process, which ends."""
+    """Runs the task in this process, and then ends the process."""
     code = 0
     try:
         silence = os.open(os.devnull, os.O_RDWR)
@@ -141,7 +141,7 @@ def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[in
 
 
 def _own_memory() -> int:
-    """Returns the memory that this process has for data [bytes]."""
+    """Returns the memory of this process for data [bytes]."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmData:"):
             return int(line.split()[1]) * 1024

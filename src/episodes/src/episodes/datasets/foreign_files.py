@@ -1,4 +1,4 @@
-"""Files of data sets of other people: Parquet, HDF5 and JSON, read within limits; names of files that are templates."""
+"""Files of untrusted data sets: Parquet, HDF5 and JSON, read within limits; file names from templates."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def read_parquet(path: Path) -> Any:
 
 
 def hdf5_faults(file: Any, size: int) -> Iterator[str]:
-    """Yields a sentence for each object of an HDF5 file that is not read.
+    """Yields a sentence for each object of an HDF5 file that is refused.
 
     These are links, but for those by which groups have their members; objects with two names; data that lie in other
     files, that are no numbers or texts, or that unfold to too much.

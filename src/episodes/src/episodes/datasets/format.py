@@ -130,7 +130,7 @@ class ExportedEpisode(ABC):
 
 
 def require_room(folder: Path, size: int) -> None:
-    """Raises an OSError if there is no room for so many bytes in a folder, by asking for it."""
+    """Raises an OSError if the disk of a folder lacks space for a number of bytes, by reserving it."""
     with tempfile.TemporaryFile(dir=folder) as file:
         os.posix_fallocate(file.fileno(), 0, size)
 
@@ -191,7 +191,7 @@ class DatasetFormat(ABC):
     @classmethod
     @abstractmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder has a data set of this format, whoever made it."""
+        """Returns whether a folder has a data set of this format, written by any tool."""
 
     @classmethod
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Sources of the episodes of a data set, stored beside them in the folder `rpbi`.
+"""Sources of the episodes of a data set, stored with them in the folder `rpbi`.
 
 `rpbi/export.json` describes the data set, `rpbi/episode_000000.json` an episode: its source, its chain of state hashes,
 and checksums, by which checks find values that were changed, swapped or shifted. `rpbi/episode_000000.npz` has coarse
@@ -161,7 +161,7 @@ def write_episode(folder: Path, index: int, facts: Mapping[str, Any], images: Ma
 
 
 def remove_episode(folder: Path, index: int) -> None:
-    """Removes what `write_episode` has written of an episode."""
+    """Removes the files that `write_episode` has written for an episode."""
     for suffix in (".json", ".npz"):
         episode_file(folder, index).with_suffix(suffix).unlink(missing_ok=True)
 

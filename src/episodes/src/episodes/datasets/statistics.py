@@ -36,7 +36,7 @@ class ImageStatistics:
     """Statistics of images, from the frequencies of brightness in a sample of frames and pixels.
 
     Args:
-        frames: Number of images that there will be.
+        frames: Expected number of images.
     """
 
     def __init__(self, frames: int) -> None:

@@ -89,7 +89,7 @@ def read_video(path: Path) -> Iterator[tuple[float, Array]]:
     """Yields time [s] and pixels, shape (height, width, 3), of each frame of a video.
 
     Raises:
-        ValueError: If it cannot be read, at the frame where it cannot.
+        ValueError: If it cannot be read, when the faulty frame is reached.
     """
     count = 0
     with _opened(path) as container:

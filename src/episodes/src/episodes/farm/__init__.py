@@ -1,4 +1,4 @@
-"""Episodes that a policy makes in many worlds at once."""
+"""Episodes made by a policy in many worlds at once."""
 
 from .policy import Policy
 

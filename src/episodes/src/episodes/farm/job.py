@@ -29,7 +29,7 @@ _CHANGED = {"world_sha256": "the world, or a file that it names", "policy_sha256
 
 @dataclass(frozen=True)
 class FarmJob:
-    """All that the episodes of a farm depend on.
+    """All inputs on which the episodes of a farm depend.
 
     Attributes:
         world: The main YAML file.
@@ -54,10 +54,10 @@ class FarmJob:
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def claim(self, folder: Path) -> None:
-        """Writes the job into a folder, or compares it with the one that is there.
+        """Writes the job into a folder, or compares it with the existing one.
 
         Raises:
-            EpisodeError: If the folder has episodes of another job; it names what differs.
+            EpisodeError: If the folder has episodes of another job; the message names the differences.
         """
         path, own = folder / FARM, self._identity()
         if os.path.lexists(path):
@@ -94,7 +94,7 @@ class EpisodeOutcome(NamedTuple):
     Attributes:
         number: Its number; -1 if it concerns none.
         label: Its label, if it is there.
-        fault: Reason why it is not there.
+        fault: Reason why it was not made.
         is_lost: Whether its process has ended meanwhile, so that it is worth another try.
         stops: Whether no other episode can be made, either.
     """

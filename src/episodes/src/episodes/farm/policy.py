@@ -31,7 +31,7 @@ class Policy:
         """Acts before a tick.
 
         Returns:
-            The label with which the episode ends now, such as `success`, before that tick; None to go on.
+            The label with which the episode ends before that tick, such as `success`; None to continue.
         """
         raise NotImplementedError
 

@@ -1,4 +1,4 @@
-"""Processes that make episodes, and their replacement when they die."""
+"""Processes that make episodes, and their replacement after a crash."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ class Child:
 
     @property
     def is_free(self) -> bool:
-        """Whether it can be asked for another episode."""
+        """Whether another episode can be requested from it."""
         return len(self.numbers) < self._slots
 
     def start(self, number: int) -> None:
-        """Asks it for an episode."""
+        """Requests an episode from it."""
         self.numbers.add(number)
         self._send(number)
 
@@ -80,13 +80,13 @@ class Child:
         return outcome
 
     def close(self, grace_s: float = 0.0) -> str:
-        """Ends it.
+        """Ends the process.
 
         Args:
-            grace_s: Time that it has to end by itself [s].
+            grace_s: Time in which it may end by itself [s].
 
         Returns:
-            How it ended: a signal, or its exit code.
+            The signal that ended it, or its exit code, in words.
         """
         self.connection.close()
         with suppress(subprocess.TimeoutExpired):
@@ -123,7 +123,7 @@ class Pool:
     def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
         """Makes episodes, and yields their outcomes, in any order.
 
-        When it is left before its end, by an exception too, no process and no temporary folder stays.
+        If it ends early, also by an exception, no process and no temporary folder remains.
 
         Raises:
             EpisodeError: If no further episode can be made; those that are complete stay.
@@ -143,7 +143,7 @@ class Pool:
                 self._drop_part(number)
 
     def _employ(self) -> None:
-        """Gives work to all that can take some, and starts processes as long as there is work."""
+        """Assigns episodes to free processes, and starts processes while there are further episodes."""
         while self._waiting:
             free = next((child for child in self._children if child.is_free), None)
             if free is None:
@@ -171,7 +171,7 @@ class Pool:
             yield outcome
 
     def _again(self, lost: EpisodeOutcome) -> Iterator[EpisodeOutcome]:
-        """Has a lost episode made again, unless it is there, or was lost too often."""
+        """Schedules a lost episode again, unless it exists, or was lost too often."""
         number = lost.number
         self._drop_part(number)
         if self._folder.folder_of(number).exists():  # the process ended just after it

@@ -22,7 +22,7 @@ _WORD = re.compile(r"\w[\w.-]{0,59}")
 
 
 class EpisodeWriter(Protocol):
-    """Writes what happens in a world."""
+    """Writes the messages of a world."""
 
     def start(self) -> None:
         """Writes the world before its first tick."""
@@ -52,7 +52,7 @@ class EpisodeRun:
         self._seed = (job.seed, number)
 
     def run(self, writer: EpisodeWriter) -> str:
-        """Runs to the end, and returns the label.
+        """Runs the episode to its end, and returns the label.
 
         Raises:
             PluginError: If the policy fails; it names class, method, tick and seed.
@@ -85,7 +85,7 @@ class EpisodeRun:
 
     @contextmanager
     def _policy_errors(self, method: str) -> Iterator[None]:
-        """Turns errors of the policy into one that names it."""
+        """Converts errors of the policy into an error that names it."""
         world = self._world
         tick, resets = world.clock.tick, world.resets
         doing = f"{method} at tick {tick} with the seed {self._seed}"

@@ -1,4 +1,4 @@
-"""Bags of episodes: their topics, tables of all of them, and bags whose recorder was killed."""
+"""Bags of episodes: their topics, tables of several episodes, and repair after the recorder was killed."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def episodes_to_dataframes(
 def repair_all(folder: EpisodeFolder) -> Iterator[str]:
     """Completes all episodes whose recorder was killed, and yields a sentence for each.
 
-    Those that another process records are left alone.
+    Episodes that another process records are skipped.
 
     Raises:
         EpisodeError: If they are of a farm, which makes them again itself.
@@ -222,7 +222,7 @@ except Exception as error:
 
 
 def _reindex(bag: Path) -> None:
-    """Writes the index of a bag, in a process of its own with limits: rosbag reads whatever a broken bag says.
+    """Writes the index of a bag, in a separate process with limits, since rosbag trusts the sizes in a broken bag.
 
     Raises:
         BagError: If it cannot be indexed, or needs too much memory or time.

@@ -1,4 +1,4 @@
-"""Messages of a recording compared with those that its world makes when it is simulated again."""
+"""Comparison of recorded messages with those of a replay."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Compared(NamedTuple):
 
     @classmethod
     def merged(cls, parts: Iterable[Compared]) -> Compared:
-        """Returns the results of parts of an episode, in their order, as that of the whole."""
+        """Merges the results of consecutive parts of an episode."""
         whole = cls({}, Counter(), Counter())
         for each in parts:
             whole = cls(each.differences | whole.differences, *(a + b for a, b in zip(whole[1:], each[1:])))
@@ -148,7 +148,7 @@ class Comparison:
                 self.result.differences[full] = TopicDifference(full, stamp_ns, place, ours, theirs, is_certain)
 
     def _read_until(self, time_ns: int) -> None:
-        """Reads the messages that were recorded until a time, and drops those that waited too long."""
+        """Reads the messages recorded up to a time, and drops those that waited too long."""
         oldest = time_ns - 5 * WINDOW_NS
         while self._coming is not None and self._coming.record_time_ns <= time_ns:
             if self._coming.record_time_ns > oldest:  # a replay may begin at a keyframe, hours after the first message
@@ -195,7 +195,7 @@ class _Stamps:
             self._by_tick.setdefault((each.resets, each.tick), set()).add(stamp_ns)
 
     def of(self, resets: int, tick: int) -> int | None:
-        """Returns the stamp of a tick [ns]; None in wall time where no state, or several, tell it."""
+        """Returns the stamp of a tick [ns]; None in wall time unless exactly one state has the tick."""
         starts = self._starts.get(resets, set())
         if len(starts) == 1:  # simulated time, in which stamps follow the ticks
             return (min(starts) + tick) * self._dt_ns
@@ -204,7 +204,7 @@ class _Stamps:
 
 
 def _parsed(kind: type, raw: bytes) -> Any:
-    """Returns a message of bytes, None if they are none of this type."""
+    """Returns the message in bytes; None if they are not of this type."""
     message = kind()
     try:
         message.deserialize(raw)
@@ -214,7 +214,7 @@ def _parsed(kind: type, raw: bytes) -> Any:
 
 
 def _as_sent(message: Any) -> Any:
-    """Returns a message with its numbers in the precision in which it is sent."""
+    """Returns a message with numbers in the precision of serialisation."""
     data = BytesIO()
     message.serialize(data)
     return _parsed(type(message), data.getvalue())

@@ -58,7 +58,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Simulator:
-    """Receives what a replay needs of the simulator, from before the first episode on."""
+    """Receives the data of the simulator that a replay needs, beginning before the first episode."""
 
     def __init__(self, namespace: str) -> None:
         self._prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
@@ -210,7 +210,7 @@ class RecordNode:
             return f"episode {self._episode.number}: {label}"
 
     def end(self) -> None:
-        """Ends what is recorded, when the node ends."""
+        """Ends the current recording when the node ends."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "the node was ended while it was recorded")
@@ -285,7 +285,7 @@ class RecordNode:
         return text
 
     def _repair(self, fault: BagError) -> str:
-        """Saves what its recorder has left of the episode, and returns a sentence."""
+        """Repairs the episode from the files that its recorder has left, and returns a sentence."""
         try:
             write_facts(self._part, self._episode)
             self._episode = repaired = repair(self._folder, self._part)
@@ -356,7 +356,7 @@ class RecordNode:
     def _actions(
         self, start: _Trigger | None, discard: _Trigger | None, labels: Mapping[_Trigger, str]
     ) -> dict[_Trigger, Callable[[], None]]:
-        """Returns what keys or buttons do; None is neither."""
+        """Returns the actions of keys or buttons; None for neither."""
         actions = [(start, self._toggle), (discard, self.discard)]
         actions += [(each, partial(self.label, label)) for each, label in labels.items()]
         return {each: partial(_do, action) for each, action in actions if each is not None}

@@ -14,7 +14,7 @@ from rpbi.world import World
 
 
 class SampleMessages:
-    """Turns samples into messages; those of cameras, which the renderer draws, are left out.
+    """Converts samples to messages, except those of cameras, which the renderer draws.
 
     Args:
         world: The world.
@@ -51,7 +51,7 @@ class SampleMessages:
                 self._transforms.collect(*topic.on_tf(sample, stamp_ns))
 
     def _topic(self, sample: Any) -> Topic | None:
-        """Returns the topic of the sensor that a sample comes from; None if there is none."""
+        """Returns the topic of a sample's sensor; None without one."""
         key = type(sample), sample.name
         if key not in self._routes:
             for sensor in self._sensors():

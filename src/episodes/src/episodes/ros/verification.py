@@ -58,7 +58,7 @@ class Verdict(NamedTuple):
         is_same: Whether all states agree and all files are as stored.
         text: The comparison in words.
         label: Label of the episode; empty if it cannot be read.
-        notes: Sentences on files that are another way on the disk by now.
+        notes: Sentences on files that have changed on the disk.
     """
 
     number: int
@@ -173,7 +173,7 @@ def _compare(
 
 
 def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
-    """Returns sentences on topics that were changed, and notes on those that only the replay has otherwise.
+    """Returns sentences on changed topics, and notes on topics that differ in the replay only.
 
     The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
     They are a fault unless the seal of their topic is whole.

@@ -1,4 +1,4 @@
-"""Reads what a page shows from a bag."""
+"""Reads the content of a page from a bag."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Links of a recorded world: their shapes, and where they were."""
+"""Links of a recorded world: their shapes and poses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Commands = Mapping[int, Mapping[int, RecordedCommand]]
 
 
 def add_later_bodies(world: World, commands: Commands) -> list[str]:
-    """Adds the bodies that came into a world after its start, to have their shapes.
+    """Adds the bodies that were added to a world after its start, for their shapes.
 
     Returns:
         Sentences on those that cannot be added.
@@ -96,7 +96,7 @@ class _Presence:
                     self._changes.append((at_s, command.name, command.what == "add"))
 
     def of(self, name: str) -> Array:
-        """Returns for each time whether a body is there, shape (n,); always if nothing is known."""
+        """Returns for each time whether a body is present, shape (n,); always without data."""
         is_there = np.ones(len(self._times), bool)
         for at_s, changed, comes in self._changes:
             if changed == name:
@@ -105,7 +105,7 @@ class _Presence:
 
 
 class _LinkPoses:
-    """Poses of the links of a body: from TF, else by its joint states from that of its base, else as it started."""
+    """Poses of the links of a body: from TF, else from its joint states and its base pose, else the initial poses."""
 
     def __init__(self, world: World, body: Body, frames: Frames, joints: pd.DataFrame | None) -> None:
         self._body, self._frames, self._joints = body, frames, joints

@@ -1,4 +1,4 @@
-"""The first view of a page: from where a camera sees all links."""
+"""The initial view of a page, in which all links are visible."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class Arrows:
 
 @dataclass
 class PageScene:
-    """All that a page shows.
+    """Content of a page.
 
     Attributes:
         title: Its title.

@@ -55,7 +55,7 @@ def lerobot_faults(folder: Path) -> Iterator[str]:
 
 
 class _Check:
-    """The parts of a check, in the order in which they are called; later ones use what earlier ones read."""
+    """The parts of a check, in the order of their calls; later ones use data read by earlier ones."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -356,7 +356,7 @@ class _Check:
         yield from self._frame_faults(key, rows, np.array(times), np.array(images))
 
     def _frame_faults(self, key: str, rows: list[dict[str, Any]], times: Array, images: Array) -> Iterator[str]:
-        """Finds the frames of each episode by its times, as readers do, and compares them with what was exported."""
+        """Finds the frames of each episode by its times, as readers do, and compares them with the exported images."""
         fps = self._info["fps"]
         for row in rows:
             where = f"episode {row['episode_index']}"
@@ -404,7 +404,7 @@ def _type_faults(key: str, feature: Mapping[str, Any], values: Array) -> Iterato
 
 
 def _statistic_faults(stored: Mapping[str, Any], values: Array) -> Iterator[str]:
-    """Compares the statistics of a feature with its values; values beyond the extremes are named by themselves."""
+    """Compares the statistics of a feature with its values; values beyond the extremes are reported separately."""
     found = statistics(values)
     scale = np.maximum(np.abs(values.astype(float)).max(axis=0), 1e-6)
     for name in ("min", "max", "mean", "std"):

@@ -56,7 +56,7 @@ def _quaternion_faults(quats: Array) -> Iterator[str]:
 
 
 def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
-    """Yields faults; if their search fails at content of another kind than expected, a sentence about that instead."""
+    """Yields faults; if the search fails at unexpected content, yields a sentence about that instead."""
     try:
         yield from faults
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
@@ -97,7 +97,7 @@ class Facts:
             return {}
 
     def total_faults(self, episodes: int) -> Iterator[str]:
-        """Yields sentences if the data set has another number of episodes than were exported."""
+        """Yields sentences if the number of episodes differs from the export."""
         exported = self.export.get("episodes")
         if exported is not None and len(exported) != episodes:
             yield f"rpbi/export.json: {len(exported)} episodes were exported, found {episodes}"
@@ -114,7 +114,7 @@ class Facts:
 
 
 def feature_faults(key: str, names: Sequence[str], values: Array, facts: Mapping[str, Any]) -> Iterator[str]:
-    """Yields sentences if the values of a feature in an episode are not as they were exported.
+    """Yields sentences if the values of a feature in an episode differ from the exported ones.
 
     Args:
         key: The feature.

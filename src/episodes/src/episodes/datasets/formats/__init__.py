@@ -1,4 +1,4 @@
-"""The formats of data sets; a new one is a class in a file of its own and a line here."""
+"""The formats of data sets; a new one is a class in its own file and a line here."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
         others: Formats of other packages, as `module:Class`.
 
     Raises:
-        DatasetError: If there is no such folder, or no format recognises it; it names what is in it.
+        DatasetError: If there is no such folder, or no format recognises it; the message lists its content.
         MissingDependency: If its library is not installed.
     """
     if not folder.is_dir():

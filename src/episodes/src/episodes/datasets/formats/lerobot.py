@@ -29,7 +29,7 @@ except ImportError:
 MAX_DATA_BYTES = 100_000_000
 """Size of the rows in memory beyond which a data file is written [bytes]."""
 ROOM_BYTES = 200_000
-"""Room on the disk beside that of the rows, for metadata [bytes]."""
+"""Disk space for metadata, in addition to that of the rows [bytes]."""
 Preset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"]
 
 
@@ -80,7 +80,7 @@ class LeRobot(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "images": images}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last, whose rows are never in a full file yet."""
+        """Removes the episode that was added last; its rows are not written to a file yet."""
         self._frames -= len(self._pending.pop())
         self._episodes.pop()
         for key, found in self._image_statistics.items():
@@ -90,7 +90,7 @@ class LeRobot(DatasetFormat):
             (self._folder / layout.data_file(self._data_file)).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Writes the rows that are left and all metadata."""
+        """Writes the remaining rows and all metadata."""
         if self._pending:
             self._write_rows()
         fps = self._schema.fps
@@ -198,7 +198,7 @@ class LeRobot(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether there is a `meta/info.json`, or what is left of such a data set."""
+        """Returns whether there is a `meta/info.json`, or the remains of such a data set."""
         return (folder / "meta").is_dir() and ((folder / "meta/info.json").exists() or (folder / "data").is_dir())
 
     @classmethod
@@ -216,7 +216,7 @@ class LeRobot(DatasetFormat):
 
 
 class _Film:
-    """Facts on the images of one camera in one episode."""
+    """Data on the images of one camera in one episode."""
 
     def __init__(self, frames: int) -> None:
         self._statistics = ImageStatistics(frames)

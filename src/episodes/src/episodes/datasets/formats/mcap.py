@@ -67,7 +67,7 @@ class Mcap(DatasetFormat):
         shutil.rmtree(self._folder / f"episode_{index:06d}")
 
     def close(self) -> None:
-        """There is nothing to complete."""
+        """Does nothing: a recording is complete after `add`."""
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:

@@ -31,7 +31,7 @@ SUCCESS = "success"
 """Label of episodes whose last row has the reward 1, and filter of them in `mask`."""
 
 ROOM_BYTES = 100_000
-"""Room on the disk beside that of the numbers of an episode [bytes]."""
+"""Disk space in addition to that of the numbers of an episode [bytes]."""
 
 
 class RobomimicConfig(ConfigModel):
@@ -62,7 +62,7 @@ class Robomimic(DatasetFormat):
         self._is_closing = False
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Writes an episode, after all of it has been read and there is room for it on the disk."""
+        """Writes an episode after it was read completely and its disk space was checked."""
         stamps: dict[str, Array] = {}
         observations: dict[str, Array] = {}
         for camera in self._schema.cameras:
@@ -95,7 +95,7 @@ class Robomimic(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last; its room in the file is there for the rest."""
+        """Removes the episode that was added last; its space in the file is reused."""
         if self._is_closing:
             super().take_back(index)
         name = f"demo_{index}"
@@ -143,7 +143,7 @@ class Robomimic(DatasetFormat):
         demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
 
     def _write_split(self, names: list[str]) -> None:
-        """Writes the filters `train` and `valid`, which share the episodes at random, always in the same way."""
+        """Writes the filters `train` and `valid`, a random but reproducible split of the episodes."""
         count = max(1, round(self.config.valid * len(names))) if self.config.valid and len(names) > 1 else 0
         chosen = {names[i] for i in np.random.default_rng(0).permutation(len(names))[:count]}
         for name, of_filter in (("train", sorted({*names} - chosen)), ("valid", sorted(chosen))):

@@ -27,7 +27,7 @@ ROW_COLUMNS = {
 
 
 def place(number: int) -> dict[str, int]:
-    """Returns folder and number of a file in it."""
+    """Returns the folder of a file and its number in it."""
     return {"chunk_index": number // CHUNK, "file_index": number % CHUNK}
 
 

@@ -33,7 +33,7 @@ def farm(
 
         ./rpbi farm WORLD.yaml --policy push:Push --episodes 200 --out pushes
 
-    It needs no ROS master. Episodes that are there already are not made again, so that the same command goes on after
+    It needs no ROS master. Episodes that are there already are not made again, so that the same command continues after
     an interruption. Episodes that cannot be made are named, and the exit code is 1; see docs/farm.md.
 
     Usage:
@@ -75,7 +75,7 @@ def farm(
                         labels[outcome.label] += 1
                         bar.update()
         except (EpisodeError, KeyboardInterrupt):
-            print(f"{_count(made, folder, episodes)}; the same command goes on from there", file=sys.stderr)
+            print(f"{_count(made, folder, episodes)}; the same command continues from there", file=sys.stderr)
             raise
         new = ", ".join(f"{count} {label}" for label, count in labels.most_common()) or "none"
         print(f"{_count(made, folder, episodes)}; new: {new}")

@@ -10,9 +10,9 @@ from rpbi_utils.ros.console.running_simulator import Namespace, RunningSimulator
 
 
 def restore(file: Annotated[Path, Argument("FILE.world", parse=Path, files="*.world")], *, ns: Namespace = None) -> str:
-    """Makes the running world what it was when its state was saved.
+    """Restores the running world to a saved state.
 
-    It simulates again from the start of the world, so it takes a while if that was long ago. Stamps go on.
+    It simulates again from the start of the world, so it takes a while if that was long ago. Stamps do not go back.
 
     Args:
         file: file that `save` wrote, on the simulator's computer

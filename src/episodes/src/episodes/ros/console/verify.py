@@ -25,8 +25,8 @@ def verify(
 ) -> int:
     """Simulates recorded episodes again and compares their states, with the files that are stored with them.
 
-    It prints a line an episode: the same, or the first tick that differs, and files that were changed. Files that are
-    another way on the disk by now are noted. It ends with 1 unless all are the same; needs no ROS master.
+    It prints a line an episode: the same, or the first tick that differs, and files that were changed. Files that have
+        changed on the disk are noted. It ends with 1 unless all are the same; needs no ROS master.
 
     Args:
         folder: of the episodes

@@ -71,12 +71,12 @@ class Signal(NamedTuple):
 
     @property
     def begins_at_once(self) -> bool:
-        """Whether rows begin with its first message; actions and contacts may come later."""
+        """Whether rows begin with its first message; actions and contacts may begin later."""
         return self.method not in (NEXT, PREVIOUS)
 
 
 class Choice(NamedTuple):
-    """Content of rows that the user chooses; topics are derived with None.
+    """Content of rows chosen by the user; with None, topics are derived.
 
     Attributes:
         state: Topics of `observation.state`.
@@ -109,7 +109,7 @@ def wanted_topics(types: Mapping[str, str], choice: Choice) -> list[str]:
         choice: Topics that the user names.
 
     Raises:
-        UnknownNameError: If there is no topic that was named.
+        UnknownNameError: If a named topic does not exist.
     """
     named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
     for topic in sorted(named - types.keys()):
@@ -149,7 +149,7 @@ def image_topics(types: Mapping[str, str], choice: Choice) -> dict[str, str]:
 
 
 def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
-    """Returns tables with a table for each frame of TF, in place of the one of all frames."""
+    """Returns the tables, with that of TF split by frame."""
     found = {name: table for name, table in tables.items() if name != topic}
     if topic in tables:
         frames = tables[topic].groupby(["parent", "child"], sort=True)
@@ -192,7 +192,9 @@ def derive(
 
 
 def label(topic: str) -> str:
-    """Returns a topic as a part of a key: without `rpbi`, with `_` for all that is no letter or number."""
+    """Returns a topic as a part of a key: without `rpbi`, with `_` for all other characters than letters and
+    numbers.
+    """
     return re.sub(r"\W+", "_", "/".join(part for part in topic.split("/") if part != "rpbi")).strip("_")
 
 

@@ -1,4 +1,4 @@
-"""Rows of one rate from the bag of an episode."""
+"""Rows at a constant rate from the bag of an episode."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ from .signals import (
 
 
 class Cut(NamedTuple):
-    """The beginning of the rows of an episode after resets of its world.
+    """Start of the rows of an episode with resets of its world.
 
     Attributes:
         resets: Number of resets within the episode.
@@ -160,7 +160,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def times(self) -> Array:
-        """Times of the rows: where all features but actions have values, int64, shape (n,) [ns].
+        """Times of the rows at which all features except actions have values, int64, shape (n,) [ns].
 
         Raises:
             DatasetError: If there is none.
@@ -215,7 +215,7 @@ class SourceEpisode(ExportedEpisode):
         return values
 
     def facts(self) -> dict[str, Any]:
-        """Returns its source and its chain of state hashes, as they are stored with the data set."""
+        """Returns its source and its chain of state hashes, for storage with the data set."""
         episode = self.episode
         chain = hash_chain(self._states())
         source = {"folder": str(self.folder.path), "episode": episode.number, "bag_sha256": file_digest(self.bag)}
@@ -262,7 +262,7 @@ class SourceEpisode(ExportedEpisode):
         return matrix.astype(signal.feature.dtype), error.astype(np.float32)
 
     def _continuous_tables(self) -> list[str]:
-        """Returns the names of the tables that rows begin and end with."""
+        """Returns the names of the tables that determine the first and the last row."""
         signals = [signal for signal in self._signals if signal.begins_at_once] or self._signals
         return sorted({table for signal in signals for table, _ in signal.columns})
 
@@ -366,7 +366,7 @@ def _rgb(pixels: Array) -> Array:
 
 
 def _make_continuous(values: Array, feature: Feature) -> None:
-    """Gives the quaternions of a feature the signs by which each is nearest to the one before; the first has w >= 0."""
+    """Flips signs of quaternions so that each is nearest to the one before; the first has w >= 0."""
     names = feature.names
     for first in range(len(names) - 3):
         if names[first : first + 4] == QUATERNION:

@@ -75,7 +75,7 @@ class EpisodeBag:
         self._write_images()
 
     def before_step(self) -> None:
-        """Writes the commands that came since the last time, and targets on the topics on which they would have come.
+        """Writes the new commands, and targets on the topics on which a node would have received them.
 
         Raises:
             InterfaceError: If one cannot be recorded.
@@ -105,10 +105,10 @@ class EpisodeBag:
             self._write_state(with_hash)
 
     def end(self) -> None:
-        """Writes the rest of the last tick, with the hash of its state.
+        """Writes the remaining messages of the last tick, with the hash of its state.
 
         Raises:
-            InterfaceError: If a camera has no image, since nobody has put its pose.
+            InterfaceError: If a camera has no image, since its pose was never set.
         """
         if self._images is not None:
             self._images.require_all()

@@ -1,6 +1,6 @@
 """Entry point of the process between a farm and a Ray cluster: `python -m episodes.ros.farm.cluster FD ADDRESS`.
 
-It is a process of its own because Ray ends the process that uses it when the head of the cluster goes away.
+It is a separate process because Ray ends its client process when the head of the cluster ends.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Cluster:
         self._numbers[self._task.remote(self._job, number)] = number
 
     def outcomes(self) -> Iterator[EpisodeOutcome]:
-        """Yields the outcomes of episodes that are ready by now, or within POLL_S.
+        """Yields the outcomes of episodes that are ready, or become ready within POLL_S.
 
         Raises:
             ClusterError: If the head does not answer.
@@ -107,7 +107,7 @@ class ClusterError(InterfaceError):
 
 
 def main() -> None:
-    """Passes requests to the cluster and outcomes back until the other end is closed."""
+    """Forwards requests to the cluster, and outcomes back, until the other end is closed."""
     connection = Connection(int(sys.argv[1]))
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it

@@ -65,12 +65,12 @@ class Farm:
         self.job = FarmJob(path, policy, seed, length, world_sha256, policy_sha256, images, (here,))
 
     def missing(self, folder: EpisodeFolder, count: int) -> list[int]:
-        """Returns the numbers below a count of episodes that are not in a folder; discarded ones count as there."""
+        """Returns the numbers below a count of episodes missing in a folder; discarded ones count as present."""
         return sorted(set(range(count)) - folder.taken())
 
     @contextmanager
     def claimed(self, folder: EpisodeFolder) -> Iterator[None]:
-        """Keeps a folder for this farm, and other processes away from it, until the end of the context.
+        """Locks a folder for this farm until the end of the context.
 
         Raises:
             EpisodeError: If it has episodes of another farm, another process is about it, or it cannot be written.
@@ -120,7 +120,7 @@ class Farm:
             _require_space(folder, disk_reserve_mb)
 
     def _facts(self, folder: EpisodeFolder) -> dict[str, object]:
-        """Returns what all episodes have in common, and stores the files of the world."""
+        """Returns the facts that all episodes share, and stores the files of the world."""
         try:
             files, faults = store_files(self._description, folder.files)
         except OSError as error:

@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 def new_world(loaded: LoadedWorld) -> World:
-    """Returns a world in simulated time, without a window, whose frames have their names in messages."""
+    """Returns a world in simulated time, without a window, with frame names as in messages."""
     world = World(loaded, connection_mode=pybullet.DIRECT)
     use_prefix(loaded.config.tf_prefix)
     use_own_frames(world.frames())
@@ -52,7 +52,7 @@ class EpisodeMaker:
             raise _AnotherError(f"the file of the policy {job.policy}")
 
     def make(self, folder: EpisodeFolder, number: int) -> EpisodeOutcome:
-        """Makes an episode in a folder; it is there as a whole or not at all."""
+        """Makes an episode in a folder; a failed one leaves nothing behind."""
         try:
             return EpisodeOutcome(number, self._make(folder, number))
         except OSError as error:
@@ -93,7 +93,7 @@ class EpisodeMaker:
 
 
 class _AnotherError(InterfaceError):
-    """World or policy are not those of the job; its argument says which."""
+    """World or policy differs from that of the job; the argument names it."""
 
     def __str__(self) -> str:
         where = "another one here than where the farm was started"

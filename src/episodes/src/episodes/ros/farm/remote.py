@@ -52,5 +52,5 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
 
 @lru_cache(maxsize=1)
 def _maker(job: FarmJob) -> EpisodeMaker:
-    """Returns the maker of a job; the process of a node goes on with the same job most of the time."""
+    """Returns the maker of a job, cached, since the process of a node mostly continues with the same job."""
     return EpisodeMaker(job)

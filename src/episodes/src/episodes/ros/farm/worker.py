@@ -12,7 +12,7 @@ from .maker import EpisodeMaker
 
 
 def main() -> None:
-    """Makes the episodes that are asked for until the other end is closed."""
+    """Makes the requested episodes until the other end is closed."""
     connection = Connection(int(sys.argv[1]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it
     job, path = connection.recv()
