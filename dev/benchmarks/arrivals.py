@@ -43,12 +43,12 @@ class Arrivals(NamedTuple):
         return float(self.arrival_s[-1] - self.arrival_s[0])
 
     def lateness_ms(self, percentile: float) -> float:
-        """Returns how much later than by the grid of the stamps messages came [ms].
+        """Returns the lateness of messages relative to the grid of their stamps [ms].
 
-        The grid is where the promptest message of all puts it, so this is lateness beyond the best that happened.
+        The earliest message defines the offset of the grid, so lateness is relative to the best case.
 
         Args:
-            percentile: Which percentile of it.
+            percentile: Percentile of the lateness.
         """
         late_s = self.arrival_s - (self.stamp_ns - self.stamp_ns[0]) * 1e-9
         return float(np.percentile(late_s - late_s.min(), percentile)) * 1e3

@@ -42,7 +42,7 @@ def arm_world(
 
 
 def crowded_world(folder: Path, hz: float, count: int = 30, **main: Any) -> dict[str, Any]:
-    """Returns the arm amid balls and boxes that bounce about in a pen and never come to rest.
+    """Returns the arm among balls and boxes that bounce in a pen and never come to rest.
 
     Args:
         folder: Where its files are written to.

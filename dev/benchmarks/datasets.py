@@ -25,7 +25,7 @@ QUICK_SECONDS = 5.0
 FPS = 30
 HEIGHT, WIDTH = 480, 640
 PICTURES = 60
-"""Number of different images, which follow each other again and again."""
+"""Number of different images, repeated in a cycle."""
 JOINTS = [f"lwr_arm_{index}_joint" for index in range(7)]
 
 
@@ -33,7 +33,7 @@ def run(quick: bool) -> list[Result]:
     """Measures the processor time of exports to LeRobot, in seconds for a second of the recording.
 
     Args:
-        quick: Whether a few seconds will do.
+        quick: Whether to measure a few seconds only.
     """
     results = []
     for kind, length_s in SECONDS.items():
@@ -74,7 +74,7 @@ def _write(folder: EpisodeFolder, seconds: float, is_jpeg: bool) -> None:
 
 
 def _picture(number: int) -> np.ndarray:
-    """Returns a textured picture in which something moves."""
+    """Returns a textured picture with a moving part."""
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     texture = np.random.default_rng(0).integers(0, 12, (HEIGHT, WIDTH, 1))
     pixels = np.stack([columns / 3, rows / 2, (rows + columns) / 5], axis=2) + texture

@@ -29,7 +29,7 @@ def retargeting_ms() -> float:
 
 
 def run(quick: bool) -> list[Result]:
-    """Dresses people by seed, without ROS and as fast as it goes."""
+    """Dresses people by seed, without ROS and as fast as possible."""
     seeds = QUICK_SEEDS if quick else SEEDS
     outcomes = [run_trial(seed) for seed in range(seeds)]
     dressed = sum(each.is_dressed and each.is_within_limits for each in outcomes)

@@ -45,7 +45,7 @@ FACTOR = re.compile(r"seed \d+ (\w+).*real-time factor: ([\d.]+)")
 HZ = re.compile(r"([\d.]+) Hz")
 UNCOUNTED = ("rpbi/status", "rpbi/state", "rpbi/markers", "/tf")
 UNCOUNTED_TYPES = ("CameraInfo", "CompressedImage", "PointCloud2", "MarkerArray")
-"""Messages that no sensor is, or that are made only when somebody subscribes."""
+"""Messages that are not of sensors, or are only made for subscribers."""
 
 
 def run(quick: bool) -> list[Result]:
@@ -76,7 +76,7 @@ def _example(name: str, seconds: float) -> Iterator[Result]:
 
 
 def rate_results(name: str, asked: Mapping[str, float], rates: Mapping[str, float]) -> Iterator[Result]:
-    """Yields the least share of the rates that were asked for [Hz], and any other that is too small, by topic."""
+    """Yields the least share of the requested rates [Hz], and all others that are too small, by topic."""
     shares = sorted((rates[topic] / hz, topic) for topic, hz in asked.items())
     for index, (share, topic) in enumerate(shares):
         if index == 0 or share < LEAST.limit:
@@ -85,7 +85,7 @@ def rate_results(name: str, asked: Mapping[str, float], rates: Mapping[str, floa
 
 
 def asked_rates(name: str, arguments: list[str]) -> dict[str, float]:
-    """Returns the rates of joint states, sensors and images that the worlds of a launch file ask for [Hz], by topic.
+    """Returns the rates of joint states, sensors and images in the worlds of a launch file [Hz], by topic.
 
     Args:
         name: The launch file.

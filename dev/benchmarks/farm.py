@@ -1,4 +1,4 @@
-"""Whether a farm whose workers are killed makes the same episodes as one process that nobody disturbs."""
+"""Checks that a farm whose workers are killed makes the same episodes as one undisturbed process."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ QUICK_EPISODES, QUICK_KILLS, QUICK_VERIFIED = 12, 2, 2
 TICKS = 600
 POLL_S = 0.02
 LONGEST_PAUSE_S = 0.5
-"""Longest time from the moment at which somebody is to be killed until that happens [s]."""
+"""Longest time from a due kill until it happens [s]."""
 
 
 def run(quick: bool) -> list[Result]:
@@ -78,7 +78,7 @@ def _finish(farm: subprocess.Popen[Any]) -> None:
 
 
 def _kill_workers(farm: subprocess.Popen[Any], folder: Path, episodes: int, kills: int) -> int:
-    """Kills a random worker whenever a share of the episodes is there; returns how many were killed."""
+    """Kills a random worker each time a share of the episodes is complete; returns the number of killed workers."""
     chance, killed = random.Random(episodes), 0
     while farm.poll() is None and killed < kills:
         if len(list(folder.glob("episode_*"))) >= killed * episodes // (kills + 1):

@@ -1,4 +1,4 @@
-"""Whether saved, restored and forked worlds go on as the world itself, and how long a prediction takes."""
+"""Checks that saved, restored and forked worlds continue like the original world; measures the time of a prediction."""
 
 from __future__ import annotations
 

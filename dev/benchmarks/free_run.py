@@ -16,7 +16,9 @@ JOINT_STATES_HZ = 50
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures both by turns, with a subscriber of the joint states and with only one of /diagnostics; best of all."""
+    """Measures both alternately, with a subscriber of the joint states and with one of /diagnostics only; best of all
+    runs.
+    """
     rounds, seconds = (3, 2.0) if quick else (5, 5.0)
     alone, subscribed, unseen = [], [], []
     with Session() as ros:

@@ -1,4 +1,6 @@
-"""How still a box is in a gripper's coupled fingers, and how exactly it is placed; runs free, without ROS."""
+"""Drift of a box in a gripper's coupled fingers, and accuracy of its placement; runs without ROS, as fast as
+possible.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,7 @@ class Grasp:
         return PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3]))
 
     def observe(self, step: GraspStep) -> None:
-        """Does a step: the hand moves there, then the fingers."""
+        """Simulates a step: the hand moves to its target, then the fingers."""
         robot = self.world.bodies["panda"]
         positions = tuple(robot.joint_positions().values())
         problem = IKProblem(
@@ -67,7 +69,7 @@ class Grasp:
 
 
 def drift_mm_s(hold_s: float) -> tuple[float, float]:
-    """Returns how fast a lifted box moves in the world, from begin to end and in its worst second [mm/s]."""
+    """Returns the speed of a lifted box in the world, as mean and in its worst second [mm/s]."""
     grasp = Grasp(PlanarPose(0.5, -0.2, 0.35))
     for step in pick_and_place(grasp.box(), PlanarPose(0.5, 0.2, 0.0)):
         grasp.observe(step)
@@ -83,7 +85,7 @@ def drift_mm_s(hold_s: float) -> tuple[float, float]:
 
 
 def placed_mm(seed: int) -> float:
-    """Returns how far from its goal a box is placed [mm] that was found somewhere."""
+    """Returns the distance from the goal at which a box from a random place is put down [mm]."""
     draw = random.Random(seed)
     grasp = Grasp(PlanarPose(draw.uniform(0.4, 0.6), draw.uniform(-0.3, -0.1), draw.uniform(-math.pi, math.pi)))
     goal = PlanarPose(draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.3), draw.uniform(-0.7, 0.7))

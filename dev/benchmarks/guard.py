@@ -1,4 +1,4 @@
-"""How long the guard takes for a decision on a seven-joint arm, with all checks of joints and shapes.
+"""Time of a decision of the guard on a seven-joint arm, with all checks of joints and shapes.
 
 Alone, and through ROS at 500 Hz; there the reference is a rospy echo of the same messages, alternating.
 """
@@ -28,7 +28,7 @@ HZ, ROUNDS = 500, 4
 ROS_PERIOD_S = 0.75 / HZ
 """Of the guard: as docs/safety.md says it is less than that of targets, so that late ones are caught up with."""
 SAFE_RAD, UNSAFE_RAD = 0.22, 3.0
-"""How far joints swing: the arm stays out of the margin of all bodies, or does not."""
+"""Amplitudes of joints: one keeps the arm outside the margin of all bodies, one does not."""
 LIMITS = {"acceleration": 10.0, "jerk": 500.0}
 DECISIONS, QUICK_DECISIONS = 20_000, 2_000
 HOME = np.array((0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0))
@@ -46,7 +46,7 @@ BODIES = {"table": (TABLE, (-0.7, 0.0, 0.0)), "pole": (POLE, (-0.5, 0.6, 1.0))}
 
 
 def run(quick: bool) -> list[Result]:
-    """Returns how long safe targets take, and those that `limit` has to replace."""
+    """Returns the times of safe targets, and of targets that `limit` has to replace."""
     count = QUICK_DECISIONS if quick else DECISIONS
     with tempfile.TemporaryDirectory() as folder:
         checks = {**CHECKS, "environment": {"world": _world(Path(folder))}}
@@ -74,7 +74,7 @@ def _world(folder: Path) -> str:
 
 
 def _through_ros(seconds: float) -> list[Result]:
-    """Returns how long it takes from the publication of a target to its command, and how many get there."""
+    """Returns the time from the publication of a target to its command, and the number of commanded targets."""
     echoed, commanded, shares = [], [], []
     options = {"start_from": "target", "period_s": ROS_PERIOD_S, "limits": LIMITS}
     with Session(use_sim_time=False) as ros:

@@ -22,7 +22,7 @@ VARIANTS = {
     "brake": (("--on-halt", "brake"), 0.25),
     "brake, /clock": (("--on-halt", "brake", "--simulated-time"), 0.05),
 }
-"""How the guard is told to stop, and the share of faults that it gets."""
+"""Methods of stopping the guard, and their shares of the faults."""
 COUNT, QUICK_COUNT = 200, 40
 
 

@@ -122,7 +122,7 @@ def _images(name: str, episodes: int) -> Result:
 
 
 def _draw(env: WorldEnv) -> None:
-    """Draws the scene as often as there are actions, by the renderer that the environment has."""
+    """Draws the scene once for each action, by the renderer of the environment."""
     images: CameraImages = env._views._images
     camera = next(iter(env.world.cameras.values()))
     intrinsics = Camera.of(camera.config).intrinsics
@@ -164,7 +164,7 @@ def _workers(name: str, steps: int, rounds: int) -> Iterator[Result]:
 
 
 def _speeds(envs: dict[str, Any], steps: int, rounds: int) -> dict[str, float]:
-    """Returns the actions a second of vectors, in turns, and closes them."""
+    """Returns the actions per second of vectors, measured alternately, and closes them."""
     speeds: dict[str, list[float]] = {name: [] for name in envs}
     for each in envs.values():
         each.reset(seed=0)

@@ -14,7 +14,7 @@ from session import PROGRAMS, Session
 
 PERIOD_S = 1e-3
 START_S = 10.0
-"""Before this much time has passed programs are still starting [s]."""
+"""Time in which programs are still starting [s]."""
 
 
 def run(quick: bool) -> list[Result]:
@@ -44,7 +44,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def _jitter_ms(file: Path, seconds: float) -> np.ndarray:
-    """Returns by how much the times between ticks differ from the period in the last seconds of a file [ms]."""
+    """Returns the differences of the times between ticks from the period, in the last seconds of a file [ms]."""
     times = np.load(file)
     times = times[times > times[-1] - seconds]
     return np.abs(np.diff(times) - PERIOD_S) * 1e3

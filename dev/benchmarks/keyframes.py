@@ -1,4 +1,6 @@
-"""Whether worlds go on from their keyframes as the running one, how fast after an hour, and how long keyframes take."""
+"""Checks that worlds continue from keyframes like the running one; measures restoring after an hour, and the time of
+keyframes.
+"""
 
 from __future__ import annotations
 
