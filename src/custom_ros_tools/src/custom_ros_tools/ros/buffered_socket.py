@@ -37,7 +37,9 @@ class BufferedSocket:
     def sendall(self, data: bytes) -> None:
         """Buffers a message for the next flush; flushes now if many are buffered.
 
-        Raises: OSError: If an earlier call found the connection closed.
+        Raises:
+
+            OSError: If an earlier call found the connection closed.
         """
         with self._lock:
             if self._error is not None:

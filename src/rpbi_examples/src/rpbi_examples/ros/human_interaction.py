@@ -183,7 +183,9 @@ def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
 def interrupt_roslaunch() -> bool:
     """Interrupts the roslaunch that started this process, which then ends all of its nodes, without an error.
 
-    Returns: Whether roslaunch started this process.
+    Returns:
+
+        Whether roslaunch started this process.
     """
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():

@@ -10,7 +10,7 @@ import numpy as np
 from robot_model.geometry import ZERO, Pose, Vector, minus, norm, rotated
 
 from .parts.arm import about_z
-from .parts.polar import CylindricalPosition, PolarArm
+from .parts.polar import PolarArm, PolarPoint
 from .scene import Scene, SceneFailedError, Watched
 
 TABLE_M = 0.5
@@ -24,15 +24,11 @@ PALM = "j2s6s200_link_6"
 GRASP_M, NEAR_M = 0.05, 0.01
 """Height of the grasp above the bottom of the cup, and distance from which the hand approaches slowly."""
 BACK_M, FRONT_M, ABOVE_M = 0.13, 0.2, 0.05
-"""Distances of the hand to and from the cup, and of the cup onto the shelf; height of the first lift and above the
-shelf.
-"""
+"""Distances of the hand to and from the cup, and of the cup onto the shelf; height of the first lift."""
 SPEED, SLOW_SPEED, TURN_SPEED = 0.09, 0.03, 0.28
 """Mean speeds of the hand [m/s] and of its turn about the base [rad/s]."""
 OPEN, CLOSED = (0.4, 0.2), (1.4, 1.4)
-"""Targets of a finger and its tip [rad]; those of a closed hand are inside the cup, so that it is pressed with full
-effort.
-"""
+"""Targets of a finger and its tip [rad]; those of a closed hand are inside the cup, to press it with full effort."""
 MAX_OFF_M, MAX_TILT_DEG, AT_REST_M = 0.02, 5.0, 0.0002
 """Limits for a cup on the shelf: distance from its goal, tilt, and motion in a cycle while at rest."""
 Bend = tuple[float, float]
@@ -54,19 +50,19 @@ class Cup(Scene):
     def prepare(self) -> None:
         """Puts a cup of random friction on the table, the balls into it, and the shelf at a random height."""
         radius, azimuth, yaw = self.random.uniform((0.58, -0.6, -math.pi), (0.7, 0.2, math.pi)).tolist()
-        cup = Pose(CylindricalPosition(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
+        cup = Pose(PolarPoint(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
         self.place("cup", cup)
         self.change("cup", lateralFriction=float(self.random.uniform(0.4, 1.0)))
         for number, ball in enumerate(BALLS):
             out, angle = self.random.uniform((0.0, -math.pi), (INNER_RADIUS_M - 1.1 * BALL_RADIUS_M, math.pi)).tolist()
-            self.place(ball, cup @ CylindricalPosition(out, angle, 0.02 + 2.1 * BALL_RADIUS_M * number).pose())
+            self.place(ball, cup @ PolarPoint(out, angle, 0.02 + 2.1 * BALL_RADIUS_M * number).pose())
         self.place("shelf", Pose((*SHELF_M, TABLE_M + float(self.random.uniform(0.15, 0.3)))))
 
     def act(self) -> Iterator[None]:
         """Approaches, grasps and lifts the cup, swings to the shelf, puts it down and retreats."""
         urdf = "{rpbi_examples}/robots/kinova_hand.urdf"
         arm = PolarArm(self, "kinova", urdf, "base", "j2s6s200_end_effector", Pose((0.0, 0.0, TABLE_M)))
-        start = CylindricalPosition.of(self.sensed.poses["cup"].position)
+        start = PolarPoint.of(self.sensed.poses["cup"].position)
         yield from self._move_fingers(OPEN, OPEN, 0.02)
         for out in (-BACK_M, -NEAR_M):
             yield from arm.swing(start.moved(out, GRASP_M), SPEED, TURN_SPEED)
@@ -76,14 +72,12 @@ class Cup(Scene):
             raise SceneFailedError("kinova: expected both fingertips at the cup, got a hand that closed beside it")
         yield from arm.swing(arm.spot.moved(up=ABOVE_M), SPEED, TURN_SPEED)
         yield from self.measure()
-        cup = CylindricalPosition.of(self.sensed.poses["cup"].position)
+        cup = PolarPoint.of(self.sensed.poses["cup"].position)
         risen_mm, expected_mm = 1e3 * (cup.height - start.height), 1e3 * ABOVE_M
         if risen_mm < 0.9 * expected_mm:
             raise SceneFailedError(f"kinova: expected the cup to rise by {expected_mm:.0f} mm, got {risen_mm:.0f} mm")
-        goal = CylindricalPosition.of((self.sensed.poses["shelf"] @ self._goal).position)
-        above = CylindricalPosition(*(end + hand - held for end, hand, held in zip(goal, arm.spot, cup))).moved(
-            up=ABOVE_M
-        )
+        goal = PolarPoint.of((self.sensed.poses["shelf"] @ self._goal).position)
+        above = PolarPoint(*(end + hand - held for end, hand, held in zip(goal, arm.spot, cup))).moved(up=ABOVE_M)
         for out in (-FRONT_M, 0.0):
             yield from arm.swing(above.moved(out), SPEED, TURN_SPEED)
         yield from self._until("shelf", arm.swing(above.moved(up=-1.2 * ABOVE_M), SLOW_SPEED, TURN_SPEED))
@@ -109,9 +103,7 @@ class Cup(Scene):
         return f"{spilled} of {len(BALLS)} balls spilled" if spilled else ""
 
     def figures(self) -> dict[str, float]:
-        """Returns the number of balls in the cup, its distance from the goal, its tilt and the largest tilt of the
-        episode.
-        """
+        """Returns the number of balls in the cup, its distance from the goal, its final and its largest tilt."""
         return {
             "balls inside": self._balls_inside(),
             "off [mm]": 1e3 * self._off_m(),
@@ -153,5 +145,5 @@ class Cup(Scene):
 
     def _balls_inside(self) -> int:
         cup = self.seen.poses["cup"].inverse()
-        spots = [CylindricalPosition.of((cup @ self.seen.poses[ball]).position) for ball in BALLS]
+        spots = [PolarPoint.of((cup @ self.seen.poses[ball]).position) for ball in BALLS]
         return sum(spot.radius < INNER_RADIUS_M and 0.0 < spot.height < CUP_HEIGHT_M for spot in spots)

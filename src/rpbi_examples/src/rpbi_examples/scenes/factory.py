@@ -18,9 +18,7 @@ URDF, CHEST = "{rpbi_examples}/robots/nextage_gripper.urdf", Pose((0.0, 0.0, 0.8
 STATION_M, REACH_M = 0.18, 0.32
 """Distance of a part past the middle at which the belt stops, and distance within which parts are taken."""
 MIDDLE_M, LEAST_M = 0.16, 0.05
-"""Half the width of the zone around the middle plane that one arm at a time may enter; least distance between the
-arms.
-"""
+"""Half the width of the middle zone that one arm at a time may enter; least distance between the arms."""
 HOME_X_M, HOME_Y_M, CARRY_Z_M, HOVER_M = 0.30, 0.25, 1.04, 0.07
 """Where hands wait, out of the camera's view of the belt; height of hands that carry a part; height before a grasp."""
 OPEN_M, SPARE_M, HELD_M = 0.04, 0.012, 0.012

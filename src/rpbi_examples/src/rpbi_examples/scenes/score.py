@@ -166,7 +166,9 @@ def write_json(path: Path, found: dict[str, Any]) -> None:
 def write_failures(path: Path, results: Sequence[SeedResult]) -> str:
     """Writes a picture of the ends of failed episodes, of `MAX_PICTURES` at most.
 
-    Returns: A line with the file, and the numbers of shown and of failed episodes; empty if none failed.
+    Returns:
+
+        A line with the file, and the numbers of shown and of failed episodes; empty if none failed.
     """
     all_failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None]
     failed = all_failed[:MAX_PICTURES]

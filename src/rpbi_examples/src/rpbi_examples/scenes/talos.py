@@ -22,9 +22,7 @@ TORSO, SOLES, FEET = "torso_2_link", ("left_sole_link", "right_sole_link"), {"le
 HEIGHT_M, LOWEST_M = 1.0223, 0.8
 """Height of the pelvis at the start, and the least while the robot stands."""
 MOST_SHIFT, MOST_RISE_M, MOST_TURN = 0.05, 2e-3, (0.01, 0.01, 0.2)
-"""Largest deviations of the start pose: in x and y [m], in height [m], and in orientation as a rotation vector
-[rad].
-"""
+"""Largest deviations of the start pose: x and y [m], height [m], orientation as a rotation vector [rad]."""
 NEAREST, FARTHEST = (0.35, 0.05, 0.9), (0.55, 0.4, 1.3)
 """Corners of the region of targets: forwards and left of the pelvis, and above the floor [m]."""
 FORWARD = quaternion_of((0.0, -math.pi / 2.0, 0.0))
@@ -34,9 +32,7 @@ IMPULSE, PUSH_S = 10.0, 0.1
 REACHED_S, BACK_S, STAYS_S = 3.0, 4.0, 2.0
 """Time by which the hand is at its target, time by which it is back after a push, and time for which it stays there."""
 NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG, MOST_LEAN_DEG = 0.02, 0.01, 5.0, 15.0
-"""Largest error of the hand, largest motion of the feet, largest lean of the torso at the end, and during the
-episode.
-"""
+"""Limits of success: error of the hand, motion of the feet, lean of the torso at the end and at any time."""
 
 
 class Talos(Scene):

@@ -14,7 +14,7 @@ from .arm import LedArm, about_z, smooth
 SHORTEST_S = 0.5
 
 
-class CylindricalPosition(NamedTuple):
+class PolarPoint(NamedTuple):
     """A place in cylindrical coordinates, whose axis is z of the world.
 
     Attributes:
@@ -28,14 +28,14 @@ class CylindricalPosition(NamedTuple):
     height: float
 
     @classmethod
-    def of(cls, position: Vector) -> CylindricalPosition:
+    def of(cls, position: Vector) -> PolarPoint:
         """Returns the cylindrical coordinates of a position in the world [m]."""
         x, y, z = position
         return cls(math.hypot(x, y), math.atan2(y, x), z)
 
-    def moved(self, out: float = 0.0, up: float = 0.0) -> CylindricalPosition:
+    def moved(self, out: float = 0.0, up: float = 0.0) -> PolarPoint:
         """Returns the position that is further out and higher [m]."""
-        return CylindricalPosition(self.radius + out, self.azimuth, self.height + up)
+        return PolarPoint(self.radius + out, self.azimuth, self.height + up)
 
     def pose(self) -> Pose:
         """Returns the pose in the world whose axis x points away from the axis, and z up."""
@@ -60,9 +60,9 @@ class PolarArm(LedArm):
 
     def __init__(self, scene: Scene, robot: str, urdf: str, base_link: str, link: str, base: Pose) -> None:
         super().__init__(scene, robot, urdf, base_link, link, base)
-        self.spot = CylindricalPosition.of(self.target.position)
+        self.spot = PolarPoint.of(self.target.position)
 
-    def swing(self, end: CylindricalPosition, speed: float, turn_speed: float) -> Iterator[None]:
+    def swing(self, end: PolarPoint, speed: float, turn_speed: float) -> Iterator[None]:
         """Moves to a position, from rest to rest; used as `yield from arm.swing(...)`.
 
         Args:
@@ -80,8 +80,6 @@ class PolarArm(LedArm):
         while share < 1.0:
             share = min((self._scene.seen.time_s - begin_s) / duration_s, 1.0)
             gone = smooth(share)
-            self.spot = CylindricalPosition(
-                start.radius + gone * out, start.azimuth + gone * turn, start.height + gone * up
-            )
+            self.spot = PolarPoint(start.radius + gone * out, start.azimuth + gone * turn, start.height + gone * up)
             self.send(self.spot.pose())
             yield
