@@ -235,7 +235,7 @@ def test_starts_outside_limits_are_brought_in_with_one_warning(urdf, caplog):
     for position in (2.5, 0.0, 2.5):
         solver.solve(IKProblem(start={"left_1": position}))
     messages = [record.getMessage() for record in caplog.records]
-    assert messages == ["the start is outside limits and is brought in: 'left_1' 2.5"]
+    assert messages == ["the start is outside limits and is moved within them: 'left_1' 2.5"]
 
 
 @pytest.mark.parametrize(

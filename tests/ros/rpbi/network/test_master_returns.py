@@ -22,7 +22,7 @@ DESCRIPTION = "/rpbi/iiwa/robot_description"
 CAMERA = {"name": "camera", "object_tf": {"tf_id": "camera"}, "intrinsics": {"width": 64, "height": 48}}
 GONE = "cannot be reached"
 BACK = "is back"
-TAKEN = f"another node is called {NODE} by now"
+TAKEN = f"another node has taken the name {NODE} (at"
 
 
 def _start(ros, master, folder, **more):

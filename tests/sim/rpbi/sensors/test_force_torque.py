@@ -499,7 +499,7 @@ def test_faulty_sensor_options_are_named_with_their_key(world_of, sensors, key, 
 
 
 def test_joints_that_topics_cannot_be_named_after_are_refused(world_of):
-    with pytest.raises(ConfigError, match="only letters, digits"):
+    with pytest.raises(ConfigError, match="may only have letters, digits"):
         world_of(sensors=["wrist-joint"], description=urdf().replace("wrist_joint", "wrist-joint"))
 
 
