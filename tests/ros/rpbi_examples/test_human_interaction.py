@@ -8,15 +8,14 @@ import re
 import pytest
 import rospy
 from PIL import Image
-from ros_system import wait_until
-
-pytestmark = pytest.mark.thorough
+from ros_system import stop_group, wait_until
 
 MEAN = re.compile(r"at a depth of ([\d.]+) mm: ([\d.]+) N on the tool, by stiffness ([\d.]+) N")
 STIFFNESS = 500.0
 TOUCH_HEIGHT_M = 0.135
 
 
+@pytest.mark.thorough
 def test_one_press_and_release(ros, tmp_path):
     """The folder of the output is not there before, and roslaunch ends as if it were interrupted."""
     folder = tmp_path / "new" / "folder"
@@ -45,3 +44,10 @@ def test_one_press_and_release(ros, tmp_path):
     assert max(row["felt_n"] for row in rows) > 0.5
     with Image.open(folder / "human_interaction.png") as picture:
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 10, "it shows something"
+
+
+def test_an_interrupt_ends_the_node_while_it_waits_for_others(ros, tmp_path):
+    options = [f"_{key}:=1.0" for key in ("stiffness", "force_scale", "touch_height")]
+    node = ros.start(["rosrun", "rpbi_examples", "human_interaction_node.py", f"_output:={tmp_path}", *options])
+    wait_until(lambda: "still waiting for service" in ros.output(node), "it waits for the sensor's service")
+    assert stop_group(node) == 0

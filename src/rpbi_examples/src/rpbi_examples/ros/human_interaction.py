@@ -62,25 +62,9 @@ class Watch:
         self._start_s: float | None = None
         self._over = threading.Event()
         self._failure = ""
-        self._tf = TfInterface()
-        # without contact it measures the weight of the tool
-        get_srv_handler(SENSOR, Empty)()
-        self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
-        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)
-        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=MAX_BUFFERED, tcp_nodelay=True)
-        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=MAX_BUFFERED, tcp_nodelay=True)
         self._connected_s = float("inf")
-        rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
-        if rospy.get_param("~guard", False):
-            get_srv_handler(
-                "robot_safety/start_subscriber", Trigger
-            )  # otherwise the press is over before it subscribes
-        wait_until_ready()
-        solver = rospy.get_param("~ik", "pybullet")
-        for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", "haptics/toggle"):
-            call_service(toggle, SetBool, True)
-        rospy.loginfo("the handle moves the arm up and down; press it on the box")
-        WallTimer(SAMPLE_HZ, self._sample)
+        self._tf = TfInterface()
+        self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
 
     def run(self) -> None:
         """Shows the live figure, until ROS shuts down or the scripted press is over.
@@ -88,6 +72,7 @@ class Watch:
         Raises:
             InterfaceError: If the scripted press differs from the prediction.
         """
+        self._begin()
         if rospy.get_param("~plot", False):
             self._show()
         while not rospy.is_shutdown() and not self._over.wait(0.1):
@@ -99,6 +84,24 @@ class Watch:
             rospy.on_shutdown(left.set)
             left.wait(MAX_FAREWELL_S)
         rospy.signal_shutdown("the press is over")
+
+    def _begin(self) -> None:
+        """Waits for the other nodes, and starts following the handle."""
+        # without contact it measures the weight of the tool
+        get_srv_handler(SENSOR, Empty)()
+        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)
+        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=MAX_BUFFERED, tcp_nodelay=True)
+        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=MAX_BUFFERED, tcp_nodelay=True)
+        rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
+        if rospy.get_param("~guard", False):
+            # otherwise the press is over before it subscribes
+            get_srv_handler("robot_safety/start_subscriber", Trigger)
+        wait_until_ready()
+        solver = rospy.get_param("~ik", "pybullet")
+        for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", "haptics/toggle"):
+            call_service(toggle, SetBool, True)
+        rospy.loginfo("the handle moves the arm up and down; press it on the box")
+        WallTimer(SAMPLE_HZ, self._sample)
 
     def _new_press(self) -> Press:
         return Press(*(rospy.get_param(f"~{key}") for key in ("stiffness", "force_scale", "touch_height")))
