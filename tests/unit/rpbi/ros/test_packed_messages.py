@@ -45,6 +45,12 @@ def test_joint_states_with_invalid_numbers_are_refused_as_by_rospy():
     assert str(raised.value) == str(expected.value)
 
 
+def test_empty_joint_states_are_filled_by_deserialization():
+    message = JointState(HEADER, ["a"], [0.1], [0.2], [0.3])
+    assert written(PackedJointState()) == written(JointState())
+    assert written(PackedJointState().deserialize(written(message))) == written(message)
+
+
 @pytest.mark.parametrize("count", [0, 1, 3])
 def test_transforms(count):
     place = Transform(Vector3(0.1, -0.0, 3.0), Quaternion(0.0, 0.6, 0.0, -0.8))

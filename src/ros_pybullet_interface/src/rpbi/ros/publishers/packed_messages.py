@@ -15,13 +15,13 @@ class PackedJointState(JointState):
 
     def __init__(  # the constructor of the type takes five times as long
         self,
-        header: Header,
-        name: Sequence[str],
-        position: Sequence[float],
-        velocity: Sequence[float],
-        effort: Sequence[float],
+        header: Header | None = None,  # readers of messages make them empty
+        name: Sequence[str] = (),
+        position: Sequence[float] = (),
+        velocity: Sequence[float] = (),
+        effort: Sequence[float] = (),
     ) -> None:
-        self.header, self.name = header, name
+        self.header, self.name = header or Header(), name
         self.position, self.velocity, self.effort = position, velocity, effort
 
     def serialize(self, buff: BytesIO) -> None:
