@@ -65,7 +65,7 @@ def passed(done: subprocess.CompletedProcess[str]) -> set[str]:
         (("test_suite.py::test_sizes",), {"test_sizes[1]"}),
         (("--all", "test_suite.py::test_thorough"), {"test_thorough"}),
     ],
-    ids=" ".join,
+    ids=["default", "quick", "all", "file", "test of a file", "all of a test"],
 )
 def test_thorough_tests_run_only_with_all(tmp_path, options, expected):
     done = run_suite(tmp_path, *options)
