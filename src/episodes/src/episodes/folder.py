@@ -30,6 +30,8 @@ from .facts import MAX_BYTES, MAX_LABEL, MAX_NOTE, MAX_NUMBER, checked_label, fa
 
 BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
 """Files of an episode: the recording, its description, and commands that the topic no longer sends."""
+FARM = "farm.yaml"
+"""File of a folder of episodes with the job of the farm that they belong to."""
 FILES, DISCARDED = "files", "discarded"
 SET_BACK = "set_back_s"
 STAMPED = ("joint_states", "base_state", "contacts", "ft_sensor")

@@ -17,11 +17,10 @@ from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.foreign import load_foreign_yaml, printable
 from episodes.errors import EpisodeError
+from episodes.folder import FARM
 
 from .policy import Policy
 
-FARM = "farm.yaml"
-"""File of a folder of episodes with the job that they belong to."""
 LOG = "farm.log"
 """File of a folder of episodes with all that policies print."""
 _CHANGED = {"world_sha256": "the world, or a file that it names", "policy_sha256": "the file of the policy"}

@@ -17,8 +17,19 @@ import pandas as pd
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.foreign import printable
 from episodes.errors import DISK_FULL, EpisodeError
-from episodes.farm.job import FARM
-from episodes.folder import BAG, FACTS, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, file_in, hold, read_part
+from episodes.folder import (
+    BAG,
+    FACTS,
+    FARM,
+    SEAL,
+    SET_BACK,
+    UNREADABLE,
+    Episode,
+    EpisodeFolder,
+    file_in,
+    hold,
+    read_part,
+)
 from rpbi_utils.bags.clock import MAX_BACK_S
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.bags.limits import BASE_TIME_S, TIME_PER_MB_S
