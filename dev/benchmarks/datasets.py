@@ -14,10 +14,10 @@ from PIL import Image as PilImage
 from result import Result, Target
 from sensor_msgs.msg import CompressedImage, Image, JointState
 
-from episodes.datasets.formats import FORMATS
-from episodes.folder import BAG, EpisodeFolder
-from episodes.ros.bags import measure_topics
-from episodes.ros.export.folder import Wish, export_folder
+from rpbi_data.datasets.export import Wish, export_folder
+from rpbi_data.datasets.formats import FORMATS
+from rpbi_data.episodes.bags import measure_topics
+from rpbi_data.episodes.folder import BAG, EpisodeFolder
 
 SECONDS = {"raw": 60.0, "JPEG": 600.0}
 """Lengths of the episodes [s]; raw images of a minute take 3 GB."""

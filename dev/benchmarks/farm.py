@@ -15,10 +15,10 @@ from typing import Any
 
 from result import Result, Target
 
-from episodes import EpisodeFolder
-from episodes.folder import BAG
-from episodes.ros.farm.farm import WORKER
-from episodes.ros.verification import verify_all
+from rpbi_data import EpisodeFolder
+from rpbi_data.episodes.folder import BAG
+from rpbi_data.episodes.verified_messages import verify_all
+from rpbi_data.farm.ros.farm import WORKER
 
 ROOT = Path(__file__).resolve().parents[2]
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"

@@ -16,9 +16,8 @@ from bench_worlds import CAMERA, arm_world
 from result import Result, Target
 from session import COLOUR, DEPTH, JOINT_STATES, Session
 
-from episodes import EpisodeFolder
-from episodes.folder import BAG
-from rpbi_utils import Recorder
+from rpbi_data import EpisodeFolder, Recorder
+from rpbi_data.episodes.folder import BAG
 
 HZ = 1000
 SECONDS, QUICK_SECONDS = 600.0, 10.0

@@ -15,7 +15,7 @@ import rosbag
 from result import Result, Target
 from sensor_msgs.msg import Image, JointState
 
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import bag_to_dataframes
 
 MESSAGES = 100_000
 QUICK_MESSAGES = 10_000
@@ -28,7 +28,7 @@ SPEED_MB_S, MEMORY = 150.0, 3.0
 IMAGE_TOPIC = "/rpbi/camera/colour/image"
 MEASURE = """
 import json, resource, sys, time
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import bag_to_dataframes
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 begin_s = time.perf_counter()
 tables = bag_to_dataframes(sys.argv[1])

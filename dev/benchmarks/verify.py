@@ -17,8 +17,8 @@ from bench_worlds import arm_world
 from result import Result, Target
 from session import Session
 
-from episodes import EpisodeFolder
-from episodes.ros.verification import verify_all
+from rpbi_data import EpisodeFolder
+from rpbi_data.episodes.verified_messages import verify_all
 
 
 class Scene(NamedTuple):

@@ -24,9 +24,9 @@ import pyarrow.parquet  # noqa: E402, F401
 import rosbags.rosbag2  # noqa: E402, F401
 
 from custom_ros_tools.console.modules import command_of  # noqa: E402
-from episodes.datasets.checks import lerobot, mcap, robomimic  # noqa: E402, F401
 from robustness.hostile_bags.trial import Trial, tried  # noqa: E402
 from robustness.hostile_datasets.makers import MAKERS, good_datasets, hostile_datasets  # noqa: E402
+from rpbi_data.datasets.checks import lerobot, mcap, robomimic  # noqa: E402, F401
 
 MAX_MEMORY_MB = 2000.0
 MODULE = "canary_module"
@@ -73,7 +73,7 @@ def main() -> None:
 
 
 def _check(path: Path) -> None:
-    command = command_of("episodes.ros.console.check_dataset")
+    command = command_of("rpbi_data.console.check_dataset")
     assert command is not None
     sys.exit(command.run([str(path)]))
 

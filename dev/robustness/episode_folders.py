@@ -22,14 +22,14 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "dev"), *map(str, (ROOT / "tests/support").iterdir())]
 
 
-import episodes.ros.view  # noqa: E402
-import episodes.view.page  # noqa: E402, F401
+import rpbi_data.view.bag_messages  # noqa: E402
+import rpbi_data.view.page  # noqa: E402, F401
 from custom_ros_tools.console.modules import command_of  # noqa: E402
-from episodes.datasets.formats import FORMATS  # noqa: E402
 from robustness.hostile_bags.trial import Trial  # noqa: E402
 from robustness.hostile_episodes.good import write_good  # noqa: E402
 from robustness.hostile_episodes.makers import hostile_folders  # noqa: E402
 from robustness.hostile_episodes.trial import READERS, is_fine, trials  # noqa: E402
+from rpbi_data.datasets.formats import FORMATS  # noqa: E402
 
 
 def main() -> None:
@@ -45,7 +45,7 @@ def main() -> None:
     for name in ("lerobot", "robomimic", "mcap"):  # imported once for all forks
         FORMATS.configured(name, "")
     for name in ("episodes", "view", "export"):
-        command_of(f"episodes.ros.console.{name}")
+        command_of(f"rpbi_data.console.{name}")
     importlib.import_module("pyarrow.parquet")
     gc.freeze()  # else each fork copies what its collections look at
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell has its background jobs ignore

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from episodes.farm import Policy
 from rpbi.world import World
+from rpbi_data.farm import Policy
 
 
 class Push(Policy):

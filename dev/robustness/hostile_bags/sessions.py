@@ -12,7 +12,7 @@ from pathlib import Path
 
 from robustness.hostile_files.files import REPLACED, spoil_text, write_session
 from ros_pybullet_interface.msg import SimulationState, WorldCommand, WorldCommands
-from rpbi_utils.bags.bag_file import BagFile
+from rpbi_data.bags.bag_file import BagFile
 
 from .records import Bag, Topic, text
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from custom_ros_tools.console.modules import command_of
 from custom_ros_tools.errors import InterfaceError
-from rpbi_utils import bag_to_dataframes, topic_report
-from rpbi_utils.ros.bags import bag_to_table
+from rpbi_data import bag_to_dataframes, topic_report
+from rpbi_data.bags import bag_to_table_node as bag_to_table
 
 LONGEST_S = 60.0
 """Processor time; a process that takes more, or ten times this on the clock, is ended by signal 9."""
@@ -57,7 +57,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "bag_to_dataframes": lambda path: bag_to_dataframes(path, images=True),
     "bag_to_table, Parquet": lambda path: _to_files(path, "parquet"),
     "bag_to_table, CSV": lambda path: _to_files(path, "csv"),
-    "replay": lambda path: sys.exit(command_of("rpbi_utils.ros.console.replay").run([str(path), "--quiet"])),
+    "replay": lambda path: sys.exit(command_of("rpbi_data.console.replay").run([str(path), "--quiet"])),
 }
 """Readers of bags by name; a refusal is an InterfaceError, or an exit with 1 and words on stderr or stdout."""
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from written_episodes import write_episode
 
 from custom_ros_tools.console.modules import command_of
-from episodes.folder import EpisodeFolder
+from rpbi_data.episodes.folder import EpisodeFolder
 
 from . import lerobot, robomimic, rosbag2
 
@@ -40,7 +40,7 @@ def good_datasets(folder: Path) -> dict[str, Path]:
     episodes = EpisodeFolder(folder / "demos")
     for phase in (0.0, 0.4):
         write_episode(episodes, seconds=0.4, phase=phase)
-    command, found = command_of("episodes.ros.console.export"), {}
+    command, found = command_of("rpbi_data.console.export"), {}
     assert command is not None
     for name in MAKERS:
         found[name] = folder / name

@@ -6,15 +6,15 @@ from pathlib import Path
 
 from worlds import FLOOR, box, write_world
 
-from episodes.farm.job import FarmJob
-from episodes.farm.policy import Policy
-from episodes.farm.run import EpisodeRun
-from episodes.files import store_files
-from episodes.folder import BAG, EpisodeFolder
-from episodes.ros.bags import measure_topics
-from episodes.ros.farm.bag import EpisodeBag
-from episodes.ros.farm.maker import new_world
 from rpbi.world.loading import load_world
+from rpbi_data.episodes.bags import measure_topics
+from rpbi_data.episodes.files import store_files
+from rpbi_data.episodes.folder import BAG, EpisodeFolder
+from rpbi_data.farm.job import FarmJob
+from rpbi_data.farm.policy import Policy
+from rpbi_data.farm.ros.bag import EpisodeBag
+from rpbi_data.farm.ros.maker import new_world
+from rpbi_data.farm.run import EpisodeRun
 
 TICKS = 60
 ARM = """<robot name="arm"><link name="base"/><link name="upper"><inertial><mass value="1"/>

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from episodes.folder import BAG, EARLIER, FACTS, EpisodeFolder
 from robustness.hostile_bags.records import text
 from robustness.hostile_bags.sessions import DATA, NUMBERS_OF_WORLDS, PHYSICS, rewrite, serialised
 from ros_pybullet_interface.msg import SimulationState, WorldCommand, WorldCommands
+from rpbi_data.episodes.folder import BAG, EARLIER, FACTS, EpisodeFolder
 
 FIRST, PART = "episode_000000", ".episode_000001.part"
 HASH = "0" * 64

@@ -12,10 +12,10 @@ from typing import Any
 
 from custom_ros_tools.console.modules import command_of
 from custom_ros_tools.plugins import trust_only
-from episodes import episodes_to_dataframes
-from episodes.folder import EpisodeFolder
-from episodes.ros.verification import verify
 from robustness.hostile_bags.trial import Trial, tried
+from rpbi_data import episodes_to_dataframes
+from rpbi_data.episodes.folder import EpisodeFolder
+from rpbi_data.episodes.verified_messages import verify
 
 from .makers import Hostile
 
@@ -38,7 +38,7 @@ _CHANGES = {
 
 def _command(name: str, *words: str) -> Callable[[Path], None]:
     def run(demos: Path) -> None:
-        command = command_of(f"episodes.ros.console.{name}")
+        command = command_of(f"rpbi_data.console.{name}")
         assert command is not None
         sys.exit(command.run([str(demos), *words]))
 

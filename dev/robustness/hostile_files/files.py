@@ -39,7 +39,7 @@ from rpbi.ros.node import SimulatorNode
 from rpbi.world import World
 from rpbi.world.loading import load_world
 from rpbi.world.saved.values import to_text
-from rpbi_utils import bag_to_dataframes, topic_report
+from rpbi_data import bag_to_dataframes, topic_report
 
 DATA = Path(pybullet_data.getDataPath())
 URDFS = ("kuka_iiwa/model.urdf", "cube.urdf", "cartpole.urdf", "teddy_vhacd.urdf")
@@ -421,7 +421,7 @@ def _read_bag(path: Path) -> None:
             read(str(path))
         except InterfaceError as error:
             refusals.append(error)
-    if command_of("rpbi_utils.ros.console.replay").run([str(path), "--quiet"]):
+    if command_of("rpbi_data.console.replay").run([str(path), "--quiet"]):
         refusals.append(InterfaceError("replay refuses it"))
     if refusals:
         raise refusals[0]

@@ -12,8 +12,8 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/episodes/src"))
-from episodes.datasets.coarse_images import coarse, image_faults
-from episodes.datasets.provenance import changes, read_episode, read_export, read_images
+from rpbi_data.datasets.coarse_images import coarse, image_faults
+from rpbi_data.datasets.provenance import changes, read_episode, read_export, read_images
 
 try:
     import torchvision

@@ -14,7 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/episodes/src"))
-from episodes.datasets.provenance import read_episode, read_export
+from rpbi_data.datasets.provenance import read_episode, read_export
 
 
 def main(folder: Path) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/custom_ros_tools/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "src/episodes/src"))
-from episodes.datasets.provenance import changes, frame_changes, frame_checksums, read_episode, read_export
+from rpbi_data.datasets.provenance import changes, frame_changes, frame_checksums, read_episode, read_export
 
 
 def main(folder: Path) -> int:

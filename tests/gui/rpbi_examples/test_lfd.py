@@ -10,8 +10,7 @@ from PIL import Image
 from ros_system import RPBI, RosSystem, wait_until
 from std_srvs.srv import Trigger
 
-from episodes import EpisodeFolder
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import EpisodeFolder, bag_to_dataframes
 
 SLOW = "real_time_factor:=0.5"
 """Half as fast, since a person cannot push straight where other tests take the processor."""

@@ -14,9 +14,9 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
-from episodes import EpisodeFolder
 from operator_node.emulators.spacenavd import SpacenavDaemon
 from operator_node.parser import reconstruct_interface_log_msg
+from rpbi_data import EpisodeFolder
 
 SLOW_S = 120.0
 REQUESTED, GUARDED, MEASURED = (

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from worlds import BOX_FLOOR, box, iiwa, write_world
 
 from ros_pybullet_interface.msg import SimulationState
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import bag_to_dataframes
 
 TITLE = "ROS-PyBullet Interface Controls"
 CAMERA = {

@@ -15,7 +15,7 @@ from PIL import Image
 from ros_system import wait_until
 
 from custom_ros_tools.console.modules import command_of
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import bag_to_dataframes
 
 ROOT = Path(__file__).resolve().parents[3]
 JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]

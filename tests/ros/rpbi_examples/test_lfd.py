@@ -22,10 +22,9 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.transforms import Array
-from episodes import EpisodeFolder
 from operator_node.emulators.spacenavd import SpacenavDaemon
 from ros_pybullet_interface.srv import ApplyWrench
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import EpisodeFolder, bag_to_dataframes
 from rpbi_utils.msg import DriverState
 from safe_robot.msg import Violation
 

@@ -20,10 +20,10 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from rpbi.render.camera import Intrinsics
 from rpbi.world import World
+from rpbi_data.labels.arrangement import CLEAR_M, Arrangement
+from rpbi_data.labels.bop import BopFolder
+from rpbi_data.labels.dataset import write_labelled_images
 from rpbi_examples.ros.console.label_images import label_images
-from rpbi_utils.labelled_images.arrangement import CLEAR_M, Arrangement
-from rpbi_utils.labelled_images.bop import BopFolder
-from rpbi_utils.labelled_images.dataset import write_labelled_images
 
 CLUTTER = "{rpbi_examples}/configs/clutter/config.yaml"
 IMAGES = 2
@@ -264,7 +264,7 @@ def test_unsuitable_world_is_refused_and_leaves_no_files(small, tmp_path, what):
 
 
 def test_objects_that_never_rest_are_named(small, tmp_path, monkeypatch):
-    monkeypatch.setattr("rpbi_utils.labelled_images.arrangement.PATIENCE_S", 0.2)
+    monkeypatch.setattr("rpbi_data.labels.arrangement.PATIENCE_S", 0.2)
     with pytest.raises(InterfaceError, match="'(ball|box)' does not come to rest within 0.2 s, in 5 attempts"):
         write_labelled_images(small(), tmp_path / "set", 1)
     assert [path.name for path in tmp_path.iterdir()] == ["world.yaml"]

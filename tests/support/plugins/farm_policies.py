@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from episodes.farm import Policy
+from rpbi_data.farm import Policy
 
 FAULTY = 2
 """Number of the first episodes in which a policy fails."""

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel
-from episodes.datasets.format import DatasetFormat, ExportedEpisode, Schema
+from rpbi_data.datasets.format import DatasetFormat, ExportedEpisode, Schema
 
 
 class TableConfig(ConfigModel):

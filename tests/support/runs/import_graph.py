@@ -47,6 +47,21 @@ class ImportGraph:
                 found[target].add(name)
         return found
 
+    def leading_to(self, found: dict[str, str]) -> dict[str, str]:
+        """Returns some modules and all that import them, directly or by way of others.
+
+        Args:
+            found: A reason by module; the reason of an importer is the module that it imports.
+        """
+        found, waiting = dict(found), list(found)
+        while waiting:
+            target = waiting.pop()
+            for name in self.importers[target] - found.keys():
+                if target in {self._known(each) for each in imported_names(self.files[name], name, typing=False)}:
+                    found[name] = target
+                    waiting.append(name)
+        return found
+
     def circles(self) -> list[list[str]]:
         """Returns the groups of modules that import each other, directly or by way of others."""
         return circles_of(self.imports)
@@ -66,14 +81,6 @@ class ImportGraph:
                 if depth:
                     found[".".join(path[:depth])][path[depth]].add(target[depth])
         return found
-
-    def crowded_folders(self, most: int) -> dict[str, list[Path]]:
-        """Returns the files of packages with more modules than `most`, `__init__` not counted."""
-        files: dict[str, list[Path]] = defaultdict(list)
-        for name, path in self.files.items():
-            if path.name != "__init__.py":
-                files[name.rpartition(".")[0]].append(path)
-        return {package: paths for package, paths in files.items() if len(paths) > most}
 
     def small_with_one_importer(self, most_lines: int) -> list[str]:
         """Returns the modules of at most so many lines that only one other module imports."""
@@ -118,18 +125,26 @@ def _reachable(graph: Mapping[str, Set[str]], start: str) -> set[str]:
     return reached
 
 
-def imported_names(path: Path, module: str) -> Iterator[str]:
+def imported_names(path: Path, module: str, *, typing: bool = True) -> Iterator[str]:
     """Yields the full names of all that a file imports; those of relative imports are resolved.
 
     Args:
         path: The file.
         module: Full name of its module.
+        typing: Whether imports for typing alone count.
     """
     package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
+    tree = ast.parse(path.read_text())
+    if not typing:
+        tree.body = [node for node in tree.body if not _is_for_typing(node)]
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             outer = package[: len(package) - node.level + 1] if node.level else []
             source = ".".join([*outer, *filter(None, [node.module])])
             yield from (f"{source}.{alias.name}" for alias in node.names)
+
+
+def _is_for_typing(node: ast.stmt) -> bool:
+    return isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"

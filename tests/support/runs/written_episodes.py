@@ -12,9 +12,9 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from episodes.folder import BAG, EpisodeFolder
-from episodes.ros.bags import measure_topics
 from ros_pybullet_interface.msg import Contacts, SimulationState
+from rpbi_data.episodes.bags import measure_topics
+from rpbi_data.episodes.folder import BAG, EpisodeFolder
 
 JOINTS = ("shoulder", "elbow", "wrist")
 STATES, TARGETS = "/rpbi/arm/joint_states", "/rpbi/arm/joint_states/target"

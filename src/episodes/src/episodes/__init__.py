@@ -1,23 +1,16 @@
-"""Demonstrations as episodes: recorded, listed, read as one table, and verified.
+"""Former names of episodes.
 
-The names in `__all__` can be imported from here; each is loaded when it is used, ROS included.
+The names in `__all__` are those of `rpbi_data`, and are loaded from there when they are used.
 """
 
-from __future__ import annotations
+from typing import Any
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+import rpbi_data
 
-if TYPE_CHECKING:
-    from episodes.folder import EpisodeFolder
-    from episodes.ros.bags import episodes_to_dataframes
-
-__all__ = ["EpisodeFolder", "episodes_to_dataframes"]
-
-_HOMES = {"EpisodeFolder": "episodes.folder", "episodes_to_dataframes": "episodes.ros.bags"}
+__all__ = ["EpisodeFolder", "episodes_to_dataframes"]  # noqa: F822
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(rpbi_data, name)

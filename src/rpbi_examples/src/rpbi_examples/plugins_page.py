@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from custom_ros_tools.plugins.table import PluginTable
-from episodes.datasets.formats import FORMATS
 from ik_ros.solvers import SOLVERS
 from ik_ros.tasks import TASKS
 from motion_primitives.primitives import PRIMITIVES
@@ -16,6 +15,7 @@ from rpbi.control.controllers import CONTROLLERS
 from rpbi.gym.tasks import TASKS as GYM_TASKS
 from rpbi.reference.markdown import WRITTEN_BY, code, page, table
 from rpbi.sensors import SENSOR_TYPES
+from rpbi_data.datasets.formats import FORMATS
 from rpbi_examples.scenes import SCENES
 from safe_robot.checks import CHECKS
 

@@ -15,7 +15,7 @@ from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState
 from std_srvs.srv import Trigger
 
-from rpbi_utils import Recorder
+from rpbi_data import Recorder
 
 
 def test_segmentation_of_empty_pixels_is_65535(ros, placed):

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from worlds import ball, iiwa, write_world
 
-from rpbi_utils import Recorder
+from rpbi_data import Recorder
 
 STATES = {
     "running": {},  # in real time

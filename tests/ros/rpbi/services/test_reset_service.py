@@ -21,7 +21,7 @@ from worlds import BOX_FLOOR, ball, box, iiwa
 
 from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import GetStateHash, ResetJointState, StepN
-from rpbi_utils import Recorder
+from rpbi_data import Recorder
 
 JOINT = "lbr_iiwa_joint_1"
 LISTEN = """

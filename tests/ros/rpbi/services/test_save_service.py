@@ -16,11 +16,11 @@ from std_srvs.srv import Trigger
 from worlds import BOX_FLOOR, ball, box, iiwa
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.ros.console.restore import restore
-from episodes.ros.console.save import save
 from ros_pybullet_interface.srv import GetStateHash, StepN
 from rpbi.world import World
 from rpbi.world.saved.state import WorldState
+from rpbi_utils.ros.console.restore import restore
+from rpbi_utils.ros.console.save import save
 
 JOINT = "lbr_iiwa_joint_1"
 

@@ -1,4 +1,4 @@
-"""The modules of commands: `ros/console/NAME.py` of a package has the function NAME."""
+"""The modules of commands: `console/NAME.py` or `ros/console/NAME.py` of a package has the function NAME."""
 
 import importlib
 import pkgutil
@@ -7,8 +7,8 @@ from typing import Any
 
 from .command import Command
 
-FOLDER = "ros/console"
-"""Folder of the modules within a Python package. Modules without a function of their own name have no command."""
+FOLDERS = ("console", "ros/console")
+"""Folders of the modules within a Python package. Modules without a function of their own name have no command."""
 
 
 def workspace() -> Path:
@@ -18,8 +18,14 @@ def workspace() -> Path:
 
 def module_names(root: Path) -> list[str]:
     """Returns the full names of the modules of a workspace that may have commands."""
-    files = sorted(root.glob(f"src/*/src/*/{FOLDER}/*.py"))
-    return [".".join(file.with_suffix("").parts[-4:]) for file in files if file.stem != "__init__"]
+    files = {file for folder in FOLDERS for file in root.glob(f"src/*/src/*/{folder}/*.py")}
+    own = Path(__file__).parent  # the console itself
+    names = [
+        ".".join(file.relative_to(root).with_suffix("").parts[3:])
+        for file in files
+        if file.stem != "__init__" and file.parent.parts[-2:] != own.parts[-2:]
+    ]
+    return sorted(names)
 
 
 def modules_of(package: str) -> list[str]:

@@ -20,9 +20,9 @@ def run_console(module: str, words: Sequence[str] | None = None) -> None:
     run_command(f"{module}:{module.rpartition('.')[2]}", lambda function: Command(function).run(given))
 
 
-def run_console_of(package: str) -> None:
-    """Runs the command of a package that the first argument of the process names, and exits."""
-    _run_one_of(modules_of(package))
+def run_console_of(*packages: str) -> None:
+    """Runs the command of some packages that the first argument of the process names, and exits."""
+    _run_one_of(module for package in packages for module in modules_of(package))
 
 
 def run_console_of_workspace() -> None:

@@ -1,5 +1,3 @@
-"""Episodes made by a policy in many worlds at once."""
+"""Former names of `rpbi_data.farm`."""
 
-from .policy import Policy
-
-__all__ = ["Policy"]
+from rpbi_data.farm import Policy as Policy

@@ -340,4 +340,4 @@ def _trajectory_message(trajectory: MotionPlan) -> JointTrajectory:
 
 def main() -> None:
     """Runs the node."""
-    run_node(NODE, PrimitivesNode, loggers=["rpbi_utils"])
+    run_node(NODE, PrimitivesNode, loggers=["rpbi_data"])

@@ -25,7 +25,7 @@ from motion_primitives.node_configs import (
     SourceConfig,
 )
 from motion_primitives.space import Space
-from rpbi_utils import bag_to_dataframes
+from rpbi_data import bag_to_dataframes
 
 TF = "/tf"
 QUEUE_SIZE = 10

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from custom_ros_tools.errors import InterfaceError, hint, shortened
-from rpbi_utils.bags.layout import NUMBER_DTYPES, Leaf, lay_out
-from rpbi_utils.bags.message_type import SCALAR, Field, MessageType
-from rpbi_utils.bags.row_plan import STAMP, plan_rows
+from rpbi_data.bags.layout import NUMBER_DTYPES, Leaf, lay_out
+from rpbi_data.bags.message_type import SCALAR, Field, MessageType
+from rpbi_data.bags.row_plan import STAMP, plan_rows
 
 MAX_LINES = 16
 """Largest number of lines of one name, which may denote all numbers of an array or of a part of a message."""

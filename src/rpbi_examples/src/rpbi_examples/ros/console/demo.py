@@ -30,11 +30,11 @@ from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from robot_model.geometry import Pose
 from rpbi.ros.publishers.status import MAX_CLOCK_HZ
 from rpbi.world.loading import LoadedWorld, load_world
+from rpbi_data import Recorder, bag_to_dataframes
+from rpbi_data.bags.bag_reader import BagReader
 from rpbi_examples import demo_report
 from rpbi_examples.draw_rate import draw_rate_hz
 from rpbi_examples.ros.joint_targets import HZ as TARGET_HZ
-from rpbi_utils import Recorder, bag_to_dataframes
-from rpbi_utils.ros.bags.bag_reader import BagReader
 
 EXAMPLE = "basic_example_kuka_lwr"
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"

@@ -8,7 +8,7 @@ from typing import Annotated
 from tqdm import tqdm
 
 from custom_ros_tools.console.argument import Argument, UsageError
-from rpbi_utils.labelled_images.dataset import write_labelled_images
+from rpbi_data.labels.dataset import write_labelled_images
 
 
 def label_images(

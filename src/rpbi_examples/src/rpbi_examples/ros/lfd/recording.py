@@ -11,11 +11,10 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.transforms import yaw_of
-from episodes import EpisodeFolder
-from episodes.folder import BAG
+from rpbi_data import EpisodeFolder, bag_to_dataframes, transforms_between
+from rpbi_data.episodes.folder import BAG
 from rpbi_examples.lfd.report import BoxError, Run, write_tables
 from rpbi_examples.lfd.skill import PushPlan
-from rpbi_utils import bag_to_dataframes, transforms_between
 
 from .arm import ORIGIN, TIP
 from .box import FRAME, NAME

@@ -5,4 +5,4 @@ from custom_ros_tools.ros.console import run_console_of
 
 def main() -> None:
     """Runs the command that the first argument names, for the program `world`."""
-    run_console_of(__name__)
+    run_console_of(__name__, "rpbi_data.console")

@@ -31,7 +31,7 @@ def main() -> None:
     """Runs the node; exits with 1 if it cannot start or has no display, with 0 when it is interrupted or closed."""
     if missing := missing_for_windows():
         sys.exit(f"{NAME}: {missing}")
-    run_node(NAME, _open, _show, ros_time=False, loggers=["rpbi_utils"])
+    run_node(NAME, _open, _show, ros_time=False, loggers=["rpbi_utils", "rpbi_data"])
 
 
 def _open() -> tuple[Any, Any, Any]:

@@ -22,7 +22,9 @@ def main() -> None:
     arguments = _parser().parse_args(rospy.myargv(sys.argv)[1:])
     if missing := missing_for_windows():
         sys.exit(f"{NAME}: {missing}")
-    run_node(NAME, partial(_open, arguments), _show, anonymous=True, ros_time=False, loggers=["rpbi_utils"])
+    run_node(
+        NAME, partial(_open, arguments), _show, anonymous=True, ros_time=False, loggers=["rpbi_utils", "rpbi_data"]
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -7,7 +7,7 @@ import rospy
 from PyQt5.QtWidgets import QCheckBox, QGridLayout, QLineEdit, QPushButton
 from std_msgs.msg import String
 
-from rpbi_utils.ros.bags.recorder import Recorder
+from rpbi_data.bags.recorded_topics import Recorder
 from rpbi_utils.ros.plain_text import plain_label
 
 from ..link import SimulatorLink, SimulatorSnapshot

@@ -1,1 +1,0 @@
-"""Episodes in ROS: the recorder, repairs, tables and verification."""

@@ -1,1 +1,0 @@
-"""Episodes of a farm as bags, and the processes that write them."""

@@ -1,0 +1,170 @@
+"""Writes topics to a bag; `Recorder` starts it as a process of its own.
+
+All messages that arrive are kept until they are written. `rosbag record` keeps 100 of each topic, and loses messages
+when it gets no processor time for a while.
+"""
+
+from __future__ import annotations
+
+import argparse
+import queue
+import shutil
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import genpy
+import rosbag
+import rospy
+from rosgraph_msgs.msg import Clock
+
+from custom_ros_tools.ros.lifecycle.timed_master import allow_large_integers
+
+from .recorded_topics import NOT_RECORDING
+
+_POLL_S = 0.1
+_FLUSH_S = 0.2
+"""Time between two writes of the open chunk, which a recorder that is killed would lose [s]."""
+_CLOCK = "/clock"
+_HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
+
+
+class _Arrival(NamedTuple):
+    """A received message; its time is zero before the first /clock."""
+
+    topic: str
+    time: genpy.Time
+    message: rospy.AnyMsg
+
+
+class BagWriter:
+    """Writes topics to a bag until `end`, compressed by LZ4; the bag is `NAME.bag.active` until it is closed.
+
+    It keeps the time itself, in a node with `disable_rostime`: rospy would subscribe to /clock before the bag is there.
+
+    Args:
+        path: The bag.
+        min_space_mb: Free space of the disk below which it ends [MB].
+    """
+
+    def __init__(self, path: Path, min_space_mb: float) -> None:
+        self._path, self._min_space_mb = path, min_space_mb
+        self._arrivals: queue.SimpleQueue[_Arrival] = queue.SimpleQueue()
+        self._connections: dict[tuple[str, ...], Any] = {}
+        self._is_ended = threading.Event()
+        self._is_time_simulated = False
+        self._simulated_time = genpy.Time()
+
+    def end(self) -> None:
+        """Makes `run` write the received messages, close the bag, and return."""
+        self._is_ended.set()
+
+    def run(self, topics: Sequence[str]) -> None:
+        """Writes topics until `end`.
+
+        Raises:
+            OSError: If the bag cannot be written, or there is too little space.
+        """
+        self._require_space()
+        self._is_time_simulated = bool(rospy.get_param("/use_sim_time", False))
+        callbacks = {topic: partial(self._on_message, topic) for topic in topics}
+        if self._is_time_simulated:
+            callbacks[_CLOCK] = partial(self._on_clock, callbacks.get(_CLOCK))
+        for topic, callback in callbacks.items():
+            rospy.Subscriber(topic, rospy.AnyMsg, callback, queue_size=None, tcp_nodelay=True)
+        while not self._now():
+            if self._is_ended.wait(_POLL_S):
+                return
+        active = self._path.with_name(f"{self._path.name}.active")
+        with rosbag.Bag(str(active), "w", compression="lz4") as bag:
+            self._write_all(bag)
+        active.rename(self._path)
+
+    def _write_all(self, bag: rosbag.Bag) -> None:
+        flushed_s = time.monotonic()
+        untimed: list[_Arrival] = []  # received before the first /clock: they get the time of the next message
+        while not (self._is_ended.is_set() and self._arrivals.empty()):
+            try:
+                arrival = self._arrivals.get(timeout=_POLL_S)
+                untimed.append(arrival)
+                if arrival.time:
+                    for each in untimed:
+                        self._write(bag, each, arrival.time)
+                    untimed.clear()
+            except queue.Empty:
+                pass
+            if (now_s := time.monotonic()) - flushed_s > _FLUSH_S:
+                flushed_s = now_s
+                bag.flush()
+                self._require_space()
+        for each in untimed:
+            self._write(bag, each, self._now())
+
+    def _write(self, bag: rosbag.Bag, arrival: _Arrival, at: genpy.Time) -> None:
+        """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
+        header = arrival.message._connection_header
+        key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
+        known = bag._topic_connections  # by default, Bag.write has one connection per topic
+        known.pop(arrival.topic, None)
+        if key in self._connections:
+            known[arrival.topic] = self._connections[key]
+        described = {"topic": arrival.topic, **{each: header[each] for each in _HEADER if each in header}}
+        raw = (
+            header["type"],
+            bytes(arrival.message._buff),
+            header["md5sum"],
+            SimpleNamespace(_md5sum=header["md5sum"]),
+        )
+        bag.write(arrival.topic, raw, at, raw=True, connection_header=described)
+        self._connections[key] = known[arrival.topic]
+
+    def _now(self) -> genpy.Time:
+        """Returns ROS time; it is zero before the first /clock."""
+        return self._simulated_time if self._is_time_simulated else rospy.Time.from_sec(time.time())
+
+    def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:
+        self._arrivals.put(_Arrival(topic, self._now(), message))
+
+    def _on_clock(self, record: Callable[[rospy.AnyMsg], None] | None, message: rospy.AnyMsg) -> None:
+        if message._connection_header["type"] == Clock._type:
+            self._simulated_time = Clock().deserialize(message._buff).clock
+        if record is not None:
+            record(message)
+
+    def _require_space(self) -> None:
+        free_mb = shutil.disk_usage(self._path.parent).free / 1e6
+        if free_mb < self._min_space_mb:
+            raise OSError(f"expected at least {self._min_space_mb:g} MB of free space, got {free_mb:.0f} MB")
+
+
+def main(words: Sequence[str]) -> int:
+    """Records until SIGTERM or SIGINT; returns the exit code, 1 if the bag cannot be written."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("node")
+    parser.add_argument("path", type=Path)
+    parser.add_argument("min_space_mb", type=float)
+    parser.add_argument("topics", nargs="+")
+    options = parser.parse_args(words)
+    writer = BagWriter(options.path, options.min_space_mb)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: writer.end())
+    allow_large_integers()  # of bytes received, about which the recorder asks
+    rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
+    try:
+        writer.run(options.topics)
+    except OSError as error:
+        print(f"{NOT_RECORDING}{error}", flush=True)
+        return 1
+    finally:
+        rospy.signal_shutdown("the recording has ended")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,377 @@
+"""Serialised messages to pandas tables, many at a time and without ROS; and tables to files."""
+
+import logging
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.files import atomic_file
+
+from .clock import clock_of
+from .layout import BYTES, NUMBER_DTYPES, Leaf
+from .limits import MAX_COLUMNS, Budget, LimitError
+from .message_type import MessageType
+from .nanoseconds import PER_SECOND, to_seconds
+from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
+
+Array = NDArray[Any]
+_Piece = tuple[int, Array]
+"""Values of a column, and the row that they begin with."""
+
+FORMATS = ("parquet", "csv", "hdf5")
+BATCH_MESSAGES = 16_384
+BATCH_BYTES = 32 * 1024 * 1024
+MAX_STEM_LENGTH = 200
+"""Largest number of characters of a file's name from the topic, before a number; file systems allow 255 bytes."""
+MAX_PIECES = 500_000
+"""Largest number of pieces of all columns, some 200 bytes each beside their values; beyond it they are merged."""
+OWN_COLUMNS = 3
+"""Columns that the builder adds: time, time of recording, number of the message."""
+
+_log = logging.getLogger(__name__)
+
+
+class _Block(NamedTuple):
+    """Messages of one layout.
+
+    Attributes:
+        rows: The columns of each row that one of them gives.
+        matrix: The messages, shape (n, size), uint8.
+        indices: Their places in the batch, shape (n,), ascending.
+    """
+
+    rows: list[Columns]
+    matrix: Array
+    indices: Array
+
+
+class TableBuilder:
+    """Collects the serialised messages of one topic and turns them into one table.
+
+    Messages are read in batches, those of one layout (see `rpbi_data.bags.layout`) at once. Strings and numbers are
+    unchanged; a value that a message lacks is NaN (None in columns of text).
+
+    Args:
+        topic: Name of the topic, for the log.
+        keep_binary: Whether binary arrays become columns of `bytes`; else they are left out.
+        budget: Limits of time and cells, if any.
+        is_plain: Whether every message is one row, with columns named by its fields alone.
+        in_nanoseconds: Whether the index is int64 [ns] instead of a float [s].
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        keep_binary: bool = False,
+        budget: Budget | None = None,
+        is_plain: bool = False,
+        in_nanoseconds: bool = False,
+    ) -> None:
+        self._topic = topic
+        self._in_nanoseconds = in_nanoseconds
+        self._is_plain = is_plain
+        self._budget = budget
+        self._keep_binary = keep_binary
+        self._batch: list[tuple[MessageType, bytes, int]] = []
+        self._batch_bytes = 0
+        self._messages = 0
+        self._rows = 0
+        self._time: list[Array] = []
+        self._record_time: list[Array] = []
+        self._message: list[Array] = []
+        self._columns: dict[str, list[_Piece]] = {}
+        self._pieces = self._merged_rows = 0
+        self._appeared: dict[str, tuple[int, int]] = {}
+        self._notes: Counter[str] = Counter()
+        self._types: Counter[str] = Counter()
+
+    def add(self, message_type: MessageType, raw: bytes, record_time_ns: int) -> None:
+        """Adds a serialised message with the time at which it was recorded [ns].
+
+        Raises:
+            LimitError: If the table has too many columns, or one with too long a name; so does `table`.
+            BagError: If the budget is used up; so does `table`.
+        """
+        self._batch.append((message_type, raw, record_time_ns))
+        self._batch_bytes += len(raw)
+        if len(self._batch) >= BATCH_MESSAGES or self._batch_bytes >= BATCH_BYTES:
+            self._read_batch()
+
+    def table(self) -> pd.DataFrame:
+        """Returns all rows in the order of time; to be called once, after the last message.
+
+        The index `time` is the stamp of the header [s], or the record time where there is none or it is 0; with
+        `in_nanoseconds`, int64 [ns].
+        The column `record_time` [s] is the first; the others are grouped by field. A warning names a clock that was
+        set back, and messages of several types.
+        """
+        self._read_batch()
+        for note, times in self._notes.items():
+            _log.warning("%s: %s (messages: %d)", self._topic, note, times)
+        if len(self._types) > 1:
+            came = ", ".join(f"{name} (messages: {count})" for name, count in sorted(self._types.items()))
+            _log.warning("%s: expected messages of one type, got %s", self._topic, came)
+        time = np.concatenate([*self._time, np.empty(0, np.int64)])
+        record_time = to_seconds(np.concatenate([*self._record_time, np.empty(0, np.int64)]))
+        order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
+        names = sorted(self._columns, key=self._appeared.__getitem__)
+        fields = dict.fromkeys(name.split("/")[0] for name in names)
+        places = {field: place for place, field in enumerate(fields)}
+        names.sort(key=lambda name: places[name.split("/")[0]])  # stable
+        columns = {name: _join(self._columns.pop(name), self._rows)[order] for name in names}
+        index = pd.Index(to_seconds(time[order]), name=INDEX)
+        table = pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index)
+        if (clock := clock_of(table)).is_fault:
+            _log.warning("%s: %s", self._topic, clock)
+        return table.set_axis(pd.Index(time[order], name=INDEX)) if self._in_nanoseconds else table
+
+    def _read_batch(self) -> None:
+        """Reads the messages that are waiting, sorted by type and size."""
+        groups: dict[tuple[MessageType, int], list[int]] = {}
+        for index, (message_type, raw, _) in enumerate(self._batch):
+            groups.setdefault((message_type, len(raw)), []).append(index)
+        for (message_type, size), indices in groups.items():
+            self._types[message_type.name] += len(indices)
+            joined = b"".join(self._batch[index][1] for index in indices)
+            matrix = np.frombuffer(joined, np.uint8).reshape(len(indices), size)
+            for block in self._split_by_layout(message_type, matrix, np.array(indices)):
+                self._read_block(block)
+        self._merge_pieces()
+        self._messages += len(self._batch)
+        self._batch, self._batch_bytes = [], 0
+
+    def _read_block(self, block: _Block) -> None:
+        """Reads all rows of messages of one layout.
+
+        Raises:
+            LimitError, BagError: If there are too many columns or cells, or the time is over.
+        """
+        first, places = self._messages + int(block.indices[0]), count()
+        for row in block.rows:
+            for name in row:
+                place = first, next(places)
+                self._appeared[name] = min(self._appeared.get(name, place), place)
+            self._read_rows(row, block.matrix, block.indices)
+        if len(self._columns) > MAX_COLUMNS:
+            raise LimitError.over(f"{MAX_COLUMNS:,} columns", f"{len(self._columns):,}")
+        if self._budget is not None:
+            self._budget.set_cells(self._topic, self._rows, len(self._columns) + OWN_COLUMNS)
+        self._pieces += sum(map(len, block.rows))
+        if self._pieces > MAX_PIECES:
+            self._merge_pieces()
+
+    def _merge_pieces(self) -> None:
+        """Merges the pieces that were added to each column since the last time, since each piece needs memory of its
+        own.
+        """
+        first, rows = self._merged_rows, self._rows - self._merged_rows
+        for pieces in self._columns.values():
+            new = [(start - first, values) for start, values in pieces if start >= first]
+            if len(new) > 1:
+                pieces[-len(new) :] = [(first, _join(new, rows))]
+        self._merged_rows, self._pieces = self._rows, 0
+
+    def _split_by_layout(self, message_type: MessageType, matrix: Array, indices: Array) -> Iterator[_Block]:
+        """Yields messages of one type and size, one layout at a time; for the arguments see `_Block`."""
+        while len(indices):
+            if self._budget is not None:
+                self._budget.check_time(self._topic)
+            try:
+                plan = plan_rows(message_type, self._batch[indices[0]][1], self._is_plain)
+            except LimitError:
+                raise
+            except ValueError as error:
+                _log.debug("%s: message %d: %s", self._topic, self._messages + indices[0], error)
+                self._notes["a message does not fit its type: left out"] += 1
+                matrix, indices = matrix[1:], indices[1:]
+                continue
+            same = np.ones(len(indices), bool)
+            for start, stop in plan.fixed:
+                same &= (matrix[:, start:stop] == matrix[0, start:stop]).all(axis=1)
+                if np.count_nonzero(same) == 1:
+                    break
+            alike = int(np.count_nonzero(same))
+            for note in plan.notes:
+                self._notes[note] += alike
+            if alike == len(indices):
+                yield _Block(plan.rows, matrix, indices)
+                return
+            if alike == 1:  # a view, which copies nothing
+                yield _Block(plan.rows, matrix[:1], indices[:1])
+                matrix, indices = matrix[1:], indices[1:]
+                continue
+            yield _Block(plan.rows, matrix[same], indices[same])
+            matrix, indices = matrix[~same], indices[~same]
+
+    def _read_rows(self, row: Columns, matrix: Array, indices: Array) -> None:
+        """Reads one row of each message; for the arguments see `_Block`."""
+        record_time = np.array([self._batch[index][2] for index in indices], np.int64)
+        time = record_time
+        for name, leaf in row.items():
+            if leaf.kind == BYTES and not self._keep_binary:
+                self._notes[f"'{name}' is binary or long: left out, unless asked for"] += len(indices)
+                continue
+            if name == STAMP and leaf.kind == "time":
+                stamps = _read_stamps(leaf, matrix)
+                time = np.where(stamps == 0, record_time, stamps)  # 0 is ROS for "no time"
+            else:
+                self._columns.setdefault(name, []).append((self._rows, _read_leaf(leaf, matrix)))
+        self._time.append(time)
+        self._record_time.append(record_time)
+        self._message.append(self._messages + indices)
+        self._rows += len(indices)
+
+
+def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
+    """Reads the same value out of messages of one layout, shape (n, size), uint8.
+
+    Returns:
+        Shape (n,): numbers of the field's own type, bool, float64 [s] for `time` and `duration`, `str` or
+        `bytes`.
+    """
+    start, stop = leaf.span
+    cells = np.ascontiguousarray(matrix[:, start:stop])
+    if leaf.kind in NUMBER_DTYPES:
+        numbers: Array = cells.view(NUMBER_DTYPES[leaf.kind])[:, 0]
+        return numbers.astype(bool) if leaf.kind == "bool" else numbers
+    if leaf.kind in ("time", "duration"):
+        seconds, nanoseconds = cells.view("<u4" if leaf.kind == "time" else "<i4").T
+        times: Array = seconds + nanoseconds / 1e9  # as `to_sec()` does it
+        return times
+    values: Array = np.empty(len(cells), object)
+    if leaf.kind == BYTES:
+        values[:] = [cell.tobytes() for cell in cells]
+    elif (cells == cells[0]).all():
+        values[:] = _text(cells[0])
+    else:
+        known: dict[bytes, str] = {}  # equal texts share their memory
+        values[:] = [known.setdefault(cell.tobytes(), _text(cell)) for cell in cells]
+    return values
+
+
+def _read_stamps(leaf: Leaf, matrix: Array) -> Array:
+    """Reads a `time` out of messages of one layout: int64, shape (n,) [ns]."""
+    start, stop = leaf.span
+    seconds, nanoseconds = np.ascontiguousarray(matrix[:, start:stop]).view("<u4").astype(np.int64).T
+    return np.asarray(seconds * PER_SECOND + nanoseconds)
+
+
+def _text(cell: Array) -> str:
+    return cell.tobytes().decode("utf-8", "replace")
+
+
+def _join(pieces: list[_Piece], rows: int) -> Array:
+    """Returns a column joined from its pieces, shape (rows,); missing values are NaN, or None in text and bool."""
+    dtypes = {values.dtype for _, values in pieces}
+    is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
+    dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
+    if sum(len(values) for _, values in pieces) < rows:
+        dtype = {"i": np.dtype(float), "u": np.dtype(float), "b": np.dtype(object)}.get(dtype.kind, dtype)
+    column: Array = np.full(rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype)
+    for start, values in pieces:
+        column[start : start + len(values)] = values
+    return column
+
+
+def file_stems(topics: Iterable[str]) -> dict[str, str]:
+    """Finds a file name for each topic: `/kuka/joint_states` becomes `kuka.joint_states`.
+
+    Names are made of letters, digits, `_`, `-` and `.`, at most `MAX_STEM_LENGTH` of them; where two would be the same,
+    the second ends with `-2`.
+    """
+    stems: dict[str, str] = {}
+    used: Counter[str] = Counter()
+    for topic in topics:
+        stem = (
+            re.sub(r"[^\w.-]", "_", topic.strip("/").replace("/", "."), flags=re.ASCII).strip(".")[:MAX_STEM_LENGTH]
+            or "_"
+        )
+        unique = stem
+        while unique in used:
+            used[stem] += 1
+            unique = f"{stem}-{used[stem]}"
+        used[unique] += 1
+        stems[topic] = unique
+    return stems
+
+
+def write_table(table: pd.DataFrame, path: Path) -> None:
+    """Writes a table with its index; the format follows from the ending of the file, `.parquet`, `.csv` or `.hdf5`.
+
+    A column of several types (two types of message on one topic) is written as text in a Parquet or HDF5 file. An HDF5
+    file has a data set a column, with `/` as the separator of groups, and the index as `time`.
+
+    Raises:
+        ValueError: If binary columns were to go into a text file, or an HDF5 file cannot have a column.
+        MissingDependency: If fastparquet or h5py is not installed.
+        OSError: If the file cannot be written; a former one stays as it was.
+    """
+    with atomic_file(path) as part:
+        _WRITERS[path.suffix](table, part)
+
+
+def _write_csv(table: pd.DataFrame, path: Path) -> None:
+    binary = [name for name in table.columns if _encoding(table[name]) == "bytes"]
+    if binary:
+        raise ValueError(f"'{binary[0]}' is binary and cannot be written as CSV: use Parquet")
+    table.to_csv(path)
+
+
+def _write_parquet(table: pd.DataFrame, path: Path) -> None:
+    try:
+        import fastparquet  # noqa: F401  (slow to load, and not needed for CSV)
+    except ImportError as error:
+        raise MissingDependency("fastparquet", "pip install fastparquet, or write CSV") from error
+    encodings = {name: encoding for name in table.columns if (encoding := _encoding(table[name]))}
+    texts = {name: table[name].map(str, na_action="ignore") for name in encodings if encodings[name] == "utf8"}
+    table.assign(**texts).to_parquet(path, engine="fastparquet", object_encoding=encodings or "infer")
+
+
+def _write_hdf5(table: pd.DataFrame, path: Path) -> None:
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingDependency("h5py", "apt install python3-h5py, or write Parquet") from error
+    kinds = {"utf8": h5py.string_dtype(), "bytes": h5py.special_dtype(vlen=np.uint8)}
+    with h5py.File(path, "w") as file:
+        for name, column in table.reset_index().items():
+            encoding = _encoding(column)
+            values = column.to_numpy()
+            if encoding == "utf8":
+                values = np.array(["" if value is None else str(value) for value in values], object)
+            elif encoding == "bytes":
+                values = _rows_of([np.frombuffer(value or b"", np.uint8) for value in values])
+            elif encoding == "bool":
+                values = np.array([np.nan if value is None else value for value in values], float)
+            try:
+                file.create_dataset(str(name), data=values, dtype=kinds.get(str(encoding)))
+            except (ValueError, TypeError) as error:
+                raise ValueError(f"'{name}' cannot be a data set of an HDF5 file: {error}; use Parquet") from error
+
+
+_WRITERS = {".parquet": _write_parquet, ".csv": _write_csv, ".hdf5": _write_hdf5}
+
+
+def _rows_of(cells: list[Array]) -> Array:
+    """Returns arrays of different lengths as an array of objects, shape (rows,)."""
+    rows: Array = np.empty(len(cells), object)
+    rows[:] = cells
+    return rows
+
+
+def _encoding(column: pd.Series) -> str | None:
+    """Returns the Parquet encoding of a column of Python objects, or None for a column of numbers."""
+    if column.dtype != np.dtype(object):
+        return None
+    kinds = {type(value) for value in column if value is not None}
+    if kinds == {bool}:
+        return "bool"
+    return "bytes" if kinds == {bytes} else "utf8"

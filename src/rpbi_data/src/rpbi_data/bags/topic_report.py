@@ -1,0 +1,82 @@
+"""Topics of a bag, and the regularity of their messages."""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .bag_reader import BagMessage, BagReader
+from .clock import SetBack, set_back
+from .nanoseconds import PER_SECOND, to_seconds
+
+Array = NDArray[Any]
+
+_STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
+_COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "first", "last")
+
+
+class TopicReport(pd.DataFrame):
+    """A table that is printed completely, on a terminal of any width; tables derived from it are ordinary."""
+
+    def __repr__(self) -> str:
+        return self.to_string()
+
+
+def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
+    """Measures every topic of a bag.
+
+    Args:
+        path: A `.bag` file, of any compression.
+        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
+
+    Returns:
+        A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
+        (serialised, before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the
+        same time), `max_gap_s` (longest time without a message in between), `set_back_s` (largest time by which a
+        message is before an earlier one, in the order of recording), `first` and `last` [s of ROS time]. Times are the
+        stamps of headers, or of recording where there is none, as for `/tf`.
+
+    Raises:
+        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
+    """
+    with BagReader(path, any_size) as bag:
+        times: dict[str, list[int]] = {topic: [] for topic in bag.types}
+        sizes = dict.fromkeys(bag.types, 0)
+        for message in bag.messages(list(bag.types)):
+            times[message.topic].append(message_time_ns(message))
+            sizes[message.topic] += len(message.raw)
+        rows = [
+            (
+                "|".join(sorted({each.name for each in types})),
+                len(times[topic]),
+                sizes[topic],
+                *_rhythm(to_seconds(times[topic]), bag.clock_of(topic)),
+            )
+            for topic, types in bag.types.items()
+        ]
+        return TopicReport(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
+
+
+def message_time_ns(message: BagMessage) -> int:
+    """Returns the stamp of a message [ns], or where it has none the time of its recording."""
+    if not message.type.has_header or len(message.raw) < _STAMP.size:
+        return message.record_time_ns
+    seconds, nanoseconds = _STAMP.unpack_from(message.raw)
+    return seconds * PER_SECOND + nanoseconds or message.record_time_ns
+
+
+def message_time(message: BagMessage) -> float:
+    """Returns the stamp of a message [s], or where it has none the time of its recording."""
+    return float(to_seconds(message_time_ns(message)))
+
+
+def _rhythm(times: Array, clock: SetBack) -> tuple[float, float, float, float, float]:
+    """Returns mean rate [Hz], longest gap, largest time by which times run back, first and last time [s]."""
+    back_s = max(set_back(times).back_s, clock.back_s)
+    ordered = np.sort(times)
+    first, last = ordered[0], ordered[-1]
+    rate_hz = (len(ordered) - 1) / (last - first) if last > first else np.nan
+    return rate_hz, np.diff(ordered).max(initial=0.0), back_s, first, last

@@ -1,0 +1,1 @@
+"""Commands for bags, episodes and data sets."""

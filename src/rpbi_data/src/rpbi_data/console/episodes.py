@@ -1,0 +1,48 @@
+"""The command `episodes`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from rpbi_data.episodes.bags import repair_all
+from rpbi_data.episodes.folder import EpisodeFolder, is_held
+from rpbi_data.episodes.listing import details_of, table_of
+
+
+def episodes(
+    folder: Annotated[Path, Argument("DIR", parse=Path)],
+    *,
+    show: Annotated[int | None, Argument("N", parse=int, excludes="action")] = None,
+    discard: Annotated[int | None, Argument("N", parse=int, excludes="action")] = None,
+    relabel: Annotated[Sequence[str], Argument("N LABEL", excludes="action")] = (),
+    repair: Annotated[bool, Argument("", excludes="action")] = False,
+) -> str:
+    """Lists the episodes of a folder; shows, discards, relabels or repairs them.
+
+    Args:
+        folder: of the episodes
+        show: all that is stored of an episode, with its topics
+        discard: moves an episode into DIR/discarded
+        relabel: gives an episode another label
+        repair: completes episodes whose recorder was killed; those that are being recorded are left alone
+    """
+    given = EpisodeFolder(folder)
+    if show is not None:
+        return details_of(given.read(show))
+    if discard is not None:
+        return f"episode {discard} is in {given.discard(discard)}"
+    if relabel:
+        if not relabel[0].isdecimal():
+            raise UsageError(f"--relabel: expected the number of an episode, got {relabel[0]}")
+        episode = given.relabel(int(relabel[0]), relabel[1])
+        return f"episode {episode.number}: {episode.label}"
+    if repair:
+        return "\n".join(repair_all(given)) or "nothing to repair"
+    text = table_of(given.all())
+    parts = given.partial()
+    active = sum(map(is_held, parts))
+    lines = [f"{active} more: being recorded"] if active else []
+    if killed := len(parts) - active:
+        lines.append(f"{killed} more: the recorder was killed (--repair)")
+    return "\n".join([text, *lines])

@@ -1,0 +1,54 @@
+"""The command `plot`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from matplotlib.figure import Figure
+
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.files import atomic_file
+from rpbi_data.bags.dataframes import bag_to_dataframes
+from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.plots import plot_tables
+
+
+def plot(
+    bag: Annotated[Path, Argument("BAG", parse=Path, files="*.bag")],
+    *,
+    topics: Annotated[Sequence[str], Argument("TOPIC ...")] = (),
+    out: Annotated[Path | None, Argument("FOLDER", parse=Path)] = None,
+    window: Annotated[bool, Argument("")] = False,
+    any_size: Annotated[bool, Argument("")] = False,
+) -> str:
+    """Draws the data of a bag: joint states, wrenches, paths of frames, contacts, rates and latencies.
+
+    It prints the files that it writes. The time axes start at the first message.
+
+    Args:
+        bag: the recording
+        topics: only these
+        out: folder of the PNG files; BAG_plots beside BAG.bag without it
+        window: shows them in windows instead, until these are closed
+        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+    """
+    tables = bag_to_dataframes(bag, topics or None, any_size=any_size)
+    if window:
+        from matplotlib import pyplot  # needs a screen
+
+        shown = [name for name, _ in plot_tables(tables, pyplot.figure)]
+        pyplot.show()
+        return "\n".join(shown)
+    folder = out or bag.with_name(f"{bag.stem}_plots")
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, figure in plot_tables(tables, Figure):
+            written.append(folder / f"{name}.png")
+            with atomic_file(written[-1]) as part:
+                figure.savefig(part, dpi=100)
+    except OSError as error:
+        raise BagError(bag, f"a figure cannot be written: {error}") from error
+    return "\n".join(map(str, written)) or f"{bag}: nothing to draw"

@@ -1,0 +1,82 @@
+"""The command `view`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.files import atomic_file
+from custom_ros_tools.plugins import trust_only
+from custom_ros_tools.ros.node import late_imports
+from rpbi.replay.parallel import TooSlowError, in_limited_fork
+from rpbi_data.episodes.errors import EpisodeError
+from rpbi_data.episodes.folder import EpisodeFolder
+
+MAX_CPU_S = 600
+"""Processor time for a page, by default [s]."""
+
+
+def view(
+    recording: Annotated[Path, Argument("DIR|BAG", parse=Path, files="*.bag")],
+    number: Annotated[int | None, Argument("N", parse=int)] = None,
+    *,
+    out: Annotated[Path | None, Argument("FILE.html", parse=Path, files="*.html")] = None,
+    ns: Annotated[str, Argument("NAMESPACE")] = "/",
+    trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+    max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
+    any_size: Annotated[bool, Argument("")] = False,
+) -> str:
+    """Writes an episode as one HTML file: its world in 3-D with a time line, forces as arrows and as plots.
+
+    A browser opens the file without a network. Needs ./rpbi setup html; needs no ROS master.
+
+    Args:
+        DIR|BAG: a folder of episodes, or a bag with rpbi/world_description
+        N: the episode; not with a bag
+        out: episode_N.html, or BAG.html for BAG.bag, without it
+        ns: of the simulator that was recorded, for a bag
+        trust: Python packages that the recording may import, for types of your own
+        max_cpu: a recording that needs more seconds of processor time is refused; 600 without it
+        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+    """
+    with late_imports():
+        from rpbi_data.view.bag_messages import scene_of_bag, scene_of_episode  # needs an extra
+        from rpbi_data.view.page import page_of
+
+    trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who made the recording")
+    is_folder = recording.is_dir()
+    if is_folder == (number is None):
+        raise UsageError(f"expected a folder and the number of an episode, or a bag, got {recording}")
+    if max_cpu < 1:
+        raise UsageError(f"--max-cpu: expected at least 1, got {max_cpu}")
+
+    def draw() -> tuple[str, float, list[str]]:
+        """Returns the page, the seconds that it shows, and its notes."""
+        try:
+            if number is not None:
+                scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
+            else:
+                scene = scene_of_bag(recording, ns, any_size=any_size)
+            page, scene = page_of(scene)
+        except InterfaceError:
+            raise
+        except Exception as error:  # a bag may have anything in it
+            raise EpisodeError(recording, f"cannot be shown: {type(error).__name__}: {error}") from error
+        return page, float(scene.times[-1]), scene.all_notes
+
+    try:
+        page, seconds, notes = in_limited_fork(draw, max_cpu)
+    except TooSlowError as error:
+        raise EpisodeError(recording, str(error)) from error
+    target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(target) as part:
+            part.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
+    lines = [f"note: {note}" for note in notes]
+    return "\n".join([f"{target}: {seconds:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])

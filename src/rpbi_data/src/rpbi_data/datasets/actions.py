@@ -1,0 +1,160 @@
+"""Actions of rows: the command, or the pose, that belongs to a row."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.errors import UnknownNameError
+from rpbi_data.bags.resampling import TIME_ERROR, resample_exactly
+
+from .format import ACTION, QUATERNION, Feature
+from .signals import (
+    ACTION_NAME,
+    AXES,
+    JOINTS,
+    KINDS,
+    NEXT,
+    OTHER_ACTIONS,
+    TARGETS_NAME,
+    Choice,
+    Column,
+    Signal,
+    Tables,
+    joint_columns,
+    joint_of,
+    names_of,
+    numbers_of,
+)
+
+Array = NDArray[Any]
+
+ROTATION_VECTOR = ("rx", "ry", "rz")
+"""Names of the parts of a rotation vector [rad]."""
+
+
+def derive_actions(
+    tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice, pose: Sequence[Column]
+) -> list[Signal]:
+    """Returns the feature `action`; none if there are no commands.
+
+    Args:
+        tables: Tables of a recording, those of TF by frame.
+        types: Types of messages by topic.
+        fixed: Names of joints that cannot move, which are left out.
+        choice: Topics and meaning of actions.
+        pose: Columns of the pose of the end effector; empty without one.
+
+    Raises:
+        UnknownNameError: If no target has a joint of the gripper.
+        ValueError: If differences are asked for, but commands are not positions of joints.
+    """
+    found = _commands(tables, types, fixed, choice)
+    arm = [each for each in found if joint_of(each[0]) not in choice.gripper]
+    gripper = [each for each in found if joint_of(each[0]) in choice.gripper]
+    for name in choice.gripper:
+        if name not in {joint_of(column) for column, _ in gripper}:
+            raise UnknownNameError("joint of targets", name, sorted({joint_of(column) for column, _ in found}))
+    if choice.is_pose:
+        arm = [(column, Column("", "")) for column in pose]
+    both = [*arm, *gripper]
+    if not both:
+        return []
+    columns, held = tuple(column for column, _ in both), tuple(measured for _, measured in both)
+    names = names_of(columns)
+    if choice.is_pose:
+        names = (*AXES, *(ROTATION_VECTOR if choice.is_delta else QUATERNION), *names_of(columns[len(pose) :]))
+    elif choice.is_delta and (others := [column for column, measured in arm if not measured.table]):
+        got = f"'{others[0].name}' of {others[0].table}"
+        raise ValueError(f"--action deltas: expected targets of joint positions, got {got}")
+    return [Signal(Feature(ACTION, names), columns, choice.timing, held, len(arm) if choice.is_delta else 0)]
+
+
+def _commands(
+    tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice
+) -> list[tuple[Column, Column]]:
+    """Returns the columns of commands, each with that of the measured position; its table is empty without one."""
+    topics = list(choice.action or ())
+    if choice.action is None:
+        joints = [topic for topic in tables if types.get(topic) == JOINTS]
+        topics = [topic for topic in joints if TARGETS_NAME.fullmatch(topic)]
+        others = [*joints, *(topic for topic in tables if types.get(topic) in OTHER_ACTIONS)]
+        topics = topics or [topic for topic in others if ACTION_NAME.fullmatch(topic)]
+    found: list[tuple[Column, Column]] = []
+    for topic in topics:
+        match = TARGETS_NAME.fullmatch(topic)
+        states = match[1] if match else ""
+        if types.get(topic) == JOINTS and states in tables:
+            kind = next((each for each in KINDS if joint_columns(tables[topic], each, ())), "position")
+            measured = states if kind == "position" else ""
+            for name in joint_columns(tables[states], "position", fixed):
+                found.append((Column(topic, name.replace("position", kind, 1)), Column(measured, name)))
+        else:
+            found += [(Column(topic, name), Column("", name)) for name in numbers_of(tables[topic])]
+    return found
+
+
+def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array) -> tuple[Array, Array]:
+    """Returns the actions of rows, and the time from each row to the command in use.
+
+    Args:
+        signal: The feature `action`.
+        tables: The tables.
+        rows: Times of the rows, int64, shape (n,) [ns].
+        next_rows: Times of the rows after these [ns].
+
+    Returns:
+        Shape (n, numbers) and shape (n,) [s].
+    """
+    resampled: dict[str, pd.DataFrame] = {}
+    errors = np.zeros(len(rows))
+    for table, names in _by_table(signal.columns).items():
+        samples = tables[table].reindex(columns=names)
+        if _is_pose(table):
+            resampled[table] = resample_exactly(samples, np.minimum(next_rows, samples.index[-1]), "linear")
+            errors = np.fmax(errors, resampled[table][TIME_ERROR].to_numpy(float))
+        else:
+            at = next_rows - 1 if signal.method == NEXT else rows
+            resampled[table] = resample_exactly(samples, at, "previous")
+            ages = resampled[table][TIME_ERROR].to_numpy(float)
+            errors = np.fmax(errors, np.abs((rows - at) / 1e9 + ages))
+    columns = []
+    for (table, name), measured in zip(signal.columns, signal.held, strict=True):
+        column = resampled[table][name].to_numpy(float)
+        if not _is_pose(table):  # before the first command a joint is held, other commands are 0
+            column = np.where(np.isnan(column), _measured(measured, tables, rows) if measured.table else 0.0, column)
+        columns.append(column)
+    matrix = np.stack(columns, axis=1)
+    return (_differences(signal, matrix, tables, rows) if signal.deltas else matrix), errors.astype(np.float32)
+
+
+def _differences(signal: Signal, matrix: Array, tables: Tables, rows: Array) -> Array:
+    """Returns actions whose first numbers are changes: of positions, or of a pose along and about axes of the world."""
+    count, (table, _) = signal.deltas, signal.columns[0]
+    if not _is_pose(table):
+        measured = [_measured(each, tables, rows) for each in signal.held[:count]]
+        return np.column_stack([matrix[:, :count] - np.stack(measured, axis=1), matrix[:, count:]])
+    names = [column.name for column in signal.columns[:count]]
+    now = resample_exactly(tables[table][names], rows, "linear")[names].to_numpy(float)
+    turn = Rotation.from_quat(matrix[:, 3:count]) * Rotation.from_quat(now[:, 3:]).inv()
+    return np.column_stack([matrix[:, :3] - now[:, :3], turn.as_rotvec(), matrix[:, count:]])
+
+
+def _measured(column: Column, tables: Tables, rows: Array) -> Array:
+    return resample_exactly(tables[column.table][[column.name]], rows, "linear")[column.name].to_numpy(float)
+
+
+def _is_pose(table: str) -> bool:
+    return "#" in table
+
+
+def _by_table(columns: Sequence[Column]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for table, name in columns:
+        found.setdefault(table, []).append(name)
+    return found

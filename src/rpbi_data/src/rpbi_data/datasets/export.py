@@ -1,0 +1,274 @@
+"""The export of a folder of episodes."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi_data.episodes.errors import DISK_FULL, EpisodeError
+from rpbi_data.episodes.folder import BAG, Episode, EpisodeFolder, file_in
+
+from .format import (
+    ACTION,
+    STAMP,
+    STAMP_NAMES,
+    STATE,
+    TIME_ERROR,
+    CameraFeature,
+    DatasetError,
+    DatasetFormat,
+    Feature,
+    Schema,
+)
+from .provenance import remove_episode, write_episode, write_export
+from .signals import Choice, Signal
+from .source import SourceEpisode
+
+
+class Wish(NamedTuple):
+    """Content of a data set, as the user wants it.
+
+    Attributes:
+        fps: Rows a second.
+        task: The task in words.
+        labels: Labels of the episodes to export; empty for all.
+        choice: Content of rows.
+        disk_reserve_mb: Free space of the disk that is never used [MB].
+        any_size: Whether bags may exceed the limits of `BagReader`.
+        max_time_error_s: Largest time between a row and the nearest message of an observation [s].
+    """
+
+    fps: int
+    task: str
+    labels: tuple[str, ...] = ()
+    choice: Choice = Choice()
+    disk_reserve_mb: float = 200.0
+    any_size: bool = False
+    max_time_error_s: float = float("inf")
+
+
+@dataclass
+class Result:
+    """Result of an export.
+
+    Attributes:
+        exported: Numbers of the episodes in the data set, in its order.
+        faults: Sentences on episodes that are not in it.
+    """
+
+    exported: list[int] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+
+class _Plan(NamedTuple):
+    """Episodes to export, and the content of their rows.
+
+    Attributes:
+        sources: The episodes.
+        signals: Features and their topics; empty for a format without rows.
+        schema: Content of the rows; None for a format without rows.
+    """
+
+    sources: list[SourceEpisode]
+    signals: tuple[Signal, ...] = ()
+    schema: Schema | None = None
+
+
+def export_folder(
+    folder: EpisodeFolder, target: Path, name: str, format_: DatasetFormat, wish: Wish, report: Callable[[str], None]
+) -> Result:
+    """Exports the episodes of a folder as a data set.
+
+    Episodes that cannot be exported are left out. The data set gets its name when it is complete.
+
+    Args:
+        folder: The folder.
+        target: Folder of the data set; it must not exist.
+        name: Name of the format.
+        format_: The format.
+        wish: Content of the data set.
+        report: Is called with a sentence for each episode.
+
+    Raises:
+        EpisodeError: If there is no such folder, the target exists, no episode can be exported, or the data set cannot
+            be completed; there is none then.
+        OSError: If the data set cannot be begun.
+    """
+    if target.exists():
+        raise DatasetError(target, "exists already: name a folder that does not")
+    result = Result()
+    plan = _plan(folder, format_, wish, result)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.parent / f".{target.name}.part"
+    shutil.rmtree(part, ignore_errors=True)  # of an export that was killed
+    part.mkdir()
+    try:
+        format_.open(part, plan.schema)
+        _add_all(part, format_, plan, wish.disk_reserve_mb, result, report)
+        if not result.exported:
+            raise EpisodeError(folder.path, "\n".join(["no episode was exported", *result.faults]))
+        try:
+            _complete(part, format_, result, lambda: _facts(folder, name, wish, plan, result))
+        except OSError as error:
+            raise DatasetError(target, f"cannot be completed: {error}") from error
+        part.rename(target)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return result
+
+
+def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Result) -> _Plan:
+    """Returns the episodes to export, and the features that most of them have."""
+    sources = []
+    for number in folder.numbers():
+        try:
+            episode = folder.read(number)
+            if wish.labels and episode.label not in wish.labels:
+                continue
+            _require_complete(folder, episode)
+            source = SourceEpisode(folder, episode, wish.choice, wish.task, wish.any_size, wish.max_time_error_s)
+            if format_.has_rows:
+                source.signals, source.cameras  # noqa: B018 (reads the bag)
+                _forget(source)
+            elif episode.set_back_s:
+                raise EpisodeError(source.bag, f"a clock was set back by {episode.set_back_s:.6g} s")
+            else:
+                source.check()
+            sources.append(source)
+        except Exception as error:  # an episode may have anything in it
+            result.faults.append(_fault(number, error))
+    if not sources:
+        wanted = f" with the label {' or '.join(wish.labels)}" if wish.labels else ""
+        raise EpisodeError(folder.path, "\n".join([f"no episode{wanted} can be exported", *result.faults]))
+    if not format_.has_rows:
+        return _Plan(sources)
+    most, _ = Counter(map(_content, sources)).most_common(1)[0]
+    signals = next(each.signals for each in sources if _content(each) == most)
+    features, cameras = most
+    keys = {feature.key for feature in features}
+    for key, option in ((STATE, "--state"), (ACTION, "--action")):
+        if key not in keys:
+            raise EpisodeError(folder.path, f"no topic for '{key}' in the recordings: name one by {option} TOPIC")
+    errors = (*(feature.key for feature in features), *(camera.key for camera in cameras))
+    own = (Feature(STAMP, STAMP_NAMES, "int64"), Feature(TIME_ERROR, errors))
+    return _Plan(sources, signals, Schema(wish.fps, (*features, *own), cameras))
+
+
+def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFeature, ...]]:
+    """Returns the features and cameras of an episode."""
+    return tuple(signal.feature for signal in source.signals), source.cameras
+
+
+def _require_complete(folder: EpisodeFolder, episode: Episode) -> None:
+    if episode.state == "incomplete":
+        raise EpisodeError(folder.folder_of(episode.number), f"is incomplete: {episode.note}")
+    place = folder.folder_of(episode.number)
+    if file_in(place, BAG) is None:
+        raise EpisodeError(place / BAG, "there is none")
+
+
+def _add_all(
+    part: Path,
+    format_: DatasetFormat,
+    plan: _Plan,
+    disk_reserve_mb: float,
+    result: Result,
+    report: Callable[[str], None],
+) -> None:
+    """Adds episodes until the disk is full."""
+    place = EpisodeFolder(part)
+    for position, source in enumerate(plan.sources):
+        number, index = source.episode.number, len(result.exported)
+        if (free := place.free_mb()) < disk_reserve_mb:
+            left = ", ".join(str(each.episode.number) for each in plan.sources[position:])
+            full = f"{free:.0f} MB free on the disk, less than the reserve of {disk_reserve_mb:.0f} MB"
+            result.faults.append(f"{full}: episodes {left} are not exported")
+            return
+        try:
+            if plan.schema is not None:
+                source.use(plan.schema, plan.signals)
+            facts = source.facts()
+            facts |= format_.add(index, source)
+        except Exception as error:  # as above
+            result.faults.append(_fault(number, error))
+            if getattr(error, "errno", None) in DISK_FULL:
+                result.faults += _not_exported(plan.sources[position + 1 :])
+                return
+            continue
+        finally:
+            _forget(source)
+        images = facts.pop("images", {})
+        try:
+            write_episode(part, index, facts, images)
+        except OSError as error:
+            _take_back(part, format_, index)
+            result.faults += [_fault(number, error), *_not_exported(plan.sources[position + 1 :])]
+            return
+        result.exported.append(number)
+        report(_line(source, index, facts))
+
+
+def _not_exported(sources: Sequence[SourceEpisode]) -> list[str]:
+    numbers = ", ".join(str(each.episode.number) for each in sources)
+    return [f"episodes {numbers} are not exported"] if numbers else []
+
+
+def _complete(part: Path, format_: DatasetFormat, result: Result, facts: Callable[[], dict[str, object]]) -> None:
+    """Completes the data set; if the disk is full, without the last episode, whose place is free then."""
+    try:
+        write_export(part, facts())
+        format_.close()
+    except OSError as error:
+        if error.errno not in DISK_FULL or len(result.exported) < 2:
+            raise
+        result.faults.append(_fault(result.exported.pop(), error))
+        _take_back(part, format_, len(result.exported))
+        write_export(part, facts())
+        format_.close()
+
+
+def _take_back(part: Path, format_: DatasetFormat, index: int) -> None:
+    """Removes the episode that was added last."""
+    format_.take_back(index)
+    remove_episode(part, index)
+
+
+def _line(source: SourceEpisode, index: int, facts: dict[str, object]) -> str:
+    note = f" ({sum(source.episode.lost.values())} messages lost in the recording)" if source.episode.lost else ""
+    if "cut" in facts and source.cut is not None:
+        note += f" (from its last reset on, at {source.cut.stamp_ns / 1e9:.9g} s)"
+    size = f"{facts['frames']} frames" if "frames" in facts else "all messages"
+    return f"episode {source.episode.number}: {size}, as {index}{note}"
+
+
+def _forget(source: SourceEpisode) -> None:
+    """Frees the tables of an episode."""
+    source.__dict__.pop("_tables", None)
+    source.__dict__.pop("times", None)
+
+
+def _fault(number: int, error: Exception) -> str:
+    kind = "" if isinstance(error, (InterfaceError, OSError, ValueError)) else f"{type(error).__name__}: "
+    return f"episode {number}: {kind}{'; '.join(str(error).splitlines())}"
+
+
+def _facts(folder: EpisodeFolder, name: str, wish: Wish, plan: _Plan, result: Result) -> dict[str, object]:
+    schema = plan.schema or Schema(0, ())
+    return {
+        "format": name,
+        "source": str(folder.path.absolute()),
+        "episodes": result.exported,
+        "left_out": result.faults,
+        "task": wish.task,
+        "fps": schema.fps or None,
+        "features": {each.key: list(each.names) for each in schema.features},
+        "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras},
+        "topics": {each.feature.key: sorted({table for table, _ in each.columns}) for each in plan.signals},
+        "methods": {each.feature.key: each.method for each in plan.signals},
+        "action": {"pose": wish.choice.is_pose, "deltas": wish.choice.is_delta} if schema.fps else None,
+    }

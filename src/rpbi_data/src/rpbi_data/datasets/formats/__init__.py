@@ -1,0 +1,47 @@
+"""The formats of data sets; a new one is a class in its own file and a line here."""
+
+from pathlib import Path
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.plugins.table import PluginTable
+from rpbi_data.datasets.format import DatasetError, DatasetFormat
+
+FORMATS: PluginTable[DatasetFormat] = PluginTable(
+    "data set format",
+    "rpbi_data.datasets.format:DatasetFormat",
+    {
+        "lerobot": "rpbi_data.datasets.formats.lerobot:LeRobot",
+        "robomimic": "rpbi_data.datasets.formats.robomimic:Robomimic",
+        "mcap": "rpbi_data.datasets.formats.mcap:Mcap",
+    },
+)
+"""All formats by name."""
+
+
+def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]:
+    """Returns the format of a data set.
+
+    Args:
+        folder: The data set.
+        others: Formats of other packages, as `module:Class`.
+
+    Raises:
+        DatasetError: If there is no such folder, or no format recognises it; the message lists its content.
+        MissingDependency: If its library is not installed.
+    """
+    if not folder.is_dir():
+        raise DatasetError(folder, "expected a folder with a data set, there is none")
+    missing: MissingDependency | None = None
+    for name in (*FORMATS, *others):
+        try:
+            found = FORMATS.find(name)
+            if found.recognises(folder):
+                return found
+        except MissingDependency as error:  # that of another format may be there
+            missing = error
+    if missing:
+        raise missing
+    names = sorted(each.name for each in folder.iterdir())
+    content = ", ".join(names[:10]) + (" ..." if len(names) > 10 else "") or "nothing"
+    expected = "meta/info.json (LeRobot), an HDF5 file (robomimic), or folders with metadata.yaml (rosbag2)"
+    raise DatasetError(folder, f"not a data set of a known format: expected {expected}, found {content}")

@@ -1,0 +1,312 @@
+"""Features of a data set, derived from the topics of a recording."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import pandas as pd
+
+from custom_ros_tools.errors import UnknownNameError
+from rpbi_data.bags.images import COMPRESSED_TYPE, RAW_TYPE
+from rpbi_data.bags.row_plan import RECORD_TIME
+from rpbi_data.bags.transforms import ROTATION, TRANSLATION
+
+from .format import IMAGES, QUATERNION, STATE, Feature
+
+JOINTS, WRENCH, CONTACTS = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped", "ros_pybullet_interface/Contacts"
+TRANSFORMS = "tf2_msgs/TFMessage"
+OTHER_ACTIONS = {
+    "geometry_msgs/Twist", "geometry_msgs/TwistStamped", "geometry_msgs/Pose", "geometry_msgs/PoseStamped",
+    "geometry_msgs/TransformStamped", "geometry_msgs/WrenchStamped", "std_msgs/Float64", "std_msgs/Float64MultiArray",
+    "std_msgs/Float32MultiArray",
+}  # fmt: skip
+"""Types of topics that are actions if their name ends as `ACTION_NAME` says, beside those of joints."""
+ACTION_NAME = re.compile(r"(.*)/(target|command|cmd_vel)")
+STATES_NAME = re.compile(r"(.*)/joint_states")
+TARGETS_NAME = re.compile(r"(.*/joint_states)/target")
+KINDS = ("position", "velocity", "effort")
+_JOINT = re.compile(r"^(position|velocity|effort)/(?![xyzw]$)")
+_OF_ROBOT = re.compile(r"/joint_states(/target)?$")
+AXES = ("x", "y", "z")
+
+NEXT, PREVIOUS = "next", "previous"
+"""Times of actions, see `Choice`."""
+GRIPPER, END_EFFECTOR = "observation.gripper", "observation.end_effector"
+_ALWAYS = (STATE, GRIPPER, END_EFFECTOR)
+
+Tables = Mapping[str, pd.DataFrame]
+"""Tables by name: a topic, or the topic of transforms, `#` and a frame."""
+
+
+class Column(NamedTuple):
+    """Source of the numbers of a feature.
+
+    Attributes:
+        table: Name of the table.
+        name: Column of the table.
+    """
+
+    table: str
+    name: str
+
+
+class Signal(NamedTuple):
+    """A feature and its sources.
+
+    Attributes:
+        feature: The feature.
+        columns: Source of each of its numbers.
+        method: Method of resampling, see `rpbi_utils.resample`; NEXT or PREVIOUS for actions.
+        held: For actions, columns of the measured positions; without a table for commands that have none.
+        deltas: For actions, number of columns of which the change from the row's measured value is taken.
+    """
+
+    feature: Feature
+    columns: tuple[Column, ...]
+    method: str = "linear"
+    held: tuple[Column, ...] = ()
+    deltas: int = 0
+
+    @property
+    def begins_at_once(self) -> bool:
+        """Whether rows begin with its first message; actions and contacts may begin later."""
+        return self.method not in (NEXT, PREVIOUS)
+
+
+class Choice(NamedTuple):
+    """Content of rows chosen by the user; with None, topics are derived.
+
+    Attributes:
+        state: Topics of `observation.state`.
+        action: Topics of `action`.
+        images: Topics of images.
+        features: Patterns of the other observations, without `observation.`; None for all.
+        end_effector: Frame of the end effector, such as `arm/tool`; empty for none.
+        gripper: Joints of the gripper, which are apart from the others.
+        timing: NEXT for the newest command before the next row as the action of a row; PREVIOUS for that of the row.
+        is_pose: Whether actions are poses of the end effector at the next row, not commands.
+        is_delta: Whether actions are changes from what is measured at the row, but for the gripper.
+    """
+
+    state: tuple[str, ...] | None = None
+    action: tuple[str, ...] | None = None
+    images: tuple[str, ...] | None = None
+    features: tuple[str, ...] | None = None
+    end_effector: str = ""
+    gripper: tuple[str, ...] = ()
+    timing: str = NEXT
+    is_pose: bool = False
+    is_delta: bool = False
+
+
+def wanted_topics(types: Mapping[str, str], choice: Choice) -> list[str]:
+    """Returns the topics whose tables are needed.
+
+    Args:
+        types: Types of messages by topic.
+        choice: Topics that the user names.
+
+    Raises:
+        UnknownNameError: If a named topic does not exist.
+    """
+    named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
+    for topic in sorted(named - types.keys()):
+        raise UnknownNameError("topic", topic, types)
+    derived = {topic for topic, kind in types.items() if _has_features(topic, kind)}
+    return sorted((derived | named) - {topic for topic in types if is_image(types[topic])})
+
+
+def _has_features(topic: str, kind: str) -> bool:
+    return (
+        kind in (JOINTS, WRENCH, CONTACTS)
+        or (kind == TRANSFORMS and topic == "/tf")
+        or (kind in OTHER_ACTIONS and ACTION_NAME.fullmatch(topic) is not None)
+    )
+
+
+def is_used(topic: str, kinds: Collection[str], choice: Choice) -> bool:
+    """Returns whether messages of a topic, of one type or several, would be a feature."""
+    named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
+    return topic in named or any(
+        _has_features(topic, kind) or (is_image(kind) and choice.images is None) for kind in kinds
+    )
+
+
+def is_image(kind: str) -> bool:
+    """Returns whether a type of message is an image."""
+    return kind in (RAW_TYPE, COMPRESSED_TYPE)
+
+
+def image_topics(types: Mapping[str, str], choice: Choice) -> dict[str, str]:
+    """Returns the topics of images by key of the feature; of a raw topic and its compressed one, the raw one."""
+    topics = choice.images
+    if topics is None:
+        found = {topic for topic, kind in types.items() if is_image(kind)}
+        topics = tuple(sorted(topic for topic in found if topic.removesuffix("/compressed") not in found - {topic}))
+    return {IMAGES + label(re.sub(r"/image(/compressed)?$", "", topic)): topic for topic in topics}
+
+
+def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
+    """Returns the tables, with that of TF split by frame."""
+    found = {name: table for name, table in tables.items() if name != topic}
+    if topic in tables:
+        frames = tables[topic].groupby(["parent", "child"], sort=True)
+        found |= {f"{topic}#{parent}#{child}": table for (parent, child), table in frames}
+    return found
+
+
+def derive(
+    tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], choice: Choice
+) -> list[Signal]:
+    """Returns the observations of a recording.
+
+    Args:
+        tables: Its tables, those of TF by frame.
+        types: Types of messages by topic.
+        namespace: Namespace of the simulator.
+        fixed: Names of joints that cannot move, which are left out.
+        choice: Content that the user chooses.
+
+    Raises:
+        UnknownNameError: If there is no such feature, joint of a gripper, or frame.
+    """
+    found = [
+        *_states(tables, types, fixed, choice),
+        *_wrenches(tables, types, choice),
+        *_contacts(tables, types),
+        *_poses(tables, namespace),
+    ]
+    if choice.end_effector:
+        columns = end_effector_columns(tables, namespace, choice.end_effector)
+        found.append(Signal(Feature(END_EFFECTOR, (*AXES, *QUATERNION)), columns))
+    if choice.features is None:
+        return found
+    names = {signal.feature.key: signal.feature.key.partition(".")[2] for signal in found}
+    for pattern in choice.features:
+        if not fnmatch.filter(names.values(), pattern):
+            raise UnknownNameError("feature", pattern, names.values())
+    chosen = {key for key, name in names.items() if any(fnmatch.fnmatchcase(name, each) for each in choice.features)}
+    return [signal for signal in found if signal.feature.key in (*_ALWAYS, *chosen)]
+
+
+def label(topic: str) -> str:
+    """Returns a topic as a part of a key: without `rpbi`, with `_` for all other characters than letters and
+    numbers.
+    """
+    return re.sub(r"\W+", "_", "/".join(part for part in topic.split("/") if part != "rpbi")).strip("_")
+
+
+def _states(tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice) -> Iterator[Signal]:
+    if choice.state is not None:
+        yield _generic(STATE, tables, choice.state)
+        return
+    topics = [topic for topic in tables if types.get(topic) == JOINTS and STATES_NAME.fullmatch(topic)]
+    for kind, key in zip(KINDS, (STATE, "observation.velocity", "observation.effort")):
+        columns = [Column(topic, name) for topic in topics for name in joint_columns(tables[topic], kind, fixed)]
+        if key == STATE and choice.gripper:
+            known = {joint_of(column): column for column in columns}
+            for name in choice.gripper:
+                if name not in known:
+                    raise UnknownNameError("joint of the gripper", name, known)
+            gripper = tuple(known[name] for name in choice.gripper)
+            yield Signal(Feature(GRIPPER, names_of(gripper)), gripper)
+            columns = [column for column in columns if column not in gripper]
+        if columns:
+            yield Signal(Feature(key, names_of(columns)), tuple(columns))
+
+
+def _wrenches(tables: Tables, types: Mapping[str, str], choice: Choice) -> Iterator[Signal]:
+    used = {*(choice.action or ()), *(choice.state or ())}
+    for topic in tables:
+        if types.get(topic) == WRENCH and topic not in used and not ACTION_NAME.fullmatch(topic):
+            columns = [Column(topic, f"wrench/{part}/{axis}") for part in ("force", "torque") for axis in AXES]
+            names = tuple(f"{part}.{axis}" for part in ("force", "torque") for axis in AXES)
+            yield Signal(Feature(f"observation.wrench.{label(topic)}", names), tuple(columns))
+
+
+def _contacts(tables: Tables, types: Mapping[str, str]) -> Iterator[Signal]:
+    for topic in tables:
+        if types.get(topic) == CONTACTS:
+            columns = tuple(Column(topic, f"force/{axis}") for axis in AXES)
+            key = f"observation.contact_force.{label(topic.removesuffix('/contacts'))}"
+            yield Signal(Feature(key, tuple(f"force.{axis}" for axis in AXES)), columns, "nearest")
+
+
+def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
+    """Yields the poses of the bodies of the world that have a frame of their own."""
+    for name, table in _frames(tables, namespace).items():
+        if "/" not in name:
+            yield Signal(
+                Feature(f"observation.pose.{label(table.rpartition('#')[2])}", (*AXES, *QUATERNION)),
+                _pose_columns(table),
+            )
+
+
+def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Column, ...]:
+    """Returns the columns of the pose of a frame in the world.
+
+    Raises:
+        UnknownNameError: If it is not on TF.
+    """
+    frames = _frames(tables, namespace)
+    name = frame.rpartition("rpbi/")[2]
+    if name not in frames:
+        raise UnknownNameError("frame on TF", frame, frames)
+    return _pose_columns(frames[name])
+
+
+def _frames(tables: Tables, namespace: str) -> dict[str, str]:
+    """Returns the tables of the frames whose parent is the world, by name without prefix, such as `arm/tool`."""
+    prefix = f"{namespace.strip('/')}/rpbi/".lstrip("/")
+    found = {}
+    for table in tables:
+        _, _, frames = table.partition("#")
+        parent, _, child = frames.partition("#")
+        match = re.fullmatch(rf"(?:{re.escape(prefix)}|rpbi/)(.+)", child)
+        if match and parent in (f"{prefix}world", "rpbi/world"):
+            found[match[1]] = table
+    return found
+
+
+def _pose_columns(table: str) -> tuple[Column, ...]:
+    return tuple(Column(table, name) for name in (*TRANSLATION, *ROTATION))
+
+
+def _generic(key: str, tables: Tables, topics: Sequence[str]) -> Signal:
+    columns = [Column(topic, name) for topic in topics for name in numbers_of(tables[topic])]
+    return Signal(Feature(key, names_of(columns)), tuple(columns))
+
+
+def numbers_of(table: pd.DataFrame) -> list[str]:
+    """Returns the columns with numbers of messages, without header and time of recording."""
+    return [
+        name
+        for name in table.columns
+        if table[name].dtype.kind in "iufb" and name != RECORD_TIME and not name.startswith("header/")
+    ]
+
+
+def joint_of(column: Column) -> str:
+    """Returns the name of the joint of a column of joint states."""
+    return column.name.partition("/")[2]
+
+
+def joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> list[str]:
+    """Returns the columns of a kind, such as `position`, that have values, without those of fixed joints."""
+    names = [name for name in table.columns if name.startswith(f"{kind}/")]
+    return [name for name in names if name.partition("/")[2] not in fixed and table[name].notna().any()]
+
+
+def names_of(columns: Iterable[Column]) -> tuple[str, ...]:
+    """Returns names of numbers: joints by name, else the path; with the robot or topic where that is not unique."""
+    columns = list(columns)
+    short = [
+        re.sub(rf"^({'|'.join(KINDS)})/(?!([xyzw]|covariance)$)", "", name).replace("/", ".") for _, name in columns
+    ]
+    if len(set(short)) == len(short):
+        return tuple(short)
+    robots = [label(_OF_ROBOT.sub("", table)) for table, _ in columns]
+    return tuple(f"{robot}.{name}" for robot, name in zip(robots, short))

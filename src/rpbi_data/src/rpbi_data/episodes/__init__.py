@@ -1,0 +1,1 @@
+"""Demonstrations as episodes: recorded, listed, read as one table, and verified."""

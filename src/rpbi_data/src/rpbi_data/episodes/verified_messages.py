@@ -1,0 +1,207 @@
+"""Simulates episodes again and compares them with their recordings."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import printable
+from custom_ros_tools.plugins import trust_only
+from rpbi.replay.parallel import TooSlowError, groups_of, in_forks, limit_cpu_time, merged
+from rpbi.replay.session import RecordedPart, Recording, Replay, ReplayResult
+from rpbi_data.replay.session_messages import MAX_TICKS, read_recording, require_few_ticks
+
+from .bags import seals_of
+from .compared_messages import Compared, Comparison
+from .errors import EpisodeError
+from .files import changed_files, newer_files, stored_names, with_stored_files
+from .folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
+
+_PROGRAM = "import sys; from rpbi_data.episodes.verified_messages import main; main(sys.argv[1:])"
+
+
+MAX_CPU_S = 3600
+"""Processor time of an episode, by default [s]."""
+
+
+class ReplayLimits(NamedTuple):
+    """Limits on a recording, as those of `replay`.
+
+    Attributes:
+        max_ticks: Largest number of ticks.
+        any_size: Whether its bag may exceed the limits of `BagReader`.
+        cpu_s: Processor time of each process that simulates it [s].
+    """
+
+    max_ticks: int = MAX_TICKS
+    any_size: bool = False
+    cpu_s: int = MAX_CPU_S
+
+
+USUAL_LIMITS = ReplayLimits()
+
+
+class Verdict(NamedTuple):
+    """Result of the verification of an episode.
+
+    Attributes:
+        number: The episode.
+        is_same: Whether all states agree and all files are as stored.
+        text: The comparison in words.
+        label: Label of the episode; empty if it cannot be read.
+        notes: Sentences on files that have changed on the disk.
+    """
+
+    number: int
+    is_same: bool
+    text: str
+    label: str = ""
+    notes: Sequence[str] = ()
+
+
+def verify_all(
+    folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str], limits: ReplayLimits = USUAL_LIMITS
+) -> Iterator[Verdict]:
+    """Simulates episodes again, each in a process of its own, and yields the results in order.
+
+    Args:
+        folder: The folder.
+        numbers: The episodes.
+        jobs: Number of processes at once.
+        trust: Python packages that the episodes may import, for types of the user's own.
+        limits: Limits on each episode.
+    """
+    each = max(1, jobs // max(1, len(numbers)))  # for episodes with keyframes
+    with ThreadPoolExecutor(jobs) as pool:
+        yield from pool.map(partial(_verify_in_process, folder, trust, limits, each), numbers)
+
+
+def _verify_in_process(
+    folder: EpisodeFolder, trust: Sequence[str], limits: ReplayLimits, jobs: int, number: int
+) -> Verdict:
+    arguments = [str(folder.path), str(number), json.dumps(limits), str(jobs), *trust]
+    command = [sys.executable, "-c", _PROGRAM, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    try:
+        return Verdict(*json.loads(done.stdout.splitlines()[-1]))
+    except (IndexError, ValueError, TypeError):
+        if done.returncode == -signal.SIGXCPU:
+            return Verdict(number, False, str(TooSlowError(limits.cpu_s)))
+        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        return Verdict(number, False, f"the simulation ended early: {words}")
+
+
+def main(words: Sequence[str]) -> None:
+    """Verifies one episode and prints the result as JSON.
+
+    Args:
+        words: Folder, number, limits as JSON, number of processes, and packages to trust.
+    """
+    path, number, limits, jobs, *trust = words
+    trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
+    given = ReplayLimits(*json.loads(limits))
+    limit_cpu_time(given.cpu_s)
+    verdict = verify(EpisodeFolder(path), int(number), given, int(jobs))
+    print(f"\n{json.dumps(verdict)}", flush=True)
+
+
+def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS, jobs: int = 1) -> Verdict:
+    """Simulates an episode again, with the files that are stored with it.
+
+    Args:
+        folder: The folder.
+        number: The episode.
+        limits: Limits on it.
+        jobs: Number of processes at once if it has keyframes; with 1, it is this process.
+    """
+    try:
+        episode = folder.read(number)
+    except EpisodeError as error:
+        return Verdict(number, False, str(error))
+    notes = [f"note: {each}" for each in newer_files(episode.files)]
+    try:
+        changed = list(changed_files(episode.files, folder.files))
+        is_same, text, own_notes = _replay(folder, episode, limits, jobs)
+        notes += own_notes
+    except (InterfaceError, OSError) as error:
+        return Verdict(number, False, "; ".join(str(error).splitlines()), episode.label, notes)
+    except Exception as error:  # a bag may have anything in it
+        words = f"cannot be simulated: {type(error).__name__}: {error}"
+        return Verdict(number, False, words, episode.label, notes)
+    return Verdict(number, is_same and not changed, "; ".join([*changed, text]), episode.label, notes)
+
+
+def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
+    """Returns whether an episode is the same, the comparison in words, and notes."""
+    place = folder.folder_of(episode.number)
+    bag = file_in(place, BAG)
+    if bag is None:
+        raise EpisodeError(place, episode.note or "has no bag")
+    with tempfile.TemporaryDirectory(prefix="verify-") as files:
+        recording = read_recording(
+            bag,
+            episode.namespace,
+            any_size=limits.any_size,
+            earlier=file_in(place, EARLIER),
+            relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
+            names=stored_names(episode.files, Path(files)),
+        )
+        require_few_ticks(bag, recording, limits.max_ticks)
+        compare = partial(_compare, bag, episode.namespace, recording)
+        results, comparisons = zip(*in_forks(compare, groups_of(recording.parts(), jobs), limits.cpu_s))
+    result, compared = merged(results), Compared.merged(comparisons)
+    faults, notes = _message_faults(bag, episode, compared, limits.any_size)
+    words = [*recording.description.warnings, *faults, _words(result, compared, bool(faults))]
+    return result.difference is None and not result.left_out and not faults, "; ".join(words), notes
+
+
+def _compare(
+    bag: Path, namespace: str, recording: Recording, parts: Sequence[RecordedPart]
+) -> tuple[ReplayResult, Compared]:
+    with Comparison(bag, namespace) as comparison:
+        result = Replay(recording, observe=comparison.observe).run(parts)
+    return result, comparison.result
+
+
+def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
+    """Returns sentences on changed topics, and notes on topics that differ in the replay only.
+
+    The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
+    They are a fault unless the seal of their topic is whole.
+    """
+    seals = {topic: each[SEAL] for topic, each in episode.topics.items() if SEAL in each}
+    found = seals_of(bag, any_size=any_size) if seals else {}
+    broken = {topic for topic in seals.keys() | found.keys() if seals.get(topic) != found.get(topic)}
+    faults, notes = [], []
+    for topic, each in sorted(comparison.differences.items()):
+        text = f"{each} ({comparison.different[topic]} of {comparison.compared[topic]} differ)"
+        if each.is_certain or topic in broken or topic not in seals:
+            faults.append(text)
+        else:
+            notes.append(f"note: the replay differs, but the messages are those that were recorded: {text}")
+    for topic in sorted(broken - comparison.differences.keys()):
+        faults.append(f"{printable(topic)}: its messages are not those that were recorded")
+    return faults, notes
+
+
+def _words(result: ReplayResult, comparison: Compared, has_faults: bool) -> str:
+    if result.difference is not None:
+        each, last = result.difference.checkpoint, result.difference.last_agreement
+        since = "the first state" if last is None else f"the same until tick {last.tick}"
+        return f"differs at {each} ({since}): recorded {each.state_hash}, now {result.difference.state_hash}"
+    if result.left_out:
+        return "; ".join(f"not simulated {text}" for text in result.left_out)
+    states = f"{result.agreed} states over {result.ticks} ticks"
+    if has_faults:
+        return f"its states are the same ({states})"
+    compared = comparison.compared
+    return f"same: {states}, {sum(compared.values())} messages of {len(compared)} topics"

@@ -1,0 +1,192 @@
+"""Processes that make episodes, and their replacement after a crash."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Pipe, wait
+from pathlib import Path
+from typing import Any
+
+from custom_ros_tools.foreign import path_below
+from custom_ros_tools.processes.child import start_child
+from rpbi_data.episodes.errors import EpisodeError
+from rpbi_data.episodes.folder import EpisodeFolder
+
+from .job import LOG, EpisodeOutcome, FarmJob
+
+MAX_LOSSES = 3
+"""Number of processes that an episode may end before it is left out."""
+END_S = 5.0
+"""Time from the end of the connection to a process until it is killed [s]."""
+
+
+class Child:
+    """A process that makes episodes. It ends with this one.
+
+    Args:
+        module: Its program, which takes the number of a file handle and reads the job from there.
+        job: The job.
+        folder: Folder of the episodes.
+        slots: Largest number of episodes that it is asked for at a time.
+        arguments: Further arguments of the program.
+    """
+
+    def __init__(
+        self, module: str, job: FarmJob, folder: EpisodeFolder, slots: int = 1, arguments: Sequence[str] = ()
+    ) -> None:
+        self._slots = slots
+        self.numbers: set[int] = set()
+        """Episodes that it is asked for."""
+        self.connection, theirs = Pipe()
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
+        path = path_below(folder.path, LOG)
+        if path.exists() and not path.is_file():
+            raise EpisodeError(path, "expected an ordinary file")
+        with theirs, open(path, "ab") as log:
+            self._process = start_child(
+                [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
+                signal.SIGKILL,
+                pass_fds=[theirs.fileno()],
+                env=environment,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        self._send((job, folder.path))
+
+    @property
+    def is_free(self) -> bool:
+        """Whether another episode can be requested from it."""
+        return len(self.numbers) < self._slots
+
+    def start(self, number: int) -> None:
+        """Requests an episode from it."""
+        self.numbers.add(number)
+        self._send(number)
+
+    def receive(self) -> EpisodeOutcome | None:
+        """Returns the outcome of an episode; None if the process has ended."""
+        try:
+            outcome: EpisodeOutcome = self.connection.recv()
+        except (EOFError, OSError):
+            return None
+        self.numbers.discard(outcome.number)
+        return outcome
+
+    def close(self, grace_s: float = 0.0) -> str:
+        """Ends the process.
+
+        Args:
+            grace_s: Time in which it may end by itself [s].
+
+        Returns:
+            The signal that ended it, or its exit code, in words.
+        """
+        self.connection.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(grace_s)
+        self._process.kill()
+        code = self._process.wait()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _send(self, message: Any) -> None:
+        with suppress(BrokenPipeError, ConnectionResetError):  # it has died, as `receive` finds
+            self.connection.send(message)
+
+
+class Pool:
+    """Processes that make the episodes of a job. A process that dies is replaced; its episode is made again.
+
+    Args:
+        folder: Folder of the episodes.
+        new_child: Starts a process.
+        size: Number of processes.
+        is_replaced: Whether a process that dies is replaced; without it, that is the end.
+    """
+
+    def __init__(
+        self, folder: EpisodeFolder, new_child: Callable[[], Child], size: int, *, is_replaced: bool = True
+    ) -> None:
+        self._folder, self._new_child, self._size, self._is_replaced = folder, new_child, size, is_replaced
+        self._children: list[Child] = []
+        self._waiting: deque[int] = deque()
+        self._losses: Counter[int] = Counter()
+
+    def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
+        """Makes episodes, and yields their outcomes, in any order.
+
+        If it ends early, also by an exception, no process and no temporary folder remains.
+
+        Raises:
+            EpisodeError: If no further episode can be made; those that are complete stay.
+        """
+        self._waiting.extend(numbers)
+        for number in numbers:
+            self._drop_part(number)
+        try:
+            while self._waiting or any(child.numbers for child in self._children):
+                self._employ()
+                ready = wait([child.connection for child in self._children])
+                for child in [each for each in self._children if each.connection in ready]:
+                    yield from self._outcomes(child)
+        finally:
+            self._end()
+            for number in numbers:
+                self._drop_part(number)
+
+    def _employ(self) -> None:
+        """Assigns episodes to free processes, and starts processes while there are further episodes."""
+        while self._waiting:
+            free = next((child for child in self._children if child.is_free), None)
+            if free is None:
+                if len(self._children) == self._size:
+                    return
+                free = self._new_child()
+                self._children.append(free)
+            free.start(self._waiting.popleft())
+
+    def _outcomes(self, child: Child) -> Iterator[EpisodeOutcome]:
+        outcome = child.receive()
+        if outcome is None:
+            self._children.remove(child)
+            reason = child.close(END_S)
+            if not self._is_replaced:
+                raise EpisodeError(self._folder.path, f"the process that makes the episodes ended: {reason}")
+            for number in sorted(child.numbers):
+                yield from self._again(EpisodeOutcome(number, fault=f"its process ended ({reason})", is_lost=True))
+        elif outcome.stops:
+            subject = f"episode {outcome.number}: " if outcome.number >= 0 else ""
+            raise EpisodeError(self._folder.path, subject + outcome.fault)
+        elif outcome.is_lost:
+            yield from self._again(outcome)
+        else:
+            yield outcome
+
+    def _again(self, lost: EpisodeOutcome) -> Iterator[EpisodeOutcome]:
+        """Schedules a lost episode again, unless it exists, or was lost too often."""
+        number = lost.number
+        self._drop_part(number)
+        if self._folder.folder_of(number).exists():  # the process ended just after it
+            yield EpisodeOutcome(number, self._folder.read(number).label)
+            return
+        self._losses[number] += 1
+        if self._losses[number] < MAX_LOSSES:
+            self._waiting.append(number)
+        else:
+            yield EpisodeOutcome(number, fault=f"left out: {MAX_LOSSES} times {lost.fault}")
+
+    def _drop_part(self, number: int) -> None:
+        part: Path = self._folder.part_of(number)
+        shutil.rmtree(part, ignore_errors=True)
+
+    def _end(self) -> None:
+        while self._children:
+            self._children.pop().close()

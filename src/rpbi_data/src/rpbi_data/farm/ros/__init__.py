@@ -1,0 +1,1 @@
+"""The processes of a farm, which write bags."""

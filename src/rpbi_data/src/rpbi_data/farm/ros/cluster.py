@@ -1,0 +1,130 @@
+"""Entry point of the process between a farm and a Ray cluster: `python -m rpbi_data.farm.ros.cluster FD ADDRESS`.
+
+It is a separate process because Ray ends its client process when the head of the cluster ends.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+from typing import Any
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi_data.episodes.folder import EpisodeFolder
+from rpbi_data.farm.job import EpisodeOutcome, FarmJob
+
+from .remote import make_remotely, store
+
+POLL_S = 0.2
+"""Longest time between two looks at new requests [s]."""
+HEAD_TIMEOUT_S = 5.0
+"""Time without an answer after which the head of the cluster counts as gone [s]."""
+
+
+class Cluster:
+    """Makes episodes on the nodes of a Ray cluster.
+
+    Args:
+        address: Address of its head, `HOST:PORT`, as `ray start` prints it; or `auto`.
+        job: The job.
+        folder: Folder of the episodes, on this machine.
+
+    Raises:
+        ClusterError: If there is no cluster.
+    """
+
+    def __init__(self, address: str, job: FarmJob, folder: EpisodeFolder) -> None:
+        import ray  # an extra, which takes seconds to import
+
+        self._ray, self._folder, self._address = ray, folder, address
+        if address != "auto":
+            self._require_head()
+        try:
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
+        except Exception as error:  # Ray has many kinds
+            raise ClusterError(address, f"cannot be used: {' '.join(str(error).split())}") from error
+        self._address = ray.get_runtime_context().gcs_address
+        self._job = ray.put(job)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(make_remotely)
+        self._numbers: dict[Any, int] = {}
+
+    def start(self, number: int) -> None:
+        """Asks for an episode."""
+        self._numbers[self._task.remote(self._job, number)] = number
+
+    def outcomes(self) -> Iterator[EpisodeOutcome]:
+        """Yields the outcomes of episodes that are ready, or become ready within POLL_S.
+
+        Raises:
+            ClusterError: If the head does not answer.
+        """
+        self._require_head()
+        if not self._numbers:
+            return
+        for reference in self._ray.wait(list(self._numbers), num_returns=1, timeout=POLL_S)[0]:
+            yield self._outcome(reference, self._numbers.pop(reference))
+
+    def _outcome(self, reference: Any, number: int) -> EpisodeOutcome:
+        try:
+            outcome, files = self._ray.get(reference)
+        except self._ray.exceptions.RayTaskError as error:  # raised by the task itself
+            return EpisodeOutcome(number, fault=str(error).strip().splitlines()[-1])
+        except self._ray.exceptions.RayError as error:
+            self._require_head()
+            return EpisodeOutcome(number, fault=f"its process ended ({type(error).__name__})", is_lost=True)
+        if files:
+            try:
+                store(self._folder, number, files)
+            except OSError as error:
+                shutil.rmtree(self._folder.part_of(number), ignore_errors=True)
+                return EpisodeOutcome(number, fault=f"cannot be written: {error}", stops=True)
+        result: EpisodeOutcome = outcome
+        return result
+
+    def _require_head(self) -> None:
+        host, _, port = self._address.rpartition(":")
+        try:
+            socket.create_connection((host, int(port)), HEAD_TIMEOUT_S).close()
+        except (OSError, ValueError) as error:
+            raise ClusterError(self._address, f"the head of the Ray cluster does not answer: {error}") from error
+
+
+class ClusterError(InterfaceError):
+    """A Ray cluster cannot be used."""
+
+    def __init__(self, address: str, message: str) -> None:
+        super().__init__(address, message)
+        self._text = f"{address}: {message}"
+
+    def __str__(self) -> str:
+        return self._text
+
+
+def main() -> None:
+    """Forwards requests to the cluster, and outcomes back, until the other end is closed."""
+    connection = Connection(int(sys.argv[1]))
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it
+    job, path = connection.recv()
+    try:
+        cluster = Cluster(sys.argv[2], job, EpisodeFolder(path))
+        while True:
+            while connection.poll(0.0):
+                cluster.start(connection.recv())
+            for outcome in cluster.outcomes():
+                connection.send(outcome)
+    except EOFError:
+        return
+    except ClusterError as error:
+        connection.send(EpisodeOutcome(-1, fault=str(error), stops=True))
+        os._exit(1)  # Ray would wait for its head
+
+
+if __name__ == "__main__":
+    main()

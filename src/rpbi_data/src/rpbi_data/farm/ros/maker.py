@@ -1,0 +1,100 @@
+"""Makes episodes of a job in this process."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import sys
+from datetime import datetime
+
+import pybullet
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi.ros.headers import use_own_frames, use_prefix
+from rpbi.world import World
+from rpbi.world.loading import LoadedWorld, load_world
+from rpbi_data.episodes.bags import measure_topics
+from rpbi_data.episodes.errors import DISK_FULL
+from rpbi_data.episodes.folder import BAG, EpisodeFolder
+from rpbi_data.farm.job import EpisodeOutcome, FarmJob, digest, policy_digest
+from rpbi_data.farm.policy import POLICIES
+from rpbi_data.farm.run import EpisodeRun
+
+from .bag import EpisodeBag
+
+_log = logging.getLogger(__name__)
+
+
+def new_world(loaded: LoadedWorld) -> World:
+    """Returns a world in simulated time, without a window, with frame names as in messages."""
+    world = World(loaded, connection_mode=pybullet.DIRECT)
+    use_prefix(loaded.config.tf_prefix)
+    use_own_frames(world.frames())
+    return world
+
+
+class EpisodeMaker:
+    """Makes episodes of a job, each in a new world.
+
+    Args:
+        job: The job.
+
+    Raises:
+        InterfaceError: If the world or the policy is not here, or not the same as where the farm was started.
+    """
+
+    def __init__(self, job: FarmJob) -> None:
+        sys.path += [each for each in job.python_path if each not in sys.path]
+        self._job, self._is_checked = job, False
+        self._loaded = load_world(job.world)
+        self._policy = POLICIES.configured(job.policy, "--policy")
+        if policy_digest(self._policy) != job.policy_sha256:
+            raise _AnotherError(f"the file of the policy {job.policy}")
+
+    def make(self, folder: EpisodeFolder, number: int) -> EpisodeOutcome:
+        """Makes an episode in a folder; a failed one leaves nothing behind."""
+        try:
+            return EpisodeOutcome(number, self._make(folder, number))
+        except OSError as error:
+            is_full = error.errno in DISK_FULL
+            return EpisodeOutcome(number, fault=f"cannot be written: {error}", stops=is_full)
+        except _AnotherError as error:
+            return EpisodeOutcome(number, fault=str(error), stops=True)
+        except Exception as error:
+            _log.exception("episode %d", number)
+            kind = "" if isinstance(error, InterfaceError) else f"{type(error).__name__}: "
+            return EpisodeOutcome(number, fault=kind + "; ".join(str(error).splitlines()))
+
+    def _make(self, folder: EpisodeFolder, number: int) -> str:
+        job = self._job
+        started = datetime.now().astimezone().isoformat(timespec="seconds")
+        seeds = f"seed {job.seed}, episode {number}, policy {job.policy}"
+        episode, part = folder.begin(number, started=started, seeds=seeds, **job.facts)
+        world: World | None = None
+        try:
+            world = new_world(self._loaded)
+            self._check(world)
+            with EpisodeBag(part / BAG, world, job.images) as bag:
+                episode.label = EpisodeRun(job, self._policy, number, world).run(bag)
+            episode.seconds = round(world.clock.time_s, 9)
+            episode.state, episode.topics = "complete", measure_topics(part / BAG)
+            folder.complete(part, episode)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)  # still there only after a fault
+            if world is not None:
+                world.close()
+        return episode.label
+
+    def _check(self, world: World) -> None:
+        """Checks, for the first world, that it is the one of the job."""
+        if not self._is_checked and digest(world.describe()) != self._job.world_sha256:
+            raise _AnotherError(f"the world of {self._job.world}")
+        self._is_checked = True
+
+
+class _AnotherError(InterfaceError):
+    """World or policy differs from that of the job; the argument names it."""
+
+    def __str__(self) -> str:
+        where = "another one here than where the farm was started"
+        return f"{self.args[0]} is {where}: expected the same files, version of this workspace, and PyBullet"

@@ -1,1 +1,0 @@
-"""Bags and ROS: recording, reading, tables, and reports on topics."""
