@@ -68,7 +68,7 @@ FILES = {
     "tests/unit/episodes/test_foreign_files.py": "tests/unit/rpbi_data/datasets/test_foreign_files.py",
     "tests/unit/episodes/test_page.py": "tests/unit/rpbi_data/view/test_page.py",
     "tests/unit/episodes": "tests/unit/rpbi_data/episodes",
-    "tests/unit/rpbi_utils/conftest.py": "tests/unit/rpbi_data/bags/conftest.py",
+    "tests/unit/rpbi_utils/conftest.py": "tests/unit/conftest.py",
     **{
         f"tests/unit/rpbi_utils/test_{name}.py": f"tests/unit/rpbi_data/bags/test_{name}.py"
         for name in (

@@ -217,7 +217,7 @@ def test_a_bag_of_two_sessions_is_refused(bag, tmp_path):
         for topic, message, stamp in given.read_messages(["/rpbi/world_description"]):
             written.write(topic, message, stamp)
     done = _replay(path)
-    assert done.returncode == 1 and "started anew" in done.stderr
+    assert done.returncode == 1 and "was restarted during the recording" in done.stderr
 
 
 def test_a_truncated_bag_is_refused(bag, tmp_path):
