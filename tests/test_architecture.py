@@ -64,7 +64,7 @@ def _imports(path: Path) -> set[str]:
     return set(imported_names(path, module))
 
 
-BY_FEATURE = {"rpbi_data"}
+BY_FEATURE = {"rpbi_data", "rpbi_utils"}
 """Packages whose folders are features, each with its modules that need ROS, see test_layout.py."""
 COMPATIBILITY = SRC / "compatibility"
 

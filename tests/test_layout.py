@@ -30,9 +30,9 @@ TABLES = (
     "operator_node.devices",
     "operator_node.mappings",
     "safe_robot.checks",
-    "rpbi_utils.ros.controls.panels",
+    "rpbi_utils.controls.ros",
     "motion_primitives.primitives",
-    "rpbi_utils.ros.console",
+    "rpbi_utils.console",
     "rpbi_data.console",
     "rpbi_examples.ros.console",
     "rpbi_data.datasets.formats",
@@ -135,7 +135,7 @@ DOCUMENTED = {
 """Import paths of the release's Python API, which lead into `ros` folders."""
 
 
-BY_FEATURE = {"rpbi_data"}
+BY_FEATURE = {"rpbi_data", "rpbi_utils"}
 """Packages whose folders are features, each with all of it. Others have what needs ROS below a `ros` folder."""
 EDGE = re.compile(r".*(_node|_topics|_services|_action|_messages)|.*\.(ros|console)\.\w+")
 """Modules that may need ROS: by their names, in a flat `ros` folder, and commands."""

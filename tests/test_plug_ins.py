@@ -155,7 +155,7 @@ FILES = {
     },
     "sensor": {f"{RPBI}/sensors/height.py": SENSOR_FILE, f"{RPBI}/ros/publishers/height.py": TOPIC_FILE},
     "device": {f"{OPERATOR}/devices/pedal.py": DEVICE_FILE, "docs/devices.md": "| `pedal` | its axis `down` |"},
-    "command": {"src/rpbi_utils/src/rpbi_utils/ros/console/wave.py": COMMAND_FILE},
+    "command": {"src/rpbi_utils/src/rpbi_utils/console/wave.py": COMMAND_FILE},
 }
 """Files written by hand: a class each, and the example of the body, the topic of the sensor, the page of the device."""
 LINES = {
@@ -189,7 +189,7 @@ from rpbi.ros.reference.interface_page import interface_page
 from rpbi.ros.reference.reference_world import reference_world
 from rpbi.world import World
 from rpbi_examples.plugins_page import plugins_page
-from rpbi_utils.ros.console.spawn import kind_in, kinds
+from rpbi_utils.console.spawn import kind_in, kinds
 
 world = World.from_file("world.yaml")
 samples = [sample for _ in range(50) for sample in world.step() if type(sample).__name__ == "HeightSample"]

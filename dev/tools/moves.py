@@ -50,8 +50,23 @@ MODULES = {
     "episodes.farm": "rpbi_data.farm",
     "episodes.ros.farm": "rpbi_data.farm.ros",
     "episodes.ros.console": "rpbi_data.console",
-    "episodes.ros.console.restore": "rpbi_utils.ros.console.restore",
-    "episodes.ros.console.save": "rpbi_utils.ros.console.save",
+    "episodes.ros.console.restore": "rpbi_utils.console.restore",
+    "episodes.ros.console.save": "rpbi_utils.console.save",
+    "rpbi_utils.ros.console": "rpbi_utils.console",
+    "rpbi_utils.ros.controls": "rpbi_utils.controls.ros",
+    "rpbi_utils.ros.controls.panels": "rpbi_utils.controls.ros",
+    "rpbi_utils.ros.controls.panels.view": "rpbi_utils.controls.view",
+    "rpbi_utils.ros.controls.requests": "rpbi_utils.controls.requests",
+    "rpbi_utils.ros.fake_driver.node": "rpbi_utils.fake_driver.stand_in_node",
+    "rpbi_utils.ros.interpolation": "rpbi_utils.interpolation.interpolation_node",
+    "rpbi_utils.ros.live_plot.node": "rpbi_utils.live_plot.live_plot_node",
+    "rpbi_utils.ros.live_plot.source": "rpbi_utils.live_plot.source_topics",
+    "rpbi_utils.ros.live_plot.window": "rpbi_utils.live_plot.window",
+    "rpbi_utils.ros.plain_text": "rpbi_utils.plain_text",
+    "rpbi_utils.ros.windows": "rpbi_utils.windows",
+    "rpbi_utils.ros.tracking.april_tags": "rpbi_utils.tracking.april_tags_node",
+    "rpbi_utils.ros.tracking.tracked_object": "rpbi_utils.tracking.tracked_object_node",
+    "rpbi_utils.ros.wrenches": "rpbi_utils.wrenches.calibrate_wrench_node",
 }
 """New name by old name of modules, and of packages with all below them; the longest name counts."""
 DOORS = {"rpbi_utils": "rpbi_data", "episodes": "rpbi_data"}
@@ -60,6 +75,7 @@ DOCSTRINGS = {
     "rpbi_data.episodes": "Demonstrations as episodes: recorded, listed, read as one table, and verified.",
     "rpbi_data.replay": "Recorded sessions in bags.",
     "rpbi_data.console": "Commands for bags, episodes and data sets.",
+    "rpbi_utils.controls": "The window for the running world.",
     "rpbi_data.farm.ros": "The processes of a farm, which write bags.",
 }
 """Docstrings of new packages."""

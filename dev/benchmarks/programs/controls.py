@@ -11,7 +11,7 @@ from PyQt5.QtCore import QEvent, QObject, QPoint, QTimer
 from PyQt5.QtWidgets import QApplication, QPushButton, QSlider, QStyle, QStyleOptionSlider, QWidget
 
 from custom_ros_tools.ros.node import run
-from rpbi_utils.ros.controls import node
+from rpbi_utils.controls.ros import node
 
 BUTTONS = ("start", "stop", "send")
 LOOK_MS, SETTLE_MS = 100, 1000

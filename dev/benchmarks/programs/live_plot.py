@@ -9,7 +9,7 @@ import time
 from PyQt5.QtCore import QTimer
 
 from custom_ros_tools.ros.node import run
-from rpbi_utils.ros.live_plot import node
+from rpbi_utils.live_plot import live_plot_node as node
 
 WARM_UP_S = 3.0
 

@@ -59,7 +59,7 @@ class _Window:
     def __init__(self, system: RosSystem, screen: Screen, folder: Path) -> None:
         self.system, self.screen, self.folder = system, screen, folder
         self._widgets = folder / "widgets.json"
-        environment = {**screen.environment, FILE: str(self._widgets), MODULE: "rpbi_utils.ros.live_plot.node"}
+        environment = {**screen.environment, FILE: str(self._widgets), MODULE: "rpbi_utils.live_plot.live_plot_node"}
         names = [f"{WAVE}/position/left", f"{WAVE}/positin[0]", LATER]
         self.node = system.start_program("controls_window.py", *names, "--out", str(folder), **environment)
         wait_until(lambda: "status" in self.widgets, "the window is open")

@@ -12,7 +12,7 @@ SRC = Path(__file__).resolve().parents[3] / "src"
 PROGRAM = """
 import json
 from PyQt5.QtWidgets import QApplication, QLabel
-from rpbi_utils.ros.plain_text import plain_label, plain_tip
+from rpbi_utils.plain_text import plain_label, plain_tip
 
 app = QApplication([])
 name = "<table width=900><tr><td>ball</td></tr></table>"

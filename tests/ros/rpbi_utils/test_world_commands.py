@@ -21,7 +21,7 @@ from custom_ros_tools.console.modules import command_of
 from ros_pybullet_interface.srv import ListObjects, ListObjectsResponse
 from rpbi.bodies import BODY_TYPES
 from rpbi.world.loading import load_world
-from rpbi_utils.ros.console.spawn import kind_in
+from rpbi_utils.console.spawn import kind_in
 
 CONFIGS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs"
 
@@ -45,7 +45,7 @@ def say(ros, capsys):
 
     def run(line: str, *more: str) -> tuple[int, str]:
         name, *words = line.split()
-        command = command_of(f"rpbi_utils.ros.console.{name}")
+        command = command_of(f"rpbi_utils.console.{name}")
         code = command.run([*words, *more, "--ns", "lab"])
         printed = capsys.readouterr()
         return code, (printed.out + printed.err).strip()
@@ -239,7 +239,7 @@ def test_foreign_names_reach_no_terminal_as_they_are(ros, tmp_path, capsys):
     names = ["\x1b]0;title\x07", "two\nlines"]
     rogue = rospy.Service("/rogue/rpbi/list_objects", ListObjects, lambda _: ListObjectsResponse(names, ["\x9b1m"] * 2))
     try:
-        assert command_of("rpbi_utils.ros.console.list").run(["--ns", "rogue"]) == 0
+        assert command_of("rpbi_utils.console.list").run(["--ns", "rogue"]) == 0
     finally:
         rogue.shutdown()
     assert capsys.readouterr().out == "\\x1b]0;title\\x07  \\x9b1m\ntwo\\x0alines      \\x9b1m\n"

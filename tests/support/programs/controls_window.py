@@ -80,7 +80,7 @@ def _observe(window: Any, path: Path) -> Any:
 
 def main() -> None:
     """Runs the node as its own script does."""
-    node: Any = import_module(os.environ.get(MODULE, "rpbi_utils.ros.controls.node"))
+    node: Any = import_module(os.environ.get(MODULE, "rpbi_utils.controls.ros.node"))
     show = node._show
 
     def show_observed(opened: Any) -> None:

@@ -19,8 +19,8 @@ from custom_ros_tools.errors import InterfaceError
 from ros_pybullet_interface.srv import GetStateHash, StepN
 from rpbi.world import World
 from rpbi.world.saved.state import WorldState
-from rpbi_utils.ros.console.restore import restore
-from rpbi_utils.ros.console.save import save
+from rpbi_utils.console.restore import restore
+from rpbi_utils.console.save import save
 
 JOINT = "lbr_iiwa_joint_1"
 

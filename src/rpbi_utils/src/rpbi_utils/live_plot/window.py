@@ -15,8 +15,9 @@ from PyQt5.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF,
 from PyQt5.QtWidgets import QHBoxLayout, QMainWindow, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from custom_ros_tools.files import atomic_file
-from rpbi_utils.live_plot.plot import Line, LivePlot, thinned, ticks
-from rpbi_utils.ros.plain_text import plain_label, plain_tip
+from rpbi_utils.plain_text import plain_label, plain_tip
+
+from .plot import Line, LivePlot, thinned, ticks
 
 TITLE = "Live plot"
 PERIOD_MS = 16

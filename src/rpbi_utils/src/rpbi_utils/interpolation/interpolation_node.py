@@ -23,15 +23,11 @@ from custom_ros_tools.ros.transform_messages import transform_message
 from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.model import RobotModel
 from robot_model.urdf.files import write_description
-from rpbi_utils.interpolation.config import (
-    InterpolationParameters,
-    PublisherConfig,
-    WaypointError,
-    WaypointMotionConfig,
-)
-from rpbi_utils.interpolation.interpolator import Interpolator, TargetSample
-from rpbi_utils.interpolation.limits import UNITS, MotionLimitsConfig
-from rpbi_utils.interpolation.waypoints import Waypoints, read_waypoints, waypoint_matrix
+
+from .config import InterpolationParameters, PublisherConfig, WaypointError, WaypointMotionConfig
+from .interpolator import Interpolator, TargetSample
+from .limits import UNITS, MotionLimitsConfig
+from .waypoints import Waypoints, read_waypoints, waypoint_matrix
 
 NAME = "ros_Traj_interface"
 WAYPOINTS = "ros_pybullet_interface/waypt_traj"

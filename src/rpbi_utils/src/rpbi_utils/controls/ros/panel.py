@@ -6,10 +6,10 @@ from typing import Any
 from PyQt5.QtCore import QEvent, QObject, Qt
 from PyQt5.QtWidgets import QGroupBox, QScrollArea, QWidget
 
-from rpbi_utils.ros.plain_text import plain_tip
+from rpbi_utils.controls.requests import LIMIT_S, BackgroundRequests, RequestResult
+from rpbi_utils.plain_text import plain_tip
 
 from .link import SimulatorLink, SimulatorSnapshot
-from .requests import LIMIT_S, BackgroundRequests, RequestResult
 
 Then = Callable[[RequestResult], None]
 Condition = Callable[[SimulatorSnapshot], bool]

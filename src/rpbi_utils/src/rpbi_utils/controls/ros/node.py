@@ -12,7 +12,7 @@ from pydantic import Field
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.schema import ConfigModel, Switch, Text, optional
-from rpbi_utils.ros.windows import missing_for_windows
+from rpbi_utils.windows import missing_for_windows
 
 NAME = "rpbi_controls_node"
 
@@ -37,8 +37,9 @@ def main() -> None:
 def _open() -> tuple[Any, Any, Any]:
     from PyQt5.QtWidgets import QApplication
 
+    from rpbi_utils.controls.view import rviz_view
+
     from .link import SimulatorLink
-    from .panels.view import rviz_view
     from .window import ControlsWindow, Signals
 
     parameters = private_parameters(ControlsParameters)

@@ -17,7 +17,8 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.tf_listener import TfListener
 from robot_model.geometry import Pose, Vector
-from rpbi_utils.wrenches.calibration import (
+
+from .calibration import (
     Array,
     CalibrationParameters,
     MovedError,
@@ -27,7 +28,7 @@ from rpbi_utils.wrenches.calibration import (
     gravity_in,
     listed,
 )
-from rpbi_utils.wrenches.identification import PoseSample, UndeterminedError, identify_payload
+from .identification import PoseSample, UndeterminedError, identify_payload
 
 QUEUE_SIZE = 100
 MAX_SILENCE_S = 5.0

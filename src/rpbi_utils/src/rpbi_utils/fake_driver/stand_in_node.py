@@ -17,10 +17,11 @@ from custom_ros_tools.ros.joint_states import joint_state, values_in
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallRate
-from rpbi_utils.fake_driver.config import FakeDriverConfig
-from rpbi_utils.fake_driver.controller import Reflex, RobotController
-from rpbi_utils.fake_driver.measurement import Measurement
 from rpbi_utils.msg import DriverState
+
+from .config import FakeDriverConfig
+from .controller import Reflex, RobotController
+from .measurement import Measurement
 
 QUEUE_SIZE = 100
 STATE_HZ = 20.0

@@ -21,12 +21,12 @@ from std_srvs.srv import Trigger
 
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ResetJointState, RobotInfo, SetJointState
-from rpbi_utils.ros.console.running_simulator import RunningSimulator
-from rpbi_utils.ros.plain_text import plain_label
+from rpbi_utils.console.running_simulator import RunningSimulator
+from rpbi_utils.controls.requests import LIMIT_S, BackgroundRequests, RequestResult
+from rpbi_utils.plain_text import plain_label
 
-from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, ScrolledDown, named
-from ..requests import LIMIT_S, BackgroundRequests, RequestResult
+from .link import SimulatorLink, SimulatorSnapshot
+from .panel import Panel, ScrolledDown, named
 
 UNLIMITED_RAD, UNLIMITED_M = math.pi, 1.0
 """Range of the slider of a joint without limits, to both sides."""

@@ -6,11 +6,11 @@ from typing import Any
 from PyQt5.QtWidgets import QHBoxLayout, QPushButton
 from std_srvs.srv import Trigger
 
-from rpbi_utils.ros.console.running_simulator import RunningSimulator
+from rpbi_utils.console.running_simulator import RunningSimulator
+from rpbi_utils.controls.requests import BackgroundRequests
 
-from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
-from ..requests import BackgroundRequests
+from .link import SimulatorLink, SimulatorSnapshot
+from .panel import Panel, named
 
 BUTTONS = {"Start": "Lets the controller run", "Step": "Runs one cycle", "Stop": "Lets the robot stand"}
 """Titles of buttons and their tips; their services are `mpc/start` and so on."""

@@ -11,8 +11,9 @@ from typing import Any
 import rospy
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from rpbi_utils.live_plot.plot import LivePlot
-from rpbi_utils.ros.windows import missing_for_windows
+from rpbi_utils.windows import missing_for_windows
+
+from .plot import LivePlot
 
 NAME = "live_plot"
 
@@ -57,7 +58,7 @@ def _open(arguments: argparse.Namespace) -> tuple[Any, Any, Any]:
     from PyQt5.QtCore import QObject, pyqtSignal
     from PyQt5.QtWidgets import QApplication
 
-    from .source import FieldSource
+    from .source_topics import FieldSource
     from .window import LivePlotWindow
 
     class PlotSignals(QObject):

@@ -7,11 +7,11 @@ from PyQt5.QtCore import Qt
 from PyQt5.QtGui import QPixmap
 from PyQt5.QtWidgets import QComboBox, QSizePolicy, QVBoxLayout
 
-from rpbi_utils.ros.plain_text import plain_label
+from rpbi_utils.controls.requests import BackgroundRequests
+from rpbi_utils.plain_text import plain_label
 
-from ..link import IMAGE, SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
-from ..requests import BackgroundRequests
+from .link import IMAGE, SimulatorLink, SimulatorSnapshot
+from .panel import Panel, named
 
 NONE = "none"
 

@@ -22,8 +22,9 @@ from custom_ros_tools.ros.tf_listener import TfListener
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from robot_model.geometry import Pose
 from rpbi.engine.inputs import check_pose
-from rpbi_utils.tracking.config import TrackedObjectConfig, TrackingNodeConfig
-from rpbi_utils.tracking.tracker import PoseTracker
+
+from .config import TrackedObjectConfig, TrackingNodeConfig
+from .tracker import PoseTracker
 
 QUEUE_SIZE = 100
 LOOKS_HZ = 10.0

@@ -3,17 +3,17 @@
 from PyQt5.QtCore import QObject, Qt, QTimer, pyqtSignal
 from PyQt5.QtWidgets import QMainWindow, QSplitter, QVBoxLayout, QWidget
 
-from rpbi_utils.ros.plain_text import plain_label, plain_tip
+from rpbi_utils.controls.requests import BackgroundRequests, RequestResult
+from rpbi_utils.plain_text import plain_label, plain_tip
 
+from .cameras import CamerasPanel
+from .joints import JointsPanel
 from .link import SimulatorLink
+from .mpc import MpcPanel
+from .objects import ObjectsPanel
 from .panel import Panel, ScrolledDown, named
-from .panels.cameras import CamerasPanel
-from .panels.joints import JointsPanel
-from .panels.mpc import MpcPanel
-from .panels.objects import ObjectsPanel
-from .panels.recording import RecordingPanel
-from .panels.run import RunPanel
-from .requests import BackgroundRequests, RequestResult
+from .recording import RecordingPanel
+from .run import RunPanel
 
 TITLE = "ROS-PyBullet Interface Controls"
 REFRESH_MS = 100

@@ -15,7 +15,7 @@ from std_msgs.msg import Int64
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
 from ros_pybullet_interface.msg import SimulationState
-from rpbi_utils.ros.console.running_simulator import LIST, RunningSimulator
+from rpbi_utils.console.running_simulator import LIST, RunningSimulator
 
 LOOK_S = 1.0
 """Period of queries of the ROS master [s]."""

@@ -13,12 +13,12 @@ from PyQt5.QtWidgets import (
     QTableWidgetItem,
 )
 
-from rpbi_utils.ros.console.remove import remove
-from rpbi_utils.ros.console.spawn import spawn
+from rpbi_utils.console.remove import remove
+from rpbi_utils.console.spawn import spawn
+from rpbi_utils.controls.requests import BackgroundRequests, RequestResult
 
-from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
-from ..requests import BackgroundRequests, RequestResult
+from .link import SimulatorLink, SimulatorSnapshot
+from .panel import Panel, named
 
 ADD_LIMIT_S = 120.0
 """Longest time for adding an object [s]; a mesh may have to be simplified."""

@@ -7,12 +7,12 @@ from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QPushButton, QSpinBox
 from std_srvs.srv import Trigger
 
 from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
-from rpbi_utils.ros.console.running_simulator import RunningSimulator
-from rpbi_utils.ros.plain_text import plain_label
+from rpbi_utils.console.running_simulator import RunningSimulator
+from rpbi_utils.controls.requests import BackgroundRequests, RequestResult
+from rpbi_utils.plain_text import plain_label
 
-from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Condition, Panel, named
-from ..requests import BackgroundRequests, RequestResult
+from .link import SimulatorLink, SimulatorSnapshot
+from .panel import Condition, Panel, named
 
 MAX_STEPS = 1_000_000
 """Largest number of steps of one request; the simulator refuses more."""

@@ -12,8 +12,9 @@ import rospy
 from custom_ros_tools.errors import closest
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
 from rpbi_data.bags.message_type import MessageType
-from rpbi_utils.live_plot.fields import FieldError, FieldReader, split_name
-from rpbi_utils.live_plot.plot import LivePlot
+
+from .fields import FieldError, FieldReader, split_name
+from .plot import LivePlot
 
 LOOK_S = 1.0
 """Period of queries of the ROS master [s]."""

@@ -17,8 +17,9 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.transform_messages import transform_message
 from robot_model.geometry import Pose
-from rpbi_utils.tracking.config import AprilTagNodeConfig
-from rpbi_utils.tracking.tags import Image, TagDetector, tag_poses
+
+from .config import AprilTagNodeConfig
+from .tags import Image, TagDetector, tag_poses
 
 QUEUE_SIZE = 10
 CHANNELS = {"mono8": 1, "rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}

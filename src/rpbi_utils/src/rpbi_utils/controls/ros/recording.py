@@ -8,11 +8,11 @@ from PyQt5.QtWidgets import QCheckBox, QGridLayout, QLineEdit, QPushButton
 from std_msgs.msg import String
 
 from rpbi_data.bags.recorded_topics import Recorder
-from rpbi_utils.ros.plain_text import plain_label
+from rpbi_utils.controls.requests import BackgroundRequests, RequestResult
+from rpbi_utils.plain_text import plain_label
 
-from ..link import SimulatorLink, SimulatorSnapshot
-from ..panel import Panel, named
-from ..requests import BackgroundRequests, RequestResult
+from .link import SimulatorLink, SimulatorSnapshot
+from .panel import Panel, named
 
 FOLDER = "~/rpbi_recordings"
 LIMIT_S = 60.0

@@ -1,1 +1,0 @@
-"""The parts of `rpbi_utils` that use ROS."""

@@ -1,1 +1,0 @@
-"""The node that emulates the driver of a robot."""

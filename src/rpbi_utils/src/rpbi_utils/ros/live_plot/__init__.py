@@ -1,1 +1,0 @@
-"""A window with numeric fields of running topics as lines over time."""
