@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
 import rospy
-from node_world import Rosout
+from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 
@@ -100,3 +101,21 @@ def test_published_state_has_names_stamp_and_only_the_given_values(ros):
 def test_faulty_values_are_not_published(ros, faulty):
     with pytest.raises(ValueError):
         JointStatePublisher("/published", ["a", "b"]).publish(**faulty)
+
+
+def test_slow_callback_gets_every_state(ros):
+    """A demonstration recorded on a busy machine lost samples, since only the newest state was kept."""
+    positions: list[float] = []
+
+    def slow(state: JointState) -> None:
+        if not positions:
+            time.sleep(0.3)
+        positions.append(state.position[0])
+
+    subscriber = JointStateSubscriber("/slow", ["a"], callback=slow)
+    with publishing("/slow", JointState) as publisher:
+        for count in range(50):
+            publisher.publish(JointState(name=["a"], position=[count]))
+        wait_until(lambda: len(positions) == 50, "each state has come", 20.0)
+    assert positions == list(range(50))
+    subscriber.unregister()

@@ -91,7 +91,9 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
 
 def _times_gone(ros, simulator):
     """Returns how often a simulator itself has said that the master is gone; its camera says so too."""
-    return sum(GONE in line and f"{NODE} goes on" in line for line in ros.output(simulator).splitlines())
+    return sum(
+        GONE in line and f"{NODE} keeps its existing connections" in line for line in ros.output(simulator).splitlines()
+    )
 
 
 def _connected(master, topic):

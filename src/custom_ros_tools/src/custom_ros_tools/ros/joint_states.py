@@ -102,6 +102,10 @@ class JointStatePublisher(rospy.Publisher):
         super().publish(joint_state(values, Header(stamp=rospy.Time.now())))
 
 
+QUEUE_SIZE = 1000
+"""Messages that wait for a callback which needs each of them."""
+
+
 class JointStateSubscriber(rospy.Subscriber):
     """Stores the newest joint state of a topic, its joints in the order of a list.
 
@@ -110,7 +114,7 @@ class JointStateSubscriber(rospy.Subscriber):
     Args:
         joint_names: The n joints.
         ns: Prefix of their names in messages, as `ns` in `ns/joint`.
-        callback: Called with each joint state, its joints in order.
+        callback: Called with each joint state, its joints in order; on a busy machine up to 1,000 wait for it.
     """
 
     def __init__(
@@ -123,7 +127,8 @@ class JointStateSubscriber(rospy.Subscriber):
         self._names, self._ns, self._callback = tuple(joint_names), ns, callback
         self._topic, self._warn = rospy.resolve_name(topic_name), ThrottledWarning()
         self._newest: JointState | None = None
-        super().__init__(self._topic, JointState, self._on_message, queue_size=1, tcp_nodelay=True)
+        queue_size = 1 if callback is None else QUEUE_SIZE
+        super().__init__(self._topic, JointState, self._on_message, queue_size=queue_size, tcp_nodelay=True)
 
     def received(self) -> bool:
         """Returns whether there is a joint state."""
