@@ -84,7 +84,7 @@ def test_packages_for_compatibility_have_no_code():
     assert not {path.parent.name for path in COMPATIBILITY.glob("*/package.xml")} & set(MODULES)
 
 
-@pytest.mark.parametrize("package", MODULES.keys() - BY_FEATURE)
+@pytest.mark.parametrize("package", sorted(MODULES.keys() - BY_FEATURE))
 def test_only_ros_folders_import_middleware(package):
     offenders = [
         f"{path.relative_to(ROOT)} imports {name}"

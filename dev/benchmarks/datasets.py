@@ -14,7 +14,7 @@ from PIL import Image as PilImage
 from result import Result, Target
 from sensor_msgs.msg import CompressedImage, Image, JointState
 
-from rpbi_data.datasets.export import Wish, export_folder
+from rpbi_data.datasets.export import ExportOptions, export_folder
 from rpbi_data.datasets.formats import FORMATS
 from rpbi_data.episodes.bags import measure_topics
 from rpbi_data.episodes.folder import BAG, EpisodeFolder
@@ -44,7 +44,7 @@ def run(quick: bool) -> list[Result]:
             format_class = FORMATS["lerobot"]
             format_ = format_class(format_class.Config.parse({}, "benchmark"))
             begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
-            export_folder(folder, Path(name) / "out", "lerobot", format_, Wish(FPS, "test"), lambda _: None)
+            export_folder(folder, Path(name) / "out", "lerobot", format_, ExportOptions(FPS, "test"), lambda _: None)
             wall_s, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s
             figure = f"{seconds:g} s of two {kind} cameras of {WIDTH} x {HEIGHT} to LeRobot"
             results.append(Result("datasets", f"{figure}: processor", cpu_s / seconds, "s per s", None, Target(1.0)))

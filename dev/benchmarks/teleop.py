@@ -30,7 +30,7 @@ REFUSING = {"period_s": 0.009, "start_from": "target", "limits": {"acceleration"
 REFUSING |= {"start_tolerance": 10.0}  # it is started again wherever the target is
 TARGETS = {True: "/guarded/joint_states/target", False: "/rpbi/kuka_lwr/joint_states/target"}
 """Where inverse kinematics publishes, with and without guards."""
-LATE = ("staleness", "source", "master", "command_rate", "command_timeout", "following_error", "torque")
+LOAD_REASONS = ("staleness", "source", "master", "command_rate", "command_timeout", "following_error", "torque")
 """How reasons begin that depend on how busy the machine is, too; others follow from the commands alone."""
 ROW = "{:<9} {:>4}  {:<5} {:>7} {:>7}  {}"
 HEADING = ROW.format("device", "seed", "guard", "time", "targets", "stopped by")
@@ -52,9 +52,9 @@ def run(quick: bool) -> list[Result]:
     minutes = sum(found["seconds"] for found in runs) / 60.0
     decisions = sum(found["decisions"] for found in runs)
     reasons = [reason for found in runs for reason in (*found["unsafe"], found["reflex"]) if reason]
-    late = sum(reason.startswith(LATE) for reason in reasons)
-    unsafe = sum(not reason.startswith(LATE) for found in runs for reason in found["unsafe"])
-    stops = sum(bool(found["reflex"]) and not found["reflex"].startswith(LATE) for found in runs)
+    late = sum(reason.startswith(LOAD_REASONS) for reason in reasons)
+    unsafe = sum(not reason.startswith(LOAD_REASONS) for found in runs for reason in found["unsafe"])
+    stops = sum(bool(found["reflex"]) and not found["reflex"].startswith(LOAD_REASONS) for found in runs)
     peaks = {each: max(found[f"peak_{each}"] for found in runs) for each in ("velocity", "acceleration", "jerk")}
     reflexes = sum(bool(found["reflex"]) for found in control)
     return [

@@ -8,12 +8,12 @@ import pybullet
 import pytest
 
 from ik_ros.formulation.clearance import clearance
-from ik_ros.shape import Core, ShapeConfig
+from ik_ros.shape import RoundedCore, ShapeConfig
 
 SHAPES = {"sphere": {"sphere": 0.1}, "capsule": {"capsule": [0.1, 0.6]}, "box": {"box": [0.3, 0.5, 0.7]}}
 
 
-def placed(kind: str, position: np.ndarray, rotation: np.ndarray) -> tuple[Core, pin.SE3]:
+def placed(kind: str, position: np.ndarray, rotation: np.ndarray) -> tuple[RoundedCore, pin.SE3]:
     return ShapeConfig.parse({"name": kind, **SHAPES[kind]}, "test").core, pin.SE3(rotation, position)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
 from robot_model.conformance import MIMIC, SKEW
-from robot_model.frames import FEW
+from robot_model.frames import MAX_MATRIX_PRODUCTS
 from robot_model.geometry import ZERO
 from robot_model.joints import AffineMap, followed
 from robot_model.model import RobotModel
@@ -25,7 +25,7 @@ def robot_of(folder: Path, text: str, joints: tuple[str, ...] = ()) -> RobotMode
 
 def test_many_configurations_have_the_frames_of_each(tmp_path):
     for robot in (RobotModel(KUKA), robot_of(tmp_path, MIMIC)):
-        q = np.random.default_rng(0).uniform(-1.0, 1.0, (3 * FEW, len(robot.joint_names)))
+        q = np.random.default_rng(0).uniform(-1.0, 1.0, (3 * MAX_MATRIX_PRODUCTS, len(robot.joint_names)))
         each = [robot.frames.of_links(row[None])[0] for row in q]
         np.testing.assert_allclose(robot.frames.of_links(q), each, atol=1e-14)
         link = robot.frames.links[-1]

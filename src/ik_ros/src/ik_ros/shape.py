@@ -11,7 +11,7 @@ from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf, Position, P
 from robot_model.geometry import Pose
 
 
-class Core(NamedTuple):
+class RoundedCore(NamedTuple):
     """The core of a rounded shape: the point, line or box at its centre.
 
     Attributes:
@@ -66,10 +66,10 @@ class ShapeConfig(ConfigModel):
         return Pose(self.position, self.orientation)
 
     @property
-    def core(self) -> Core:
+    def core(self) -> RoundedCore:
         """Its core: the shape without its roundness."""
         if self.sphere is not None:
-            return Core(np.zeros(3), self.sphere)
+            return RoundedCore(np.zeros(3), self.sphere)
         if self.capsule is not None:
-            return Core(np.array((0.0, 0.0, self.capsule[1] / 2.0)), self.capsule[0])
-        return Core(np.array(self.box) / 2.0, 0.0)
+            return RoundedCore(np.array((0.0, 0.0, self.capsule[1] / 2.0)), self.capsule[0])
+        return RoundedCore(np.array(self.box) / 2.0, 0.0)

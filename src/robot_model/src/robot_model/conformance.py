@@ -15,7 +15,7 @@ from .joints import Array
 from .limits import Limits
 from .model import RobotModel
 
-TRIED = 10
+CONFIGURATIONS = 10
 """Number of random configurations of each robot."""
 SKEW = """<robot name="skew">
   <link name="root"/><link name="foot"/><link name="thigh"/><link name="plate"/><link name="rod"/><link name="tip"/>
@@ -94,7 +94,7 @@ class BackendConformance(ABC):
     def configurations(self, robot: RobotModel) -> list[list[float]]:
         """Returns random configurations within limits."""
         generator = np.random.default_rng(1)
-        return [robot.limits.random(generator, robot.limits.middle) for _ in range(TRIED)]
+        return [robot.limits.random(generator, robot.limits.middle) for _ in range(CONFIGURATIONS)]
 
     def test_joints_and_their_limits_are_those_of_the_urdf(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]

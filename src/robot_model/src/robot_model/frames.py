@@ -14,7 +14,7 @@ from .geometry import Vector
 from .joints import AffineMap, Array
 from .urdf.elements import UrdfJoint
 
-FEW = 24
+MAX_MATRIX_PRODUCTS = 24
 """Number of configurations up to which products of 4 x 4 matrices are faster than arrays with one row for each
 entry."""
 _ROOT = np.eye(4)
@@ -81,13 +81,13 @@ class LinkFrames:
         key = q.tobytes()
         last, frames = self._last
         if key != last:
-            frames = (self._of_few if len(q) <= FEW else self._of_many)(q)
+            frames = (self._of_few if len(q) <= MAX_MATRIX_PRODUCTS else self._of_many)(q)
             self._last = key, frames  # several callers request the same configurations
         return frames
 
     def of_links(self, q: Array) -> Array:
         """Returns the poses of all links in the root, in the order of `links`, k x links x 4 x 4."""
-        if len(q) <= FEW:
+        if len(q) <= MAX_MATRIX_PRODUCTS:
             poses: Array = self.at(q).take(self._frame_of_link, axis=1) @ self._pose_of_link
             return poses
         frames = self.at(q).transpose(1, 3, 2, 0)[:, :, :3].reshape(len(self._parts), 4, -1)

@@ -16,7 +16,7 @@ from ros_pybullet_interface.msg import WorldCommands
 from ros_pybullet_interface.srv import StepN
 from rpbi.config.pybullet_models import ObjectTf
 from rpbi.engine.inputs import PoseInput
-from rpbi.ros.tf_follower import Followed
+from rpbi.ros.tf_follower import FollowedFrame
 
 SPEED = 0.3
 TIME_STEP_S, TICKS = 0.002, 10
@@ -106,7 +106,7 @@ def test_hand_moved_by_tf_carries_boxes_and_silence_warns_once(ros, load_states)
     ],
 )
 def test_stream_is_read_on_arrival_at_regular_intervals(sent_ms, seen_ms):
-    followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=30), print))
+    followed = FollowedFrame("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=30), print))
     sent_ms = list(sent_ms)
     seen = []
     for now_ms in range(1, 490):
@@ -121,7 +121,7 @@ def test_stream_is_read_on_arrival_at_regular_intervals(sent_ms, seen_ms):
 
 
 def test_frame_sent_by_others_is_read_every_period():
-    followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=50), print))
+    followed = FollowedFrame("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=50), print))
     looks = []
     for now_ms in range(1000):
         if now_ms / 1e3 >= followed.due_s(-1.0):

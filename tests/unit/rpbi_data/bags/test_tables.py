@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rpbi_data.bags import tables
-from rpbi_data.bags.clock import SetBack, clock_of
+from rpbi_data.bags.clock import ClockStep, clock_of
 from rpbi_data.bags.message_type import MessageType
 from rpbi_data.bags.tables import TableBuilder
 
@@ -183,8 +183,8 @@ def test_clock_set_back_and_mixed_message_types_are_reported(
 def test_stamps_of_several_frames_are_not_compared() -> None:
     table = pd.DataFrame({"record_time": [1.0, 2.0, 3.0, 4.0], "child": ["b", "a", "b", "a"]}, [50.0, 10.0, 51.0, 11.0])
     assert not clock_of(table).is_fault
-    assert clock_of(table.assign(child="a")) == SetBack(50.0, 40.0)
-    assert clock_of(table.assign(child=["b", "b", "a", "a"])) == SetBack(50.0, 40.0)
+    assert clock_of(table.assign(child="a")) == ClockStep(50.0, 40.0)
+    assert clock_of(table.assign(child=["b", "b", "a", "a"])) == ClockStep(50.0, 40.0)
 
 
 def test_a_topic_without_messages_is_an_empty_table() -> None:

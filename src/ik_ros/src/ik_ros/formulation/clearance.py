@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import hppfcl
 import numpy as np
 
-from ik_ros.shape import Core
+from ik_ros.shape import RoundedCore
 
 CROSSING_M = 1e-9
 """Distance between two lines below which they have no direction [m]."""
@@ -20,7 +20,7 @@ class RobotShape(NamedTuple):
         placement: Its pose in the link or base, a `pinocchio.SE3`.
     """
 
-    core: Core
+    core: RoundedCore
     link_id: int | None
     placement: Any
 
@@ -41,7 +41,7 @@ class Clearance(NamedTuple):
     second: np.ndarray
 
 
-def clearance(first: Core, place: Any, second: Core, other: Any) -> Clearance:
+def clearance(first: RoundedCore, place: Any, second: RoundedCore, other: Any) -> Clearance:
     """Returns the distance of two shapes with their places in the base, each a `pinocchio.SE3`.
 
     It is measured between cores, since hpp-fcl returns no direction for round shapes that penetrate.
@@ -58,6 +58,6 @@ def clearance(first: Core, place: Any, second: Core, other: Any) -> Clearance:
     return Clearance(distance - first.radius - second.radius, direction, *ends)
 
 
-def _core(core: Core) -> Any:
+def _core(core: RoundedCore) -> Any:
     """Returns a box, or a line or point as a capsule of radius 0."""
     return hppfcl.Box(2.0 * core.half) if core.is_box else hppfcl.Capsule(0.0, 2.0 * core.half[2])

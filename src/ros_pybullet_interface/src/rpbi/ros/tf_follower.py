@@ -24,7 +24,7 @@ TF_MISSING_AFTER_S = 5.0
 """Longest absence of a TF frame [s] of wall time; beyond it, a warning is logged."""
 LONGEST_NAP_S = 0.1
 """Longest sleep, after which a new frame to follow is noticed [s] of wall time."""
-EARLY, LATE = 0.75, 1.5
+LOOK_FROM, LOOK_UNTIL = 0.75, 1.5
 """Shares of a period: from the first on, a transform that comes is looked at; where more are to come, till the last."""
 STALE_AGAIN_AFTER_S = 30.0
 """Time until a stale frame is logged again [s] of wall time."""
@@ -75,7 +75,7 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     raise error
 
 
-class Followed:
+class FollowedFrame:
     """A pose input and the state of its frame.
 
     It is looked up when it comes, about once a period: at other times, steps of a motion would differ. Where nothing
@@ -99,8 +99,8 @@ class Followed:
         """Returns the time of the next look-up, after an arrival at a time."""
         if came_s <= self.looked_s:
             return self.looked_s + self.period_s
-        is_early = came_s < self.news_s + EARLY * self.period_s
-        return self.looked_s + LATE * self.period_s if is_early else came_s
+        is_early = came_s < self.news_s + LOOK_FROM * self.period_s
+        return self.looked_s + LOOK_UNTIL * self.period_s if is_early else came_s
 
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
         """Stores its stamp; returns whether it is new."""
@@ -127,13 +127,13 @@ class TfFollower:
 
     def __init__(self, put: Callable[[str, Any], None], time_s: Callable[[], float]) -> None:
         self._put, self._time_s = put, time_s
-        self._followed: tuple[Followed, ...] = ()
+        self._followed: tuple[FollowedFrame, ...] = ()
         self._tf: WatchedTf | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Begins to follow a frame for a body or sensor."""
-        self._followed = (*self._followed, Followed(name, slot, pose_input))
+        self._followed = (*self._followed, FollowedFrame(name, slot, pose_input))
         if self._tf is None:
             self._tf = WatchedTf()
             threading.Thread(target=self._run, args=(self._tf,), name="tf follower", daemon=True).start()
@@ -165,7 +165,7 @@ class TfFollower:
                 next_s = min(next_s, due_s)
             tf.something_came.wait(max(next_s - time.monotonic(), 0.001))
 
-    def _look(self, tf: WatchedTf, followed: Followed, now_s: float) -> None:
+    def _look(self, tf: WatchedTf, followed: FollowedFrame, now_s: float) -> None:
         found = tf.pose(world_frame(), followed.tf_id)
         if found is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
@@ -185,7 +185,7 @@ class TfFollower:
                 if followed in self._followed:  # else it has gone meanwhile
                     self._warn(followed.slot, f"TF refused: {reason}")
 
-    def _report_stale(self, followed: Followed, stamp_ns: int, now_s: float) -> None:
+    def _report_stale(self, followed: FollowedFrame, stamp_ns: int, now_s: float) -> None:
         """Logs once that a frame is stale, unless it is static, and once that it is back."""
         time_s = self._time_s()
         if followed.is_new(stamp_ns, now_s, time_s):

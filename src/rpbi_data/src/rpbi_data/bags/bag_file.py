@@ -13,7 +13,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import roslz4
 
-from .clock import SetBack, set_back
+from .clock import ClockStep, set_back
 from .limits import MAX_CONNECTIONS, LimitError
 from .nanoseconds import PER_SECOND
 
@@ -109,7 +109,7 @@ class BagFile:
         """Uncompressed size of all chunks, according to their headers [bytes]."""
         return sum(each.size for each in self.chunks)
 
-    def clock_of(self, connections: Collection[int]) -> SetBack:
+    def clock_of(self, connections: Collection[int]) -> ClockStep:
         """Returns the largest step back in the recording times of some connections, in the order of the file."""
         index = self._index_of(connections)
         index = index[np.lexsort((index["offset"], index["chunk"]))]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from custom_ros_tools.errors import shortened
 
 from .bag_file import BagFile, NotABagError
-from .clock import SetBack
+from .clock import ClockStep
 from .errors import BagError
 from .limits import MAX_ALL_DEFINITIONS_BYTES, MAX_TOPICS, Budget, LimitError
 from .message_type import MessageType
@@ -102,7 +102,7 @@ class BagReader:
             self.budget.check_time(topic)
             yield BagMessage(topic, message_type, raw, record_time_ns)
 
-    def clock_of(self, topic: str) -> SetBack:
+    def clock_of(self, topic: str) -> ClockStep:
         """Returns the largest step back in the recording times of a topic, in the order of the file."""
         return self._bag.clock_of([number for number, each in self._types.items() if each[0] == topic])
 

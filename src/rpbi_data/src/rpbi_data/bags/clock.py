@@ -18,7 +18,7 @@ synchronous.
 """
 
 
-class SetBack(NamedTuple):
+class ClockStep(NamedTuple):
     """Times that run back against the order of recording.
 
     Attributes:
@@ -38,7 +38,7 @@ class SetBack(NamedTuple):
         return f"its clock was set back by {self.back_s:.6g} s at {self.time_s:.9g} s"
 
 
-def set_back(times: Array) -> SetBack:
+def set_back(times: Array) -> ClockStep:
     """Returns the largest step back of times.
 
     Args:
@@ -47,12 +47,12 @@ def set_back(times: Array) -> SetBack:
     latest = np.maximum.accumulate(times)
     back = latest - times
     if not back.any():
-        return SetBack(0.0, 0.0)
+        return ClockStep(0.0, 0.0)
     worst = int(np.argmax(back))
-    return SetBack(float(latest[worst]), float(back[worst]))
+    return ClockStep(float(latest[worst]), float(back[worst]))
 
 
-def clock_of(table: pd.DataFrame) -> SetBack:
+def clock_of(table: pd.DataFrame) -> ClockStep:
     """Returns the largest step back of a table's stamps against the order of recording.
 
     Args:

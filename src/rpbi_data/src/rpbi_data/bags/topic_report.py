@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .bag_reader import BagMessage, BagReader
-from .clock import SetBack, set_back
+from .clock import ClockStep, set_back
 from .nanoseconds import PER_SECOND, to_seconds
 
 Array = NDArray[Any]
@@ -73,7 +73,7 @@ def message_time(message: BagMessage) -> float:
     return float(to_seconds(message_time_ns(message)))
 
 
-def _rhythm(times: Array, clock: SetBack) -> tuple[float, float, float, float, float]:
+def _rhythm(times: Array, clock: ClockStep) -> tuple[float, float, float, float, float]:
     """Returns mean rate [Hz], longest gap, largest time by which times run back, first and last time [s]."""
     back_s = max(set_back(times).back_s, clock.back_s)
     ordered = np.sort(times)

@@ -9,9 +9,9 @@ import yaml
 
 from custom_ros_tools.console.argument import Argument, UsageError, number
 from custom_ros_tools.foreign import printable
-from rpbi_data.datasets.export import Wish, export_folder
+from rpbi_data.datasets.export import ExportOptions, export_folder
 from rpbi_data.datasets.formats import FORMATS
-from rpbi_data.datasets.signals import NEXT, PREVIOUS, Choice
+from rpbi_data.datasets.signals import NEXT, PREVIOUS, RowOptions
 from rpbi_data.episodes.folder import EpisodeFolder
 
 POSE, DELTAS = "pose", "deltas"
@@ -81,7 +81,7 @@ def export(
         raise UsageError(f"--action: expected next or previous, and pose only with next, got {' '.join(action)}")
     if POSE in words and not end_effector:
         raise UsageError("--action pose: expected --end-effector ROBOT/LINK, too")
-    choice = Choice(
+    row_options = RowOptions(
         state=None if state is None else tuple(state),
         action=topics or None,
         images=None if images is None else tuple(images),
@@ -93,10 +93,10 @@ def export(
         is_delta=DELTAS in words,
     )
     name = task or folder.absolute().name
-    wish = Wish(fps, name, tuple(label), choice, disk_reserve_mb, any_size, max_time_error)
+    options = ExportOptions(fps, name, tuple(label), row_options, disk_reserve_mb, any_size, max_time_error)
     target = out or folder.absolute().with_name(f"{folder.absolute().name}_{to.rpartition(':')[2]}")
     format_ = made(made.Config.parse(_options(option), "--option"))
-    result = export_folder(EpisodeFolder(folder), target, to, format_, wish, lambda line: print(line, flush=True))
+    result = export_folder(EpisodeFolder(folder), target, to, format_, options, lambda line: print(line, flush=True))
     for fault in result.faults:
         print(printable(fault))
     count = len(result.exported)

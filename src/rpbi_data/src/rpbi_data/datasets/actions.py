@@ -22,8 +22,8 @@ from .signals import (
     NEXT,
     OTHER_ACTIONS,
     TARGETS_NAME,
-    Choice,
     Column,
+    RowOptions,
     Signal,
     Tables,
     joint_columns,
@@ -39,7 +39,7 @@ ROTATION_VECTOR = ("rx", "ry", "rz")
 
 
 def derive_actions(
-    tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice, pose: Sequence[Column]
+    tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions, pose: Sequence[Column]
 ) -> list[Signal]:
     """Returns the feature `action`; none if there are no commands.
 
@@ -47,40 +47,40 @@ def derive_actions(
         tables: Tables of a recording, those of TF by frame.
         types: Types of messages by topic.
         fixed: Names of joints that cannot move, which are left out.
-        choice: Topics and meaning of actions.
+        row_options: Topics and meaning of actions.
         pose: Columns of the pose of the end effector; empty without one.
 
     Raises:
         UnknownNameError: If no target has a joint of the gripper.
         ValueError: If differences are asked for, but commands are not positions of joints.
     """
-    found = _commands(tables, types, fixed, choice)
-    arm = [each for each in found if joint_of(each[0]) not in choice.gripper]
-    gripper = [each for each in found if joint_of(each[0]) in choice.gripper]
-    for name in choice.gripper:
+    found = _commands(tables, types, fixed, row_options)
+    arm = [each for each in found if joint_of(each[0]) not in row_options.gripper]
+    gripper = [each for each in found if joint_of(each[0]) in row_options.gripper]
+    for name in row_options.gripper:
         if name not in {joint_of(column) for column, _ in gripper}:
             raise UnknownNameError("joint of targets", name, sorted({joint_of(column) for column, _ in found}))
-    if choice.is_pose:
+    if row_options.is_pose:
         arm = [(column, Column("", "")) for column in pose]
     both = [*arm, *gripper]
     if not both:
         return []
     columns, held = tuple(column for column, _ in both), tuple(measured for _, measured in both)
     names = names_of(columns)
-    if choice.is_pose:
-        names = (*AXES, *(ROTATION_VECTOR if choice.is_delta else QUATERNION), *names_of(columns[len(pose) :]))
-    elif choice.is_delta and (others := [column for column, measured in arm if not measured.table]):
+    if row_options.is_pose:
+        names = (*AXES, *(ROTATION_VECTOR if row_options.is_delta else QUATERNION), *names_of(columns[len(pose) :]))
+    elif row_options.is_delta and (others := [column for column, measured in arm if not measured.table]):
         got = f"'{others[0].name}' of {others[0].table}"
         raise ValueError(f"--action deltas: expected targets of joint positions, got {got}")
-    return [Signal(Feature(ACTION, names), columns, choice.timing, held, len(arm) if choice.is_delta else 0)]
+    return [Signal(Feature(ACTION, names), columns, row_options.timing, held, len(arm) if row_options.is_delta else 0)]
 
 
 def _commands(
-    tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice
+    tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions
 ) -> list[tuple[Column, Column]]:
     """Returns the columns of commands, each with that of the measured position; its table is empty without one."""
-    topics = list(choice.action or ())
-    if choice.action is None:
+    topics = list(row_options.action or ())
+    if row_options.action is None:
         joints = [topic for topic in tables if types.get(topic) == JOINTS]
         topics = [topic for topic in joints if TARGETS_NAME.fullmatch(topic)]
         others = [*joints, *(topic for topic in tables if types.get(topic) in OTHER_ACTIONS)]

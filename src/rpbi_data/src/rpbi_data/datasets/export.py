@@ -26,18 +26,18 @@ from .format import (
     Schema,
 )
 from .provenance import remove_episode, write_episode, write_export
-from .signals import Choice, Signal
+from .signals import RowOptions, Signal
 from .source import SourceEpisode
 
 
-class Wish(NamedTuple):
+class ExportOptions(NamedTuple):
     """Content of a data set, as the user wants it.
 
     Attributes:
         fps: Rows a second.
         task: The task in words.
         labels: Labels of the episodes to export; empty for all.
-        choice: Content of rows.
+        row_options: Content of rows.
         disk_reserve_mb: Free space of the disk that is never used [MB].
         any_size: Whether bags may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s].
@@ -46,7 +46,7 @@ class Wish(NamedTuple):
     fps: int
     task: str
     labels: tuple[str, ...] = ()
-    choice: Choice = Choice()
+    row_options: RowOptions = RowOptions()
     disk_reserve_mb: float = 200.0
     any_size: bool = False
     max_time_error_s: float = float("inf")
@@ -80,7 +80,12 @@ class _Plan(NamedTuple):
 
 
 def export_folder(
-    folder: EpisodeFolder, target: Path, name: str, format_: DatasetFormat, wish: Wish, report: Callable[[str], None]
+    folder: EpisodeFolder,
+    target: Path,
+    name: str,
+    format_: DatasetFormat,
+    options: ExportOptions,
+    report: Callable[[str], None],
 ) -> Result:
     """Exports the episodes of a folder as a data set.
 
@@ -91,7 +96,7 @@ def export_folder(
         target: Folder of the data set; it must not exist.
         name: Name of the format.
         format_: The format.
-        wish: Content of the data set.
+        options: Content of the data set.
         report: Is called with a sentence for each episode.
 
     Raises:
@@ -102,18 +107,18 @@ def export_folder(
     if target.exists():
         raise DatasetError(target, "exists already: name a folder that does not")
     result = Result()
-    plan = _plan(folder, format_, wish, result)
+    plan = _plan(folder, format_, options, result)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.parent / f".{target.name}.part"
     shutil.rmtree(part, ignore_errors=True)  # of an export that was killed
     part.mkdir()
     try:
         format_.open(part, plan.schema)
-        _add_all(part, format_, plan, wish.disk_reserve_mb, result, report)
+        _add_all(part, format_, plan, options.disk_reserve_mb, result, report)
         if not result.exported:
             raise EpisodeError(folder.path, "\n".join(["no episode was exported", *result.faults]))
         try:
-            _complete(part, format_, result, lambda: _facts(folder, name, wish, plan, result))
+            _complete(part, format_, result, lambda: _facts(folder, name, options, plan, result))
         except OSError as error:
             raise DatasetError(target, f"cannot be completed: {error}") from error
         part.rename(target)
@@ -122,16 +127,18 @@ def export_folder(
     return result
 
 
-def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Result) -> _Plan:
+def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions, result: Result) -> _Plan:
     """Returns the episodes to export, and the features that most of them have."""
     sources = []
     for number in folder.numbers():
         try:
             episode = folder.read(number)
-            if wish.labels and episode.label not in wish.labels:
+            if options.labels and episode.label not in options.labels:
                 continue
             _require_complete(folder, episode)
-            source = SourceEpisode(folder, episode, wish.choice, wish.task, wish.any_size, wish.max_time_error_s)
+            source = SourceEpisode(
+                folder, episode, options.row_options, options.task, options.any_size, options.max_time_error_s
+            )
             if format_.has_rows:
                 source.signals, source.cameras  # noqa: B018 (reads the bag)
                 _forget(source)
@@ -143,7 +150,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
         except Exception as error:  # an episode may have anything in it
             result.faults.append(_fault(number, error))
     if not sources:
-        wanted = f" with the label {' or '.join(wish.labels)}" if wish.labels else ""
+        wanted = f" with the label {' or '.join(options.labels)}" if options.labels else ""
         raise EpisodeError(folder.path, "\n".join([f"no episode{wanted} can be exported", *result.faults]))
     if not format_.has_rows:
         return _Plan(sources)
@@ -156,7 +163,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
             raise EpisodeError(folder.path, f"no topic for '{key}' in the recordings: name one by {option} TOPIC")
     errors = (*(feature.key for feature in features), *(camera.key for camera in cameras))
     own = (Feature(STAMP, STAMP_NAMES, "int64"), Feature(TIME_ERROR, errors))
-    return _Plan(sources, signals, Schema(wish.fps, (*features, *own), cameras))
+    return _Plan(sources, signals, Schema(options.fps, (*features, *own), cameras))
 
 
 def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFeature, ...]]:
@@ -257,18 +264,18 @@ def _fault(number: int, error: Exception) -> str:
     return f"episode {number}: {kind}{'; '.join(str(error).splitlines())}"
 
 
-def _facts(folder: EpisodeFolder, name: str, wish: Wish, plan: _Plan, result: Result) -> dict[str, object]:
+def _facts(folder: EpisodeFolder, name: str, options: ExportOptions, plan: _Plan, result: Result) -> dict[str, object]:
     schema = plan.schema or Schema(0, ())
     return {
         "format": name,
         "source": str(folder.path.absolute()),
         "episodes": result.exported,
         "left_out": result.faults,
-        "task": wish.task,
+        "task": options.task,
         "fps": schema.fps or None,
         "features": {each.key: list(each.names) for each in schema.features},
         "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras},
         "topics": {each.feature.key: sorted({table for table, _ in each.columns}) for each in plan.signals},
         "methods": {each.feature.key: each.method for each in plan.signals},
-        "action": {"pose": wish.choice.is_pose, "deltas": wish.choice.is_delta} if schema.fps else None,
+        "action": {"pose": options.row_options.is_pose, "deltas": options.row_options.is_delta} if schema.fps else None,
     }

@@ -33,7 +33,7 @@ _OF_ROBOT = re.compile(r"/joint_states(/target)?$")
 AXES = ("x", "y", "z")
 
 NEXT, PREVIOUS = "next", "previous"
-"""Times of actions, see `Choice`."""
+"""Times of actions, see `RowOptions`."""
 GRIPPER, END_EFFECTOR = "observation.gripper", "observation.end_effector"
 _ALWAYS = (STATE, GRIPPER, END_EFFECTOR)
 
@@ -76,8 +76,8 @@ class Signal(NamedTuple):
         return self.method not in (NEXT, PREVIOUS)
 
 
-class Choice(NamedTuple):
-    """Content of rows chosen by the user; with None, topics are derived.
+class RowOptions(NamedTuple):
+    """Content of rows; with None, topics are derived.
 
     Attributes:
         state: Topics of `observation.state`.
@@ -102,17 +102,17 @@ class Choice(NamedTuple):
     is_delta: bool = False
 
 
-def wanted_topics(types: Mapping[str, str], choice: Choice) -> list[str]:
+def wanted_topics(types: Mapping[str, str], row_options: RowOptions) -> list[str]:
     """Returns the topics whose tables are needed.
 
     Args:
         types: Types of messages by topic.
-        choice: Topics that the user names.
+        row_options: Topics that the user names.
 
     Raises:
         UnknownNameError: If a named topic does not exist.
     """
-    named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
+    named = {*(row_options.state or ()), *(row_options.action or ()), *(row_options.images or ())}
     for topic in sorted(named - types.keys()):
         raise UnknownNameError("topic", topic, types)
     derived = {topic for topic, kind in types.items() if _has_features(topic, kind)}
@@ -127,11 +127,11 @@ def _has_features(topic: str, kind: str) -> bool:
     )
 
 
-def is_used(topic: str, kinds: Collection[str], choice: Choice) -> bool:
+def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool:
     """Returns whether messages of a topic, of one type or several, would be a feature."""
-    named = {*(choice.state or ()), *(choice.action or ()), *(choice.images or ())}
+    named = {*(row_options.state or ()), *(row_options.action or ()), *(row_options.images or ())}
     return topic in named or any(
-        _has_features(topic, kind) or (is_image(kind) and choice.images is None) for kind in kinds
+        _has_features(topic, kind) or (is_image(kind) and row_options.images is None) for kind in kinds
     )
 
 
@@ -140,9 +140,9 @@ def is_image(kind: str) -> bool:
     return kind in (RAW_TYPE, COMPRESSED_TYPE)
 
 
-def image_topics(types: Mapping[str, str], choice: Choice) -> dict[str, str]:
+def image_topics(types: Mapping[str, str], row_options: RowOptions) -> dict[str, str]:
     """Returns the topics of images by key of the feature; of a raw topic and its compressed one, the raw one."""
-    topics = choice.images
+    topics = row_options.images
     if topics is None:
         found = {topic for topic, kind in types.items() if is_image(kind)}
         topics = tuple(sorted(topic for topic in found if topic.removesuffix("/compressed") not in found - {topic}))
@@ -159,7 +159,7 @@ def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
 
 
 def derive(
-    tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], choice: Choice
+    tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], row_options: RowOptions
 ) -> list[Signal]:
     """Returns the observations of a recording.
 
@@ -168,27 +168,29 @@ def derive(
         types: Types of messages by topic.
         namespace: Namespace of the simulator.
         fixed: Names of joints that cannot move, which are left out.
-        choice: Content that the user chooses.
+        row_options: Content that the user chooses.
 
     Raises:
         UnknownNameError: If there is no such feature, joint of a gripper, or frame.
     """
     found = [
-        *_states(tables, types, fixed, choice),
-        *_wrenches(tables, types, choice),
+        *_states(tables, types, fixed, row_options),
+        *_wrenches(tables, types, row_options),
         *_contacts(tables, types),
         *_poses(tables, namespace),
     ]
-    if choice.end_effector:
-        columns = end_effector_columns(tables, namespace, choice.end_effector)
+    if row_options.end_effector:
+        columns = end_effector_columns(tables, namespace, row_options.end_effector)
         found.append(Signal(Feature(END_EFFECTOR, (*AXES, *QUATERNION)), columns))
-    if choice.features is None:
+    if row_options.features is None:
         return found
     names = {signal.feature.key: signal.feature.key.partition(".")[2] for signal in found}
-    for pattern in choice.features:
+    for pattern in row_options.features:
         if not fnmatch.filter(names.values(), pattern):
             raise UnknownNameError("feature", pattern, names.values())
-    chosen = {key for key, name in names.items() if any(fnmatch.fnmatchcase(name, each) for each in choice.features)}
+    chosen = {
+        key for key, name in names.items() if any(fnmatch.fnmatchcase(name, each) for each in row_options.features)
+    }
     return [signal for signal in found if signal.feature.key in (*_ALWAYS, *chosen)]
 
 
@@ -199,27 +201,29 @@ def label(topic: str) -> str:
     return re.sub(r"\W+", "_", "/".join(part for part in topic.split("/") if part != "rpbi")).strip("_")
 
 
-def _states(tables: Tables, types: Mapping[str, str], fixed: Collection[str], choice: Choice) -> Iterator[Signal]:
-    if choice.state is not None:
-        yield _generic(STATE, tables, choice.state)
+def _states(
+    tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions
+) -> Iterator[Signal]:
+    if row_options.state is not None:
+        yield _generic(STATE, tables, row_options.state)
         return
     topics = [topic for topic in tables if types.get(topic) == JOINTS and STATES_NAME.fullmatch(topic)]
     for kind, key in zip(KINDS, (STATE, "observation.velocity", "observation.effort")):
         columns = [Column(topic, name) for topic in topics for name in joint_columns(tables[topic], kind, fixed)]
-        if key == STATE and choice.gripper:
+        if key == STATE and row_options.gripper:
             known = {joint_of(column): column for column in columns}
-            for name in choice.gripper:
+            for name in row_options.gripper:
                 if name not in known:
                     raise UnknownNameError("joint of the gripper", name, known)
-            gripper = tuple(known[name] for name in choice.gripper)
+            gripper = tuple(known[name] for name in row_options.gripper)
             yield Signal(Feature(GRIPPER, names_of(gripper)), gripper)
             columns = [column for column in columns if column not in gripper]
         if columns:
             yield Signal(Feature(key, names_of(columns)), tuple(columns))
 
 
-def _wrenches(tables: Tables, types: Mapping[str, str], choice: Choice) -> Iterator[Signal]:
-    used = {*(choice.action or ()), *(choice.state or ())}
+def _wrenches(tables: Tables, types: Mapping[str, str], row_options: RowOptions) -> Iterator[Signal]:
+    used = {*(row_options.action or ()), *(row_options.state or ())}
     for topic in tables:
         if types.get(topic) == WRENCH and topic not in used and not ACTION_NAME.fullmatch(topic):
             columns = [Column(topic, f"wrench/{part}/{axis}") for part in ("force", "torque") for axis in AXES]

@@ -15,7 +15,7 @@ import pandas as pd
 from custom_ros_tools.errors import ConfigError
 from robot_model.urdf.document import UrdfDocument
 from rpbi_data.bags.bag_reader import BagMessage, BagReader
-from rpbi_data.bags.clock import MAX_BACK_S, SetBack, clock_of
+from rpbi_data.bags.clock import MAX_BACK_S, ClockStep, clock_of
 from rpbi_data.bags.dataframes import bag_to_dataframes
 from rpbi_data.bags.images import decode_image
 from rpbi_data.bags.nanoseconds import PER_SECOND, row_times, to_seconds
@@ -41,7 +41,7 @@ from .format import (
     stamps_of,
 )
 from .provenance import file_digest, hash_chain
-from .signals import Choice, Signal, by_frame, derive, end_effector_columns, image_topics, is_used, wanted_topics
+from .signals import RowOptions, Signal, by_frame, derive, end_effector_columns, image_topics, is_used, wanted_topics
 
 
 class Cut(NamedTuple):
@@ -62,7 +62,7 @@ class SourceEpisode(ExportedEpisode):
     Args:
         folder: The folder.
         episode: The episode.
-        choice: Content of rows that the user chooses.
+        row_options: Content of rows that the user chooses.
         task: The task in words.
         any_size: Whether its bag may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s].
@@ -72,14 +72,14 @@ class SourceEpisode(ExportedEpisode):
         self,
         folder: EpisodeFolder,
         episode: Episode,
-        choice: Choice,
+        row_options: RowOptions,
         task: str,
         any_size: bool = False,
         max_time_error_s: float = np.inf,
     ) -> None:
         self.folder, self.episode, self.task, self.label = folder, episode, task, episode.label
         self.bag: Path = folder.folder_of(episode.number) / BAG
-        self._choice, self._any_size, self._max_time_error_s = choice, any_size, max_time_error_s
+        self._row_options, self._any_size, self._max_time_error_s = row_options, any_size, max_time_error_s
         self._schema = Schema(0, ())
         self._signals: tuple[Signal, ...] = ()
 
@@ -96,10 +96,10 @@ class SourceEpisode(ExportedEpisode):
             UnknownNameError: If there is no topic, feature, frame or joint that the user named.
             ValueError: If actions cannot be differences.
         """
-        choice, namespace, fixed = self._choice, self.episode.namespace, self._fixed_joints()
-        pose = end_effector_columns(self._tables, namespace, choice.end_effector) if choice.is_pose else ()
-        observations = derive(self._tables, self._types, namespace, fixed, choice)
-        return (*observations, *derive_actions(self._tables, self._types, fixed, choice, pose))
+        row_options, namespace, fixed = self._row_options, self.episode.namespace, self._fixed_joints()
+        pose = end_effector_columns(self._tables, namespace, row_options.end_effector) if row_options.is_pose else ()
+        observations = derive(self._tables, self._types, namespace, fixed, row_options)
+        return (*observations, *derive_actions(self._tables, self._types, fixed, row_options, pose))
 
     @cached_property
     def cut(self) -> Cut | None:
@@ -124,7 +124,7 @@ class SourceEpisode(ExportedEpisode):
             try:
                 pixels = _rgb(first[0]())
             except ValueError as error:
-                if self._choice.images is not None:
+                if self._row_options.images is not None:
                     raise DatasetError(self.bag, f"{topic}: {error}") from error
                 continue
             found.append(CameraFeature(key, pixels.shape[0], pixels.shape[1]))
@@ -259,7 +259,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
-        topics = wanted_topics(self._types, self._choice)
+        topics = wanted_topics(self._types, self._row_options)
         tables = bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
@@ -278,7 +278,7 @@ class SourceEpisode(ExportedEpisode):
         with BagReader(self.bag, any_size=self._any_size) as bag:
             for topic, types in bag.types.items():
                 kinds = sorted({each.name for each in types})
-                if is_used(topic, kinds, self._choice):
+                if is_used(topic, kinds, self._row_options):
                     self._require_steady(topic, bag.clock_of(topic))
                     if len(kinds) > 1:
                         message = f"{topic}: expected messages of one type, got {' and '.join(kinds)}"
@@ -286,13 +286,13 @@ class SourceEpisode(ExportedEpisode):
                 found[topic] = "|".join(kinds)
         return found
 
-    def _require_steady(self, topic: str, clock: SetBack) -> None:
+    def _require_steady(self, topic: str, clock: ClockStep) -> None:
         if clock.is_fault:
             raise DatasetError(self.bag, f"{topic}: {clock}")
 
     @cached_property
     def _image_topics(self) -> dict[str, str]:
-        return image_topics(self._types, self._choice)
+        return image_topics(self._types, self._row_options)
 
     def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
         """Yields a function that returns the pixels, and the stamp [ns], of each image, in the order of stamps."""
@@ -301,7 +301,7 @@ class SourceEpisode(ExportedEpisode):
             latest = 0
             for number, message in enumerate(bag.messages([topic])):
                 stamp = message_time_ns(message)
-                self._require_steady(topic, SetBack(latest / 1e9, (latest - stamp) / 1e9))
+                self._require_steady(topic, ClockStep(latest / 1e9, (latest - stamp) / 1e9))
                 latest = max(latest, stamp)
                 if self.cut is not None and stamp < self.cut.stamp_ns:
                     continue

@@ -25,7 +25,7 @@ GEOMETRY = (
 )
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
-TRIED = 1e-4
+SIGN_STEP = 1e-4
 """Step of the joints by which the sign of a gradient is tried [rad or m]."""
 MIN_GRADIENT = 1e-6
 """Largest gradient of a distance that counts as none [m/rad]."""
@@ -216,7 +216,7 @@ class LinkDistances:
         steepest = float(np.abs(gradient).max())
         if steepest < MIN_GRADIENT or contact.is_exact:
             return gradient
-        self.place(q + TRIED * gradient / steepest)
+        self.place(q + SIGN_STEP * gradient / steepest)
         is_further = self.distance(pair, math.inf) > contact.distance
         self.place(q)
         return gradient if is_further else -gradient

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 ADAPTATION_PERIODS = 4.0
 """Time constant with which the window of the moving average follows the period [periods]."""
-HURRIED = 0.5
+SHORT_SEGMENT = 0.5
 """Share of the time between targets below which the time for a way says nothing of the velocity to come."""
 SAME_TIME = 1e-9
 """Difference of times that is an error of rounding [ticks]."""
@@ -95,7 +95,7 @@ class TargetStream:
             slopes = {index: velocity * playout.speed for index, velocity in slopes.items()}
             segment = self._append(max(playout.start, float(tick)), playout.end, goal, slopes)
             period = max(playout.period, EVERY_TICK)
-            if segment.length < HURRIED * max(period, playout.pace):
+            if segment.length < SHORT_SEGMENT * max(period, playout.pace):
                 self._velocities.clear()
             else:
                 self._velocities.append(segment.velocity(playout.end))
