@@ -388,6 +388,6 @@ def test_kinematics_end_with_their_robot(tmp_path):
     world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
     kinematics = world.bodies["iiwa"].kinematics
     world.remove("iiwa")
-    with pytest.raises(PhysicsError, match="the robot has gone"):
+    with pytest.raises(PhysicsError, match="the robot was removed"):
         kinematics.solve(IKProblem("lbr_iiwa_link_7", (0.4, 0.1, 0.6)))
     world.close()

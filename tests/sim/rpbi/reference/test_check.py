@@ -66,7 +66,7 @@ def test_missing_meshes_are_reported_with_all_other_problems(tmp_path):
     code, lines, told = check("world.yaml", tmp_path)
     assert (code, lines) == (1, [])
     missing = f"loadURDF.fileName: {tmp_path}/cup.urdf: no such mesh: none.stl"
-    assert [line.split(" (looked")[0].split("; ")[0] for line in told] == [
+    assert [line.split(" (searched")[0].split("; ")[0] for line in told] == [
         "error: box.yaml: baseMas: unknown key 'baseMas'",
         "error: b.yaml: hz: unknown key 'hz'",
         f"error: a.yaml: {missing}",
