@@ -1,4 +1,4 @@
-"""The layout that a stranger finds his way in: no circles, ROS at the edge, one place for what is told once.
+"""Rules of the layout: no import cycles, ROS only at the edge, no duplicated definitions.
 
 Each rule is a function that names file and rule of whatever breaks it; the last tests break each rule in a copy.
 """

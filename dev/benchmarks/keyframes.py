@@ -48,7 +48,7 @@ EXAMPLE = ["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", "headl
 SEEN = ["/tf", "/rpbi/kuka_lwr/joint_states", "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"]
 """Topics of it that are recorded meanwhile."""
 Inputs = Mapping[str, Callable[[np.random.Generator], Any]]
-"""What makes a value, by input that always takes one."""
+"""Functions that make a random value, by the input that takes it."""
 DRIVEN: Inputs = {
     "mobile/cmd_vel": lambda random: Twist((*random.uniform(-1.0, 1.0, 2).tolist(), 0.0), (0.0, 0.0, 0.5)),
     "follower/pose": lambda random: Pose(tuple(random.uniform((0.3, -0.3, 0.0), (0.6, 0.3, 0.3)).tolist())),

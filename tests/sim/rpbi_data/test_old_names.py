@@ -1,4 +1,4 @@
-"""What was recorded, and what users wrote, before modules moved to rpbi_data.
+"""Recordings and user code from before modules moved to rpbi_data still work.
 
 In `recorded/` are an episode of a farm, its policy, and a saved world, made with the commit 0ed45241.
 """
