@@ -36,7 +36,6 @@ TABLES = (
     "rpbi_data.console",
     "rpbi_examples.ros.console",
     "rpbi_data.datasets.formats",
-    "rpbi_data.datasets.checks",
 )
 """Packages whose classes or commands have a file each, whoever imports them."""
 FLOORS = {

@@ -26,7 +26,7 @@ import rosbags.rosbag2  # noqa: E402, F401
 from custom_ros_tools.console.modules import command_of  # noqa: E402
 from robustness.hostile_bags.trial import Trial, tried  # noqa: E402
 from robustness.hostile_datasets.makers import MAKERS, good_datasets, hostile_datasets  # noqa: E402
-from rpbi_data.datasets.checks import lerobot, mcap, robomimic  # noqa: E402, F401
+from rpbi_data.datasets.formats import lerobot, mcap, robomimic  # noqa: E402, F401
 
 MAX_MEMORY_MB = 2000.0
 MODULE = "canary_module"

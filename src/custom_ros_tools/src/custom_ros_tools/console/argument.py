@@ -18,6 +18,7 @@ class Argument(NamedTuple):
         flag: Name of an option, by default `--` and the name of the parameter.
         parse: Returns the value of a word, or raises ValueError if the word is invalid.
         choices: Returns the valid words.
+        is_open: Whether other words are valid too; the function checks them.
         offers: Name of a function in `dev/tools/completion.bash` that prints the words for completion.
         files: Pattern of the files that completion offers; empty for none.
         excludes: Name of a group of options of which at most one may be given.
@@ -28,6 +29,7 @@ class Argument(NamedTuple):
     flag: str = ""
     parse: Callable[[str], Any] = str
     choices: Callable[[], Iterable[str]] | None = None
+    is_open: bool = False
     offers: str = ""
     files: str = ""
     excludes: str = ""

@@ -219,7 +219,7 @@ class Command:
 def _parse(argument: Argument) -> Callable[[str], Any]:
     """Returns the parser of a word, which checks it against the choices."""
     choices = argument.choices
-    if choices is None:
+    if choices is None or argument.is_open:
         return argument.parse
 
     def choose(word: str) -> str:

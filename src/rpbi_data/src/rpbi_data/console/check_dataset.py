@@ -8,7 +8,7 @@ from typing import Annotated
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.foreign import printable
-from rpbi_data.datasets.checks.values import source_faults
+from rpbi_data.datasets.checks import source_faults
 from rpbi_data.datasets.confinement import ERROR, FAULT, SUMMARY, CheckLine, confined, look_at
 from rpbi_data.datasets.formats import format_of
 from rpbi_data.datasets.provenance import is_exported

@@ -22,7 +22,7 @@ WORDS = (NEXT, PREVIOUS, POSE, DELTAS)
 def export(
     folder: Annotated[Path, Argument("DIR", parse=Path)],
     *,
-    to: Annotated[str, Argument("FORMAT")] = "lerobot",
+    to: Annotated[str, Argument("FORMAT", choices=lambda: FORMATS, is_open=True)] = "lerobot",
     out: Annotated[Path | None, Argument("DIR", parse=Path)] = None,
     fps: Annotated[int, Argument("N", parse=int)] = 30,
     task: Annotated[str, Argument("TEXT")] = "",
@@ -54,7 +54,7 @@ def export(
 
     Args:
         folder: of the episodes
-        to: lerobot, robomimic or mcap, or module:Class of a format of your own; lerobot without it
+        to: {choices}, or module:Class of a format of your own; lerobot without it
         out: the data set, a folder that does not exist; DIR_FORMAT without it
         fps: rows a second; 30 without it
         task: the task in words; the name of DIR without it

@@ -148,6 +148,8 @@ class DatasetFormat(ABC):
     Config: ClassVar[type[ConfigModel]] = ConfigModel
     has_rows: ClassVar[bool] = True
     """Whether it writes rows of one rate. Otherwise it only reads the bags, and the schema is None."""
+    content: ClassVar[str] = "files of another format"
+    """Content by which a folder is recognised, in words, for the message about a folder of no known format."""
 
     def __init__(self, config: Any) -> None:
         self.config = config

@@ -43,5 +43,6 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
         raise missing
     names = sorted(each.name for each in folder.iterdir())
     content = ", ".join(names[:10]) + (" ..." if len(names) > 10 else "") or "nothing"
-    expected = "meta/info.json (LeRobot), an HDF5 file (robomimic), or folders with metadata.yaml (rosbag2)"
+    *some, last = (each.content for each in FORMATS.values())
+    expected = f"{', '.join(some)}, or {last}"
     raise DatasetError(folder, f"not a data set of a known format: expected {expected}, found {content}")

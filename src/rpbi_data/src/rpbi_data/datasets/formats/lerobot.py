@@ -16,9 +16,22 @@ from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
 from rpbi_data.datasets.coarse_images import coarse
 from rpbi_data.datasets.format import Array, CameraFeature, DatasetFormat, ExportedEpisode, Schema, require_room
-from rpbi_data.datasets.layouts import lerobot as layout
 from rpbi_data.datasets.provenance import checksums
 from rpbi_data.datasets.statistics import ImageStatistics, pooled, statistics
+
+from .lerobot_check import (
+    CHUNK,
+    DATA_PATH,
+    EPISODES_PATH,
+    ROW_COLUMNS,
+    VERSION,
+    VIDEO_PATH,
+    data_file,
+    lerobot_faults,
+    matrix,
+    place,
+    video_file,
+)
 
 try:
     import pyarrow as pa
@@ -45,6 +58,7 @@ class LeRobot(DatasetFormat):
     """A LeRobot data set, version 3.0: Parquet files with a row group for each episode, and MP4 videos."""
 
     Config = LeRobotConfig
+    content = "meta/info.json (LeRobot)"
 
     def open(self, folder: Path, schema: Schema | None) -> None:
         """Begins the data set."""
@@ -85,9 +99,9 @@ class LeRobot(DatasetFormat):
         self._episodes.pop()
         for key, found in self._image_statistics.items():
             found.pop()
-            (self._folder / layout.video_file(key, index)).unlink()
+            (self._folder / video_file(key, index)).unlink()
         if not self._pending:
-            (self._folder / layout.data_file(self._data_file)).unlink(missing_ok=True)
+            (self._folder / data_file(self._data_file)).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Writes the remaining rows and all metadata."""
@@ -96,32 +110,32 @@ class LeRobot(DatasetFormat):
         fps = self._schema.fps
         features = {each.key: _feature(each.dtype, each.names) for each in self._schema.features}
         features |= {each.key: self._video_feature(each) for each in self._schema.cameras}
-        features |= {name: _feature(dtype, None) for name, dtype in layout.ROW_COLUMNS.items()}
+        features |= {name: _feature(dtype, None) for name, dtype in ROW_COLUMNS.items()}
         info = {
-            "codebase_version": layout.VERSION,
+            "codebase_version": VERSION,
             "robot_type": self.config.robot_type or None,
             "total_episodes": len(self._episodes),
             "total_frames": self._frames,
             "total_tasks": len(self._tasks),
-            "chunks_size": layout.CHUNK,
+            "chunks_size": CHUNK,
             "data_files_size_in_mb": MAX_DATA_BYTES // 1_000_000,
             "video_files_size_in_mb": 200,
             "fps": fps,
             "splits": {"train": f"0:{len(self._episodes)}"},
-            "data_path": layout.DATA_PATH,
-            "video_path": layout.VIDEO_PATH if self._schema.cameras else None,
+            "data_path": DATA_PATH,
+            "video_path": VIDEO_PATH if self._schema.cameras else None,
             "features": features,
         }
         meta = self._folder / "meta"
         tasks = pd.DataFrame({"task_index": list(self._tasks.values())}, index=pd.Index(self._tasks, name="task"))
         _parquet(meta / "tasks.parquet", [pa.Table.from_pandas(tasks)])
-        _parquet(self._folder / layout.EPISODES_PATH, [pa.Table.from_pylist(self._episodes)])
+        _parquet(self._folder / EPISODES_PATH, [pa.Table.from_pylist(self._episodes)])
         _json(meta / "stats.json", self._all_statistics())
         _json(meta / "info.json", info)
 
     def _write_videos(self, index: int, episode: ExportedEpisode) -> tuple[dict[str, _Film], dict[str, Array]]:
         """Writes the videos of an episode, and returns their facts and the numbers of the episode."""
-        paths = {each.key: self._folder / layout.video_file(each.key, index) for each in self._schema.cameras}
+        paths = {each.key: self._folder / video_file(each.key, index) for each in self._schema.cameras}
         with ExitStack() as undo:
             for path in paths.values():
                 undo.callback(path.unlink, missing_ok=True)
@@ -137,12 +151,12 @@ class LeRobot(DatasetFormat):
         count = len(rows)
         facts: dict[str, Any] = {"episode_index": index, "tasks": [task], "length": count}
         facts |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + count}
-        facts |= {f"data/{name}": number for name, number in layout.place(self._data_file).items()}
+        facts |= {f"data/{name}": number for name, number in place(self._data_file).items()}
         for key in films:
-            facts |= {f"videos/{key}/{name}": number for name, number in layout.place(index).items()}
+            facts |= {f"videos/{key}/{name}": number for name, number in place(index).items()}
             facts |= {f"videos/{key}/from_timestamp": 0.0, f"videos/{key}/to_timestamp": count / self._schema.fps}
-        facts |= {f"meta/episodes/{name}": number for name, number in layout.place(0).items()}
-        by_feature = {key: statistics(layout.matrix(rows.column(key))) for key in rows.column_names}
+        facts |= {f"meta/episodes/{name}": number for name, number in place(0).items()}
+        by_feature = {key: statistics(matrix(rows.column(key))) for key in rows.column_names}
         for key, each in (by_feature | {key: film.statistics for key, film in films.items()}).items():
             facts |= {f"stats/{key}/{name}": value for name, value in each.items()}
         return facts
@@ -172,13 +186,13 @@ class LeRobot(DatasetFormat):
         return pa.table(arrays | {name: pa.array(each) for name, each in own.items()})
 
     def _write_rows(self) -> None:
-        _parquet(self._folder / layout.data_file(self._data_file), self._pending)
+        _parquet(self._folder / data_file(self._data_file), self._pending)
 
     def _all_statistics(self) -> dict[str, Any]:
-        files = [self._folder / layout.data_file(number) for number in range(self._data_file + bool(self._pending))]
+        files = [self._folder / data_file(number) for number in range(self._data_file + bool(self._pending))]
         found = {}
-        for key in (*(each.key for each in self._schema.features), *layout.ROW_COLUMNS):
-            columns = [layout.matrix(parquet.read_table(file, columns=[key]).column(key)) for file in files]
+        for key in (*(each.key for each in self._schema.features), *ROW_COLUMNS):
+            columns = [matrix(parquet.read_table(file, columns=[key]).column(key)) for file in files]
             found[key] = statistics(np.concatenate(columns))
         return found | {key: pooled(parts) for key, parts in self._image_statistics.items()}
 
@@ -204,8 +218,6 @@ class LeRobot(DatasetFormat):
     @classmethod
     def faults(cls, folder: Path) -> Iterator[str]:
         """Yields a sentence for each fault."""
-        from rpbi_data.datasets.checks.lerobot import lerobot_faults
-
         return lerobot_faults(folder)
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import shutil
 from collections.abc import Iterator
@@ -13,8 +14,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
+from rpbi_data.datasets.checks import Facts, guarded
 from rpbi_data.datasets.format import DatasetError, DatasetFormat, ExportedEpisode, Schema
-from rpbi_data.datasets.layouts.mcap import topics_of
 
 try:
     from rosbags.convert import ConverterError, convert
@@ -40,6 +41,7 @@ class Mcap(DatasetFormat):
 
     Config = McapConfig
     has_rows: ClassVar[bool] = False
+    content = "folders with metadata.yaml (rosbag2)"
 
     def open(self, folder: Path, schema: Schema | None) -> None:
         """Begins the folder."""
@@ -51,7 +53,7 @@ class Mcap(DatasetFormat):
         target = self._folder / f"episode_{index:06d}"
         try:
             _convert(episode.bag, target, self._types)
-            topics = topics_of(target)
+            topics = _topics_of(target)
         except (ConverterError, ReaderError) as error:
             shutil.rmtree(target, ignore_errors=True)
             if isinstance(error.__cause__, OSError):
@@ -77,9 +79,7 @@ class Mcap(DatasetFormat):
     @classmethod
     def faults(cls, folder: Path) -> Iterator[str]:
         """Yields a sentence for each fault."""
-        from rpbi_data.datasets.checks.mcap import mcap_faults
-
-        return mcap_faults(folder)
+        return _faults(folder)
 
     @classmethod
     def summary(cls, folder: Path) -> str:
@@ -100,3 +100,52 @@ def _convert(bag: Path, target: Path, types: Any) -> None:
 def _count(recording: Path) -> int:
     with Reader(recording) as reader:
         return int(reader.message_count)
+
+
+def _topics_of(recording: Path) -> dict[str, dict[str, Any]]:
+    """Returns type, number of messages and SHA-256 of stamps and content of each topic of a recording.
+
+    Raises:
+        ReaderError: If it cannot be read.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    digests: dict[str, Any] = {}
+    with Reader(recording) as reader:
+        for connection, stamp_ns, data in reader.messages():
+            each = found.setdefault(connection.topic, {"type": connection.msgtype, "messages": 0})
+            each["messages"] += 1
+            digest = digests.setdefault(connection.topic, hashlib.sha256())
+            digest.update(stamp_ns.to_bytes(8, "little", signed=True) + bytes(data))
+    return {topic: {**each, "sha256": digests[topic].hexdigest()} for topic, each in sorted(found.items())}
+
+
+def _faults(folder: Path) -> Iterator[str]:
+    """Yields a sentence for each fault of a folder of recordings."""
+    facts = Facts(folder)
+    yield from guarded("rpbi", _recording_faults(folder, facts))
+    yield from facts.faults
+
+
+def _recording_faults(folder: Path, facts: Facts) -> Iterator[str]:
+    names = sorted(each.name for each in folder.iterdir() if each.is_dir() and each.name != "rpbi")
+    for index, name in enumerate(names):
+        stored = facts.episode(index)
+        yield from facts.chain_faults(index, stored)
+        try:
+            found = _topics_of(folder / name)
+        except (ReaderError, OSError, ValueError, KeyError, AssertionError) as error:
+            yield f"{name}: cannot be read: {' '.join(str(error).split()) or type(error).__name__}"
+            continue
+        except Exception as error:  # a damaged file makes its reader fail in many ways
+            yield f"{name}: is damaged: {type(error).__name__}: {' '.join(str(error).split())}"
+            continue
+        expected = stored.get("topics", {})
+        for topic in sorted(expected.keys() | found.keys() if expected else ()):
+            ours, theirs = expected.get(topic), found.get(topic)
+            if ours is None or theirs is None:
+                yield f"{name}: {topic}: {'was not exported' if ours is None else 'was exported and is missing'}"
+            elif ours["messages"] != theirs["messages"]:
+                yield f"{name}: {topic}: {ours['messages']} messages were exported, found {theirs['messages']}"
+            elif ours != theirs:
+                yield f"{name}: {topic}: stamps or contents were changed after the export"
+    yield from facts.total_faults(len(names))

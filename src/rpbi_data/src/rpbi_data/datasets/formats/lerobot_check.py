@@ -1,26 +1,38 @@
-"""Checks of LeRobot data sets."""
+"""Files and columns of LeRobot data sets of version 3.0, and the check of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
 
+from rpbi_data.datasets.checks import Facts, feature_faults, guarded
 from rpbi_data.datasets.coarse_images import coarse, frozen_faults, image_faults
 from rpbi_data.datasets.foreign_files import file_name, read_json, read_parquet
-from rpbi_data.datasets.format import STATE
-from rpbi_data.datasets.layouts import lerobot as layout
+from rpbi_data.datasets.format import STATE, Array
 from rpbi_data.datasets.provenance import read_images
 from rpbi_data.datasets.statistics import statistics
-from rpbi_data.datasets.video import VideoFacts, read_video
 
-from .values import Facts, feature_faults, guarded
+if TYPE_CHECKING:
+    import pyarrow as pa
 
-Array = layout.Array
+VERSION = "v3.0"
+CHUNK = 1000
+"""Number of files in a folder."""
+DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+EPISODES_PATH = "meta/episodes/chunk-000/file-000.parquet"
+ROW_COLUMNS = {
+    "timestamp": "float32",
+    "frame_index": "int64",
+    "episode_index": "int64",
+    "index": "int64",
+    "task_index": "int64",
+}
+"""Columns of every data set, and their types."""
 NO_NUMBERS = ("image", "string", "audio")
 """Types of columns, in data sets of other tools, whose values are not checked."""
 MAX_TIME_ERROR_S = 1e-4
@@ -37,6 +49,42 @@ REQUIRED = (
     "data_path",
     "chunks_size",
 )
+
+
+def place(number: int) -> dict[str, int]:
+    """Returns the folder of a file and its number in it."""
+    return {"chunk_index": number // CHUNK, "file_index": number % CHUNK}
+
+
+def data_file(number: int) -> Path:
+    """Returns the path of a data file in the data set."""
+    return Path(DATA_PATH.format(**place(number)))
+
+
+def video_file(key: str, number: int) -> Path:
+    """Returns the path of a video file in the data set."""
+    return Path(VIDEO_PATH.format(video_key=key, **place(number)))
+
+
+def matrix(column: Any) -> Array:
+    """Returns a column of a Parquet table with a row for each of its rows; one number a row is one column.
+
+    Raises:
+        ValueError: If its rows differ in length, or are no numbers.
+    """
+    array = column.combine_chunks()
+    if array.null_count:
+        raise ValueError(f"{array.null_count} rows have no value")
+    rows = len(array)
+    while hasattr(array.type, "value_type"):
+        array = array.flatten()
+    flat = np.asarray(array)
+    if rows and len(flat) % rows:
+        raise ValueError("rows differ in length")
+    flat = flat.reshape(rows, -1) if rows else flat.reshape(0, 1)
+    if flat.dtype.kind not in "iufb":
+        raise ValueError(f"expected numbers, got {array.type}")
+    return flat
 
 
 def lerobot_faults(folder: Path) -> Iterator[str]:
@@ -83,8 +131,8 @@ class _Check:
             return
         self._info = info
         version = info["codebase_version"]
-        if version != layout.VERSION:
-            yield f"{path}: expected codebase_version {layout.VERSION}, found {version}"
+        if version != VERSION:
+            yield f"{path}: expected codebase_version {VERSION}, found {version}"
             return
         if not isinstance(info["features"], dict) or not all(map(_is_feature, info["features"].values())):
             yield f"{path}: expected features with 'dtype' and 'shape'"
@@ -100,7 +148,7 @@ class _Check:
 
     def _feature_faults(self, path: str) -> Iterator[str]:
         features = self._info["features"]
-        for name, dtype in layout.ROW_COLUMNS.items():
+        for name, dtype in ROW_COLUMNS.items():
             if features.get(name, {}).get("dtype") != dtype:
                 yield f"{path}: features: expected '{name}' of type {dtype}"
         exported = self.facts.export
@@ -221,7 +269,7 @@ class _Check:
         for key in table.column_names:
             if key in features and features[key]["dtype"] not in NO_NUMBERS:
                 try:
-                    columns[key] = layout.matrix(table.column(key))
+                    columns[key] = matrix(table.column(key))
                 except ValueError as error:
                     yield f"'{key}': {error}"
                     continue
@@ -258,7 +306,7 @@ class _Check:
         stored = self._stored.get(index, {})
         for key, values in columns.items():
             names = self._info["features"][key].get("names") or [str(number) for number in range(values.shape[1])]
-            if key not in layout.ROW_COLUMNS:
+            if key not in ROW_COLUMNS:
                 for fault in feature_faults(key, names, values, stored):
                     yield f"'{key}': {fault}"
 
@@ -285,7 +333,7 @@ class _Check:
         except ValueError as error:
             yield f"{path}: {_unreadable(error)}"
             return
-        for key in sorted(self._info["features"].keys() - stats.keys() - layout.ROW_COLUMNS.keys()):
+        for key in sorted(self._info["features"].keys() - stats.keys() - ROW_COLUMNS.keys()):
             yield f"{path}: nothing for '{key}'"
         for key, parts in self._values.items():
             if key not in stats or len({part.shape[1] for part in parts}) != 1:
@@ -311,7 +359,7 @@ class _Check:
                     continue
                 place = {"video_key": key, "chunk_index": row[columns[0]], "file_index": row[columns[1]]}
                 try:
-                    name = file_name(self._info.get("video_path") or layout.VIDEO_PATH, place)
+                    name = file_name(self._info.get("video_path") or VIDEO_PATH, place)
                 except ValueError as error:
                     yield f"meta/info.json: video_path: {error}"
                     return
@@ -327,6 +375,8 @@ class _Check:
         self, path: Path, key: str, feature: Mapping[str, Any], rows: list[dict[str, Any]]
     ) -> Iterator[str]:
         """Checks a video with the episodes that should be in it."""
+        from rpbi_data.datasets.video import VideoFacts, read_video  # not needed without cameras
+
         if not path.exists():
             yield f"is missing, with the images of episodes {', '.join(str(row['episode_index']) for row in rows)}"
             return

@@ -1,1 +1,0 @@
-"""Checks of data sets: each fault is a sentence with file, episode and what was expected."""

@@ -1,1 +1,0 @@
-"""Files and names of the formats, which writers and checks share."""
