@@ -64,7 +64,7 @@ def _imports(path: Path) -> set[str]:
     return set(imported_names(path, module))
 
 
-BY_FEATURE = {"rpbi_data", "rpbi_utils"}
+BY_FEATURE = {"operator_node", "rpbi_data", "rpbi_utils"}
 """Packages whose folders are features, each with its modules that need ROS, see test_layout.py."""
 COMPATIBILITY = SRC / "compatibility"
 
@@ -185,6 +185,11 @@ FAMILIES = {
     ),
     "task": ("ik_ros.tasks:TASKS", "ik_ros.formulation.task:Task", "ik_tasks.md"),
     "device": ("operator_node.devices:DEVICES", "operator_node.device:Device", "devices.md"),
+    "haptic device": (
+        "operator_node.haptics.devices:HAPTIC_DEVICES",
+        "operator_node.haptics.device:HapticDevice",
+        "haptics.md",
+    ),
     "mapping": ("operator_node.mappings:MAPPINGS", "operator_node.mappings.mapping:Mapping", "teleoperation.md"),
     "check": ("safe_robot.checks:CHECKS", "safe_robot.check:Check", "safety.md"),
     "primitive": ("motion_primitives.primitives:PRIMITIVES", "motion_primitives.primitive:Primitive", "learning.md"),
@@ -250,7 +255,7 @@ def test_every_solver_is_in_the_example_and_the_conformance_suite():
 def test_devices_are_imported_when_they_are_asked_for():
     program = """
 import sys
-import operator_node.devices, operator_node.device_feed
+import operator_node.devices, operator_node.devices.device_feed
 assert not sys.modules.keys() & {f"operator_node.devices.{name}" for name in operator_node.devices.DEVICES}
 assert not sys.modules.keys() & {"pygame", "tkinter"}
 """

@@ -17,10 +17,11 @@ from typing import NamedTuple
 
 from result import Result, Target
 
-from operator_node.haptics.controller import ForceFeedbackConfig, HapticController
+from operator_node.haptics.config import ForceFeedbackConfig
+from operator_node.haptics.controller import HapticController
 from operator_node.haptics.coupling import Mode
 from operator_node.haptics.device import HapticConfig, HapticReading
-from operator_node.haptics.hand import Hand
+from operator_node.haptics.emulated import Hand
 from robot_model.geometry import Vector
 
 SET_UPS = "PASSIVITY_SET_UPS"

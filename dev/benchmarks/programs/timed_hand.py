@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from operator_node.haptics.device import HapticReading
-from operator_node.haptics.devices.emulated import EmulatedDevice
 from operator_node.haptics.devices.scripted import ScriptedConfig, ScriptedDevice
+from operator_node.haptics.emulated import EmulatedDevice
 from robot_model.geometry import Vector
 
 

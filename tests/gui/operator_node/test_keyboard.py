@@ -14,9 +14,9 @@ from tries import tries
 from custom_ros_tools.errors import ConfigError
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.devices import DEVICES
-from operator_node.devices.held_keys import KeyEvent
 from operator_node.devices.key_terminal import codes_in
 from operator_node.devices.key_window import code_of
+from operator_node.devices.keys import KeyEvent
 
 KEYS = {"LEFT": "Left", "RIGHT": "Right", "DOWN": "Down", "UP": "Up"}
 """Names that xdotool has for keys; those of characters are their own."""

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 from worlds import box
 
 from operator_node.avatar.anthropometry import segment_offsets
-from operator_node.avatar.urdf_offsets import urdf_offsets
+from operator_node.avatar.human_urdf import urdf_offsets
 from operator_node.msg import SegmentForces
 from operator_node.mvn.segments import SEGMENTS
 from ros_pybullet_interface.msg import ContactPoint, Contacts

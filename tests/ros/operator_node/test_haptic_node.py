@@ -19,9 +19,9 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
 from operator_node.device import DeviceError
-from operator_node.emulators.haply import HaplyEmulator
+from operator_node.emulators.haply_service import HaplyEmulator
+from operator_node.haptics.devices.touch_topics import TouchConfig, TouchDevice
 from operator_node.msg import HapticState
-from operator_node.ros.haptics.touch import TouchConfig, TouchDevice
 
 DOWN = (0.0, 0.0, -0.03)
 
@@ -119,7 +119,7 @@ def test_disconnected_haply_returns_by_itself_without_a_jump(ros):
 
 def loop_of(node: subprocess.Popen) -> int:
     """Returns the id of the process in which the loop of a haptic node runs."""
-    return int(subprocess.check_output(["pgrep", "-P", str(node.pid), "-f", "operator_node.haptics.process"]))
+    return int(subprocess.check_output(["pgrep", "-P", str(node.pid), "-f", "operator_node.haptics.loop"]))
 
 
 def test_touch_receives_zero_when_the_simulator_or_node_ends(ros):

@@ -21,8 +21,8 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from operator_node.mvn.frame_messages import FramePacker
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
-from operator_node.ros.mvn.packed import FramePacker
 
 STAMP = genpy.Time(3, 999_999_999)
 

@@ -10,9 +10,8 @@ from avatar_in_pybullet import AvatarInPybullet, largest_errors
 from scipy.spatial.transform import Rotation
 
 from operator_node.avatar.anthropometry import segment_offsets
-from operator_node.avatar.forward import segment_frame
 from operator_node.avatar.human_urdf import human_urdf
-from operator_node.avatar.joints import HINGES, LOWER, UPPER
+from operator_node.avatar.joints import HINGES, LOWER, UPPER, segment_frame
 from operator_node.avatar.retargeting import AvatarPlace, AvatarPose, Retargeting
 from operator_node.mvn.segments import SEGMENTS
 

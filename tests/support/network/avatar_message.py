@@ -6,7 +6,7 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
 
 from operator_node.avatar.anthropometry import segment_offsets
-from operator_node.avatar.forward import segment_frame
+from operator_node.avatar.joints import segment_frame
 
 HEIGHT_M = 1.75
 

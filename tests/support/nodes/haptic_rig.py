@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from operator_node.haptics.controller import ForceFeedbackConfig, HapticController
+from operator_node.haptics.config import ForceFeedbackConfig
+from operator_node.haptics.controller import HapticController
 from operator_node.haptics.device import HapticConfig, HapticReading
-from operator_node.haptics.hand import Hand
+from operator_node.haptics.emulated import Hand
 from robot_model.geometry import ZERO, Vector
 
 DT_S = 0.001

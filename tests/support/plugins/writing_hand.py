@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from operator_node.haptics.devices.emulated import EmulatedDevice
+from operator_node.haptics.config import HapticNodeConfig
 from operator_node.haptics.devices.scripted import ScriptedConfig
-from operator_node.haptics.messages import Setup
-from operator_node.haptics.node_config import HapticNodeConfig
-from operator_node.haptics.process.client import LoopClient
+from operator_node.haptics.emulated import EmulatedDevice
+from operator_node.haptics.link import Setup
+from operator_node.haptics.loop_client import LoopClient
 from robot_model.geometry import Vector
 
 EXPIRY_S = 0.016

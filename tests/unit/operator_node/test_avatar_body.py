@@ -9,12 +9,9 @@ import pytest
 
 from custom_ros_tools.config import replace_package
 from operator_node.avatar.anthropometry import MASS_PERCENT, leg_length, measured_offsets, segment_offsets
-from operator_node.avatar.forward import segment_frame
-from operator_node.avatar.human_urdf import human_urdf
-from operator_node.avatar.joints import HINGES, JOINTS, LOWER, UPPER
-from operator_node.avatar.urdf_offsets import urdf_offsets
-from operator_node.mvn.segments import SEGMENTS
-from operator_node.mvn.skeleton import PARENTS
+from operator_node.avatar.human_urdf import human_urdf, urdf_offsets
+from operator_node.avatar.joints import HINGES, JOINTS, LOWER, UPPER, segment_frame
+from operator_node.mvn.segments import PARENTS, SEGMENTS
 
 LEVEL = np.array((0.0, 0.0, 0.0, 1.0))
 

@@ -13,8 +13,8 @@ import pytest
 
 from custom_ros_tools.schema import ConfigModel
 from operator_node.device import Device, DeviceError, Reading
-from operator_node.device_feed import AT_REST, HELD_S, MAX_REASONS, DeviceFeed, FeedConfig, problem_of
 from operator_node.devices import spacenav
+from operator_node.devices.device_feed import AT_REST, HELD_S, MAX_REASONS, DeviceFeed, FeedConfig, problem_of
 
 READINGS = 40
 

@@ -13,8 +13,8 @@ from tries import tries
 from custom_ros_tools.errors import ConfigError, MissingDependency, UnknownNameError
 from custom_ros_tools.schema import ConfigModel
 from operator_node.device import Device, DeviceClosedError, DeviceError, Reading
-from operator_node.device_feed import AT_REST, DeviceFeed, FeedConfig, problem_of
 from operator_node.devices import DEVICES
+from operator_node.devices.device_feed import AT_REST, DeviceFeed, FeedConfig, problem_of
 
 STEP_S = 0.001
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.schema.json_schema import yaml_text
-from operator_node.device_feed import FeedConfig
 from operator_node.devices import DEVICES
+from operator_node.devices.device_feed import FeedConfig
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGES = {"mvn": "mvn.md"}

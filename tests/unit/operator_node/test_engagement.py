@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from operator_node.avatar.engagement import MAX_STEP_S, Engagement
 from operator_node.avatar.joints import LOWER, UPPER
-from operator_node.avatar.retargeting import AvatarPose
+from operator_node.avatar.retargeting import MAX_STEP_S, AvatarPose, Engagement
 
 JOINT_SPEED, SPEED, ANGULAR_SPEED = 3.0, 2.0, 4.0
 ROUNDING = 1e-9

@@ -9,11 +9,10 @@ import pytest
 from haptic_rig import DEVICE, DT_S, Rig
 
 from custom_ros_tools.errors import ConfigError
-from operator_node.haptics.controller import ForceFeedbackConfig, HapticController
+from operator_node.haptics.config import HapticNodeConfig
+from operator_node.haptics.controller import ForceFeedbackConfig, ForceLimiter, HapticController
 from operator_node.haptics.device import HapticReading
 from operator_node.haptics.devices.scripted import ScriptedConfig
-from operator_node.haptics.limiter import ForceLimiter
-from operator_node.haptics.node_config import HapticNodeConfig
 
 SILENCE_S = 0.02
 PUSH = (0.0, 0.0, 5.0)

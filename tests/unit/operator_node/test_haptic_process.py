@@ -14,10 +14,9 @@ import pytest
 from ros_system import SUPPORT, is_running, support_on_path, wait_until
 from writing_hand import forces_in, setup_of
 
-from operator_node.haptics.link import Link
-from operator_node.haptics.messages import LoopReport
-from operator_node.haptics.process import client as client_module
-from operator_node.haptics.process.client import LoopClient
+from operator_node.haptics import loop_client as client_module
+from operator_node.haptics.link import Link, LoopReport
+from operator_node.haptics.loop_client import LoopClient
 
 SILENCE_S = 0.02
 

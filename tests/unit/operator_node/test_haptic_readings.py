@@ -9,10 +9,10 @@ import random
 import pytest
 from haptic_rig import Rig
 
-from operator_node.emulators.haply import HaplyEmulator
+from operator_node.emulators.haply_service import HaplyEmulator
 from operator_node.haptics.device import HapticReading, ReadingError
 from operator_node.haptics.devices.haply import ForceKey
-from operator_node.haptics.devices.haply_messages import HaplyState, command_of, device_in, state_in
+from operator_node.haptics.devices.haply_json import HaplyState, command_of, device_in, state_in
 
 
 def scaled(reading: HapticReading, factor: float) -> HapticReading:

@@ -8,7 +8,7 @@ from keyboard.msg import Key
 from custom_ros_tools.errors import ConfigError
 from operator_node.device import Reading
 from operator_node.devices.keyboard import KeyboardConfig
-from operator_node.key_axes import KEY_CODES, KeyAxes
+from operator_node.devices.keys import KEY_CODES, KeyAxes
 
 
 def test_names_and_codes_are_those_of_the_message():

@@ -8,8 +8,7 @@ from mvn_stream import HZ, suit
 
 from operator_node.emulators.walking_person import WalkingPerson
 from operator_node.mvn.checks import FrameChecks
-from operator_node.mvn.segments import SegmentFrame
-from operator_node.mvn.skeleton import INDEX
+from operator_node.mvn.segments import INDEX, SegmentFrame
 from operator_node.mvn.stream import StreamDecoder
 
 SECONDS = 2.0

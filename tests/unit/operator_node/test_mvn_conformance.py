@@ -9,8 +9,8 @@ from mvn_stream import T_POSE, Sender, broken_datagram, suit
 
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.device import Device
-from operator_node.mvn.hands import AXES
-from operator_node.mvn.skeleton import INDEX
+from operator_node.devices.mvn import AXES
+from operator_node.mvn.segments import INDEX
 
 
 class TestMvn(DeviceConformance):

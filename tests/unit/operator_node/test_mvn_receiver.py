@@ -12,15 +12,12 @@ from tries import tries
 
 from custom_ros_tools.errors import InterfaceError
 from operator_node.device import DeviceError
-from operator_node.devices.mvn import Mvn
-from operator_node.mvn.calibration import Calibration
-from operator_node.mvn.hands import AXES, HandAxes
-from operator_node.mvn.player import timed_datagrams
+from operator_node.devices.mvn import AXES, HandAxes, Mvn
+from operator_node.mvn.orientations import Calibration, about_z, multiply
+from operator_node.mvn.player import send, timed_datagrams
 from operator_node.mvn.receiver import MvnConfig, Silence
 from operator_node.mvn.recording import MAGIC, DatagramRecording, read_recording
-from operator_node.mvn.segments import SegmentFrame
-from operator_node.mvn.sender import send
-from operator_node.mvn.skeleton import INDEX, about_z, multiply
+from operator_node.mvn.segments import INDEX, SegmentFrame
 
 SOON_S = 10.0
 

@@ -1,7 +1,8 @@
-"""Nodes that have two names, in one package or two."""
+"""Nodes and classes that have two names, in one package or two."""
 
 from __future__ import annotations
 
+import pkgutil
 import re
 from pathlib import Path
 
@@ -25,3 +26,9 @@ def what_runs(node: str) -> list[str]:
 )
 def test_either_name_runs_the_same(node, same_as):
     assert what_runs(node) == what_runs(f"operator_node/{same_as}") != []
+
+
+def test_former_path_of_device_topics_works():
+    from operator_node.devices.device_topics import DeviceTopics
+
+    assert pkgutil.resolve_name("operator_node.ros.devices.topics:DeviceTopics") is DeviceTopics

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from operator_node.parser import reconstruct_interface_log_msg
-from operator_node.signal_window import SignalWindow
+from operator_node.parser import SignalWindow, reconstruct_interface_log_msg
 
 
 def arrays(window: SignalWindow, size: int) -> tuple[np.ndarray, np.ndarray]:

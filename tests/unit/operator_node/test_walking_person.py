@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from operator_node.emulators.walking_person import WalkingPerson
-from operator_node.mvn.segments import SEGMENTS
-from operator_node.mvn.skeleton import BONES, INDEX
+from operator_node.mvn.segments import BONES, INDEX, SEGMENTS
 
 HZ = 60.0
 

@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import pytest
 
+from operator_node.devices.device_feed import DeviceFeed, FeedConfig, problem_of
+
 from .device import Device, DeviceClosedError, DeviceError, Reading
-from .device_feed import DeviceFeed, FeedConfig, problem_of
 from .devices import DEVICES
 
 PATIENCE_S = 60.0

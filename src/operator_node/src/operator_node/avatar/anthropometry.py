@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from operator_node.mvn.segments import SEGMENTS, SegmentFrame
-from operator_node.mvn.skeleton import BONES
+from operator_node.mvn.segments import BONES, SEGMENTS, SegmentFrame
 
 Array = NDArray[np.float64]
 

@@ -1,16 +1,18 @@
-"""URDF of the body of a person."""
+"""URDF of the body of a person, and the segment lengths in the URDF of an avatar."""
 
 import math
+import tempfile
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from operator_node.mvn.segments import SEGMENTS
-from operator_node.mvn.skeleton import PARENTS
+from custom_ros_tools.errors import ConfigError, Problem
+from operator_node.mvn.segments import PARENTS, SEGMENTS
+from robot_model.urdf.document import UrdfDocument
 
 from . import anthropometry as table
 from .anthropometry import Array
-from .joints import JOINTS, HumanJoint
+from .joints import HINGES, JOINTS, HumanJoint
 
 HEIGHTS_M, MASSES_KG = (0.5, 2.5), (3.0, 300.0)
 """Ranges of height and mass; other values are rejected."""
@@ -197,3 +199,26 @@ def _text(vector: Array) -> str:
 def _number(value: float) -> str:
     text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0 turns negative zero into zero
     return text.rstrip("0").rstrip(".")
+
+
+def urdf_offsets(name: str, text: str) -> Array:
+    """Returns the origin of each segment in its parent (23 x 3) [m].
+
+    Args:
+        name: Source of the URDF, for messages.
+        text: The URDF.
+
+    Raises:
+        ConfigError: If it is not valid, or lacks a hinge of a person.
+    """
+    with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
+        file.write(text)
+        file.flush()
+        found = UrdfDocument(name, file.name).joints
+    if missing := [hinge for hinge in HINGES if hinge not in found]:
+        message = f"expected the joints of a person, as in human_urdf.py; it lacks '{missing[0]}'"
+        raise ConfigError([Problem(name, "", message)])
+    offsets = np.zeros((len(SEGMENTS), 3))
+    for index, joint in enumerate(JOINTS, start=1):
+        offsets[index] = np.sum([found[hinge].xyz for hinge in joint.hinges], axis=0)
+    return offsets

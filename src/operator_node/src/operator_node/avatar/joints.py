@@ -1,16 +1,14 @@
-"""The joints between the segments: names, order of axes, and ranges of motion.
-
-Each consists of three consecutive hinges with small links between them. The middle axis is one about which the joint
-moves little, since three hinges are singular where the middle one is at 90 deg. Only shoulders get near that, with the
-arm held sideways and the forearm straight up or down.
-"""
+"""Joints between the segments: names, order of axes, ranges of motion, and forward kinematics."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from operator_node.mvn.segments import SEGMENTS
+from operator_node.mvn.segments import PARENTS, SEGMENTS, SegmentFrame
+
+from .anthropometry import Array
 
 AXES = "xyz"
 Range = tuple[float, float]
@@ -105,3 +103,26 @@ HINGES: tuple[str, ...] = tuple(hinge for joint in JOINTS for hinge in joint.hin
 """The 66 hinges: three for each joint, in the order of `JOINTS`."""
 LOWER, UPPER = np.array([limits for joint in JOINTS for limits in joint.limits]).T
 """Limits of the hinges (66) [rad]."""
+
+
+def segment_frame(offsets: Array, position: Array, quat_xyzw: Array, hinges: dict[str, float]) -> SegmentFrame:
+    """Returns the segments of a person for poses of pelvis and hinges.
+
+    Args:
+        offsets: Origin of each segment in its parent (23 x 3) [m].
+        position: Origin of the pelvis in the world (3) [m].
+        quat_xyzw: Orientation of the pelvis in the world (4).
+        hinges: Positions of hinges by name [rad]; others are at 0.
+
+    Raises:
+        ValueError: If there is no such hinge.
+    """
+    if unknown := sorted(set(hinges) - set(HINGES)):
+        raise ValueError(f"unknown hinge '{unknown[0]}', expected names such as '{HINGES[0]}'")
+    rotations, positions = [Rotation.from_quat(quat_xyzw)], [np.asarray(position, dtype=float)]
+    for index, joint in enumerate(JOINTS, start=1):
+        parent = PARENTS[index]
+        angles = [hinges.get(hinge, 0.0) for hinge in joint.hinges]
+        rotations.append(rotations[parent] * Rotation.from_euler(joint.order.upper(), angles))
+        positions.append(positions[parent] + rotations[parent].apply(offsets[index]))
+    return SegmentFrame(0, 0, 0, np.array(positions), np.array([each.as_quat() for each in rotations]))

@@ -1,4 +1,4 @@
-"""Maps the segments of a person to the base and the joints of an avatar."""
+"""Maps the segments of a person to the base and the joints of an avatar, which moves there at limited speeds."""
 
 import math
 from typing import NamedTuple
@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from operator_node.mvn.segments import SegmentFrame
-from operator_node.mvn.skeleton import PARENTS
+from operator_node.mvn.segments import PARENTS, SegmentFrame
 
 from .anthropometry import Array, leg_length, measured_offsets
 from .joints import AXES, JOINTS, LOWER, UPPER
@@ -19,6 +18,8 @@ BEYOND = 1e-6
 LEG_RATIOS = (0.2, 5.0)
 """Range of the ratio of the avatar's leg length to the person's; other people are rejected."""
 _TURN = 2.0 * math.pi
+MAX_STEP_S = 0.1
+"""Longest time that counts between two frames [s]; the rest is dropped."""
 
 
 class AvatarPose(NamedTuple):
@@ -156,3 +157,49 @@ def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
     row_1, row_2 = c * m[1] + sign * s * m[2], c * m[2] - sign * s * m[1]
     angles = np.array((a, math.atan2(sign * m[0, 2], row_2[2]), math.atan2(sign * row_1[0], row_1[1])))
     return np.asarray(angles + _TURN * np.round((last - angles) / _TURN))
+
+
+class Engagement:
+    """Moves the avatar to its target pose at limited speeds, at the start, after a pause, and at any other time.
+
+    Args:
+        max_joint_speed: Largest speed of each hinge [rad/s].
+        max_speed: Largest speed of the pelvis [m/s].
+        max_angular_speed: Largest angular speed of the pelvis [rad/s].
+    """
+
+    def __init__(self, max_joint_speed: float, max_speed: float, max_angular_speed: float) -> None:
+        self._joint_speed, self._speed, self._angular_speed = max_joint_speed, max_speed, max_angular_speed
+        self._last: AvatarPose | None = None
+
+    def begin(self, pose: AvatarPose) -> None:
+        """Sets the present pose of the avatar, from which the next step starts."""
+        self._last = pose
+
+    def step(self, target: AvatarPose, dt: float) -> AvatarPose:
+        """Returns the next pose of the avatar.
+
+        Args:
+            target: Its target pose.
+            dt: Time since the last step [s].
+        """
+        if self._last is None:
+            self._last = target
+        last, dt = self._last, min(dt, MAX_STEP_S)
+        hinge_step, way = self._joint_speed * dt, target.position - last.position
+        distance = float(np.linalg.norm(way))
+        position = last.position + way * min(1.0, self._speed * dt / max(distance, 1e-12))
+        hinges = last.hinges + np.clip(target.hinges - last.hinges, -hinge_step, hinge_step)
+        quat = _turned(last.quat_xyzw, target.quat_xyzw, self._angular_speed * dt)
+        self._last = AvatarPose(position, quat, hinges)
+        return self._last
+
+
+def _turned(start: Array, end: Array, most_rad: float) -> Array:
+    """Returns a quaternion on the shortest path between two, limited to an angle from the first [rad]."""
+    first = Rotation.from_quat(start)
+    way = (first.inv() * Rotation.from_quat(end)).as_rotvec()
+    angle = float(np.linalg.norm(way))
+    if angle <= most_rad:
+        return end
+    return np.asarray((first * Rotation.from_rotvec(way * (most_rad / angle))).as_quat())

@@ -56,7 +56,7 @@ class Joystick(Device):
     """
 
     Config = JoystickConfig
-    ros_topics = "operator_node.ros.devices.joystick_topics:JoystickTopics"
+    ros_topics = "operator_node.devices.device_topics:JoystickTopics"
 
     def __init__(self, config: JoystickConfig) -> None:
         self.axes: Sequence[str] = ()

@@ -9,10 +9,9 @@ import time
 import tty
 
 from operator_node.device import DeviceError
-from operator_node.key_axes import KEY_CODES
 
-from .held_keys import HeldKeys
 from .key_window import CODES
+from .keys import KEY_CODES, HeldKeys
 
 ESCAPE = "\x1b"
 SEQUENCES = {

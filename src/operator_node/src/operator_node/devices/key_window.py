@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from tkinter import Event, Misc
 from typing import NamedTuple
 
-from operator_node.key_axes import KEY_CODES
-
-from .held_keys import CAPS_LOCK, NUM_LOCK, HeldKeys
+from .keys import CAPS_LOCK, KEY_CODES, NUM_LOCK, HeldKeys
 from .window import INK, DeviceWindow
 
 WIDTH_PX, HEIGHT_PX = 420, 220

@@ -9,11 +9,10 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, ListOf, Positive, Seconds, Switch, Unit
 from operator_node.device import Device, DeviceError, Reading
-from operator_node.key_axes import KeyAxes, KeyName, KeyPair
 
-from .held_keys import HeldKeys, KeyEvent
 from .key_terminal import KeyTerminal
 from .key_window import KeyWindow
+from .keys import HeldKeys, KeyAxes, KeyEvent, KeyName, KeyPair
 
 Milliseconds = Annotated[Positive, Unit("ms")]
 
@@ -46,7 +45,7 @@ class Keyboard(Device):
     """
 
     Config = KeyboardConfig
-    ros_topics = "operator_node.ros.devices.keyboard_topics:KeyboardTopics"
+    ros_topics = "operator_node.devices.device_topics:KeyboardTopics"
 
     def __init__(self, config: KeyboardConfig) -> None:
         if config.terminal and not sys.stdin.isatty():

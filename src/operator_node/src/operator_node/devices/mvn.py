@@ -4,13 +4,50 @@ import errno
 import logging
 from collections import Counter
 
+import numpy as np
+
+from custom_ros_tools.transforms import Array
 from operator_node.device import Device, DeviceError, Reading
-from operator_node.mvn.hands import AXES, HandAxes
+from operator_node.mvn.orientations import about_z, heading_rad, inverse, rotate
 from operator_node.mvn.packets import REASONS
 from operator_node.mvn.receiver import MvnConfig, Receiver, Refused, Silence
-from operator_node.mvn.segments import SegmentFrame
+from operator_node.mvn.segments import INDEX, SegmentFrame
 
+AXES = tuple(f"{side}_{axis}" for side in ("right", "left") for axis in "xyz")
+MIN_ARM_M = 0.05
+_HANDS = [INDEX["RightHand"], INDEX["LeftHand"]]
+_ARMS = np.array([[INDEX[f"{side}{bone}"] for bone in ("UpperArm", "ForeArm", "Hand")] for side in ("Right", "Left")])
 logger = logging.getLogger(__name__)
+
+
+class HandAxes:
+    """Displacements of the hands forwards, left and up since they were engaged.
+
+    They are relative to the pelvis and its heading, in arm lengths.
+    """
+
+    def __init__(self) -> None:
+        self._engaged: tuple[Array, Array] | None = None
+        """Positions of the hands, and lengths of the arms, when they were engaged."""
+
+    def release(self) -> None:
+        """Disengages the hands; the next frame engages them at their place then."""
+        self._engaged = None
+
+    def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
+        """Returns the numbers of `AXES`, each in [-1, 1]; zeros for the frame that engages."""
+        places = _places(frame)
+        if self._engaged is None:
+            lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)
+            self._engaged = places, np.maximum(lengths, MIN_ARM_M)[:, None]
+        before, lengths = self._engaged
+        return tuple(np.clip((places - before) / lengths, -1.0, 1.0).ravel().tolist())
+
+
+def _places(frame: SegmentFrame) -> Array:
+    """Returns the positions of both hands relative to the pelvis and its heading [m]."""
+    ahead = np.tile(about_z(heading_rad(frame.quats_xyzw[0])), (2, 1))
+    return rotate(inverse(ahead), frame.positions[_HANDS] - frame.positions[0])
 
 
 class Mvn(Device):
@@ -25,7 +62,7 @@ class Mvn(Device):
     Config = MvnConfig
     axes = AXES
     buttons = ()
-    ros_topics = "operator_node.ros.mvn.topics:MvnTopics"
+    ros_topics = "operator_node.devices.mvn_topics:MvnTopics"
 
     def __init__(self, config: MvnConfig) -> None:
         self.receiver = Receiver(config)

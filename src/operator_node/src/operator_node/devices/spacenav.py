@@ -66,7 +66,7 @@ class Spacenav(Device):
 
     Config = SpacenavConfig
     axes = ("x", "y", "z", "rx", "ry", "rz")
-    ros_topics = "operator_node.ros.devices.spacenav_topics:SpacenavTopics"
+    ros_topics = "operator_node.devices.device_topics:SpacenavTopics"
 
     def __init__(self, config: SpacenavConfig) -> None:
         self.buttons: Sequence[str] = ("0", "1")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from operator_node.avatar.anthropometry import Array, segment_offsets
-from operator_node.avatar.forward import segment_frame
+from operator_node.avatar.joints import segment_frame
 from operator_node.mvn.segments import SegmentFrame
 
 RAISING_S = 3.0

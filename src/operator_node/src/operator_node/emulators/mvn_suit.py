@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.transforms import Array
-from operator_node.mvn.segments import SEGMENTS
-from operator_node.mvn.sender import send, sender_arguments, without_ros_arguments
-from operator_node.mvn.skeleton import BONES, inverse, multiply
+from operator_node.mvn.orientations import inverse, multiply
+from operator_node.mvn.player import send, sender_arguments, without_ros_arguments
+from operator_node.mvn.segments import BONES, SEGMENTS
 
 from .arm_held_out import ArmHeldOut
 from .walking_person import WalkingPerson

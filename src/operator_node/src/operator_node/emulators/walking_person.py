@@ -4,8 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.transforms import Array
-from operator_node.mvn.segments import SEGMENTS
-from operator_node.mvn.skeleton import INDEX, PARENTS
+from operator_node.mvn.segments import INDEX, PARENTS, SEGMENTS
 
 T_POSE = {
     "Pelvis": (0.0, 0.0, 0.530),

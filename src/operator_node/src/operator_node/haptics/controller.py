@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pydantic import Field, model_validator
+from robot_model.geometry import ZERO, Vector, dot, minus, norm, plus, scaled, turned_about_z
 
-from custom_ros_tools.schema import ConfigModel, Count, KeyedError, NonNegative, Positive, Vec3
-from robot_model.geometry import ZERO, Vector, minus, plus, scaled, turned_about_z
-
-from .clutch import Clutch, TargetFollower
-from .coupling import Mode, VirtualCoupling, stiffest_n_per_m
+from .config import ForceFeedbackConfig
+from .coupling import Clutch, TargetFollower, VirtualCoupling, stiffest_n_per_m
 from .device import HapticConfig, HapticReading, ReadingError
-from .limiter import ForceLimiter
 from .passivity import PassivityController
 from .readings import ReadingCheck
 
@@ -23,53 +19,42 @@ SMOOTHING_S = 0.002
 """Time constant of the velocity filter for devices that do not measure velocity [s]."""
 
 
-class ForceFeedbackConfig(ConfigModel):
-    """Mapping of the handle to the tool, and the forces that are rendered."""
+class ForceLimiter:
+    """Shortens forces to a largest force and a largest slew rate.
 
-    mode: Mode = Field("wrench", description="Rendered force: the force on the tool, or a spring to its position.")
-    stiffness: Positive = Field(200.0, description="Stiffness of the spring of `mode: coupling` [N/m].")
-    damping: NonNegative = Field(
-        1.0, description="Damping between handle and tool; with `mode: wrench`, of the handle alone [N s/m]."
-    )
-    force_scale: NonNegative = Field(1.0, description="Factor of forces of `mode: wrench`.")
-    force_axes: Vec3 = Field((1.0, 1.0, 1.0), description="1 for each axis that is rendered, 0 for the others.")
-    slew_n_per_s: Positive = Field(1000.0, description="Largest rate at which a force may grow [N/s].")
-    expiry_s: float = Field(
-        0.016,
-        gt=0.0,
-        le=0.018,
-        description="Time for which a sample of handle or tool is valid [s]; the tool must be sampled more often.",
-    )
-    passivity: bool = Field(True, description="Whether the passivity controller changes forces.")
-    energy_reserve_j: NonNegative = Field(1.0, description="Largest energy that the observer stores [J].")
-    energy_allowance_j: float = Field(
-        0.0,
-        ge=0.0,
-        le=0.1,
-        description="Energy that may be given out once without having been put in; 0 is strictly passive.",
-    )
-    energy_refill_w: float = Field(
-        0.0, ge=0.0, le=0.1, description="Power at which that allowance is restored [W]; 0 is strictly passive."
-    )
-    clutch_button: Count | None = Field(None, description="Index of the button to hold; without it, always engaged.")
-    motion_scale: Vec3 = Field(
-        (1.0, 1.0, 1.0), description="Displacement of the tool for each metre of the handle; 0 holds."
-    )
-    yaw_deg: float = Field(
-        0.0, description="Angle by which the handle's axes are rotated about z relative to the tool's."
-    )
-    way_low: Vec3 = Field(
-        (-1.0, -1.0, -1.0), description="Least displacement of the target from its start, in its axes [m]."
-    )
-    way_high: Vec3 = Field((1.0, 1.0, 1.0), description="Most [m].")
-    max_target_speed: Positive = Field(0.5, description="Largest speed of the target [m/s].")
+    Directions are kept, so that a braking force still brakes. A force may become smaller, or zero, at once.
 
-    @model_validator(mode="after")
-    def _box_has_the_start(self) -> ForceFeedbackConfig:
-        for low, high in zip(self.way_low, self.way_high):
-            if not low <= 0.0 <= high:
-                raise KeyedError("way_low", f"the start, 0, has to lie between way_low and way_high, got {low}, {high}")
-        return self
+    Args:
+        max_force_n: Largest force [N].
+        slew_n_per_s: Largest rate at which a force may grow [N/s].
+
+    Attributes:
+        not_finite: Number of forces refused because a component was not finite.
+    """
+
+    def __init__(self, max_force_n: float, slew_n_per_s: float) -> None:
+        self._max_force_n, self._slew = max_force_n, slew_n_per_s
+        self._last = ZERO
+        self.not_finite = 0
+
+    def limited(self, force: Vector, dt_s: float) -> Vector:
+        """Returns the limited force [N], `dt_s` after the last one."""
+        length = norm(force)
+        if not math.isfinite(length):
+            self.not_finite += 1
+            self._last = ZERO
+            return ZERO
+        if length == 0.0:
+            self._last = ZERO
+            return ZERO
+        before = max(dot(self._last, force) / length, 0.0)
+        most = min(self._max_force_n, before + self._slew * dt_s)
+        self._last = force if length <= most else scaled(most / length, force)
+        return self._last
+
+    def note(self, force: Vector) -> None:
+        """Sets the force that was finally sent [N]; the next one grows from it."""
+        self._last = force
 
 
 class Snapshot(NamedTuple):

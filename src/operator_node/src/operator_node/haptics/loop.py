@@ -1,12 +1,19 @@
 """The 1 kHz loop between a haptic device and its controller, in a process of its own.
 
+The node starts that process: `python -m operator_node.haptics.loop FD`. Further arguments are those of a node, for
+devices that communicate through ROS.
+
 Python runs one thread at a time: in the process of a ROS node, a tick would wait for any thread that has the lock, and
 on a busy machine until that thread gets a processor.
 """
 
 import contextlib
+import gc
 import logging
 import os
+import signal
+import socket
+import sys
 import time
 from typing import Any
 
@@ -14,11 +21,10 @@ from custom_ros_tools.errors import MissingDependency
 from operator_node.device import DeviceError
 from robot_model.geometry import ZERO
 
+from .config import HapticNodeConfig
 from .controller import HapticController
 from .device import DeviceEnded, HapticDevice, ReadingError
-from .link import Link
-from .messages import LoopCommand, LoopReport
-from .node_config import HapticNodeConfig
+from .link import Link, LoopCommand, LoopReport, Setup
 
 _log = logging.getLogger(__name__)
 HZ = 1000.0
@@ -28,6 +34,8 @@ NODE_SILENCE_S = 0.2
 """Time without messages from the node after which the handle is disengaged [s]; it is engaged anew afterwards. Forces
 end earlier, since the samples of the tool come from the node, too.
 """
+SWITCH_S = 0.0002
+"""Longest time for which a thread of the device may hold Python's lock [s]; Python's default is 5 ms."""
 
 
 class HapticLoop:
@@ -186,3 +194,25 @@ def _prefer_no_longer() -> None:
     for thread in os.listdir("/proc/self/task"):
         with contextlib.suppress(OSError):  # it has just ended
             os.sched_setscheduler(int(thread), os.SCHED_OTHER, os.sched_param(0))
+
+
+def main() -> None:
+    """Runs the loop until the node has gone, or has closed the link."""
+    link = Link(socket.socket(fileno=int(sys.argv[1])))
+    # The node decides when this ends; a signal to this process alone makes it send zero first
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: link.close())
+    link.wait()
+    setup: Setup | None = next(link.receive(), None)
+    if setup is None:
+        return
+    sys.setswitchinterval(SWITCH_S)
+    device = setup.device(setup.options)
+    controller = HapticController(setup.config, setup.options, HZ, setup.way)
+    gc.collect()
+    gc.freeze()  # existing objects stay, so that later collections take next to no time
+    HapticLoop(device, controller, setup.config, link, setup.orders).run()
+
+
+if __name__ == "__main__":
+    main()

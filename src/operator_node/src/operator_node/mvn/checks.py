@@ -7,8 +7,8 @@ import numpy as np
 
 from custom_ros_tools.transforms import Array
 
-from .segments import SEGMENTS, SegmentFrame
-from .skeleton import BONES, INDEX, inverse, rotate
+from .orientations import inverse, rotate
+from .segments import BONES, INDEX, SEGMENTS, SegmentFrame
 
 SHAPE_PERIOD_S = 0.25
 """Period of the checks of a person's shape [s]; motion is checked at each frame."""

@@ -1,16 +1,50 @@
 """`mvn_player.py FILE`: sends a recorded stream of MVN with its timing."""
 
+import argparse
+import socket
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from custom_ros_tools.errors import InterfaceError
 
+from .packets import DEFAULT_PORT
 from .recording import read_recording
-from .sender import send, sender_arguments, without_ros_arguments
 
+LOOPBACK = "127.0.0.1"
 PAUSE_S = 0.02
 """Pause before a recording is repeated [s]."""
+
+
+def send(timed: Iterable[tuple[float, bytes]], host: str, port: int) -> int:
+    """Sends datagrams by UDP, each at its time [s] from now; late ones are sent at once. Returns their number.
+
+    A missing receiver is no error.
+    """
+    count = 0
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        begin_s = time.monotonic()
+        for time_s, data in timed:
+            left_s = begin_s + time_s - time.monotonic()
+            if left_s > 0.0:
+                time.sleep(left_s)
+            sender.sendto(data, (host, port))
+            count += 1
+    return count
+
+
+def sender_arguments(program: str, purpose: str | None) -> argparse.ArgumentParser:
+    """Returns a parser with the options `--host` and `--port`."""
+    parser = argparse.ArgumentParser(prog=program, description=purpose)
+    parser.add_argument("--host", default=LOOPBACK, help="receiver; by default this computer")
+    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help=f"UDP port there; by default {DEFAULT_PORT}")
+    return parser
+
+
+def without_ros_arguments(arguments: Iterable[str]) -> list[str]:
+    """Returns the arguments of a program without those that roslaunch adds, such as `__name:=player`."""
+    return [argument for argument in arguments if ":=" not in argument]
 
 
 def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Iterator[tuple[float, bytes]]:

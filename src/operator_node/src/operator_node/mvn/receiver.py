@@ -14,8 +14,8 @@ from pydantic import Field
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Switch, Text
 
-from .calibration import Calibration
 from .checks import Finding, FrameChecks
+from .orientations import Calibration
 from .packets import DEFAULT_PORT
 from .recording import DatagramRecording
 from .segments import SegmentFrame

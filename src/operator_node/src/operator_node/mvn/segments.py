@@ -1,4 +1,4 @@
-"""Messages of MVN about a person: 23 rigid segments, joint angles and more."""
+"""The 23 rigid segments of a person, and the messages of MVN about a person."""
 
 from typing import NamedTuple
 
@@ -32,6 +32,22 @@ SEGMENTS = (
     "LeftToe",
 )
 """Names of the segments in the order of the stream, whose ids start at 1 (MVN network streaming protocol, rev. N)."""
+INDEX = {name: index for index, name in enumerate(SEGMENTS)}
+PARENTS = tuple(
+    -1 if parent is None else INDEX[parent]
+    for parent in (
+        *(None, "Pelvis", "L5", "L3", "T12", "T8", "Neck"),
+        *("T8", "RightShoulder", "RightUpperArm", "RightForeArm"),
+        *("T8", "LeftShoulder", "LeftUpperArm", "LeftForeArm"),
+        *("Pelvis", "RightUpperLeg", "RightLowerLeg", "RightFoot"),
+        *("Pelvis", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot"),
+    )
+)
+"""Index of each segment's parent, -1 for the pelvis."""
+BONES = np.array([(parent, child) for child, parent in enumerate(PARENTS) if parent >= 0])
+"""Each bone as the pair of segments whose origins it connects, parent first (22 x 2); it is rigid, and rotates with its
+parent.
+"""
 
 
 class SegmentFrame(NamedTuple):

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from operator_node.avatar.anthropometry import segment_offsets
-from operator_node.avatar.engagement import Engagement
 from operator_node.avatar.joints import HINGES
-from operator_node.avatar.retargeting import AvatarPose, Retargeting
+from operator_node.avatar.retargeting import AvatarPose, Engagement, Retargeting
 from operator_node.avatar.segment_forces import forces_by_segment
 from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
 from robot_model.geometry import Pose, Vector

@@ -13,7 +13,7 @@ from std_msgs.msg import Float64
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from operator_node.ros.haptics.node import HapticNode
+from operator_node.haptics.haptic_node import HapticNode
 
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 SAMPLES = 100

@@ -9,7 +9,7 @@ HAPTIC_DEVICES: PluginTable[HapticDevice] = PluginTable(
     {
         "haply": "operator_node.haptics.devices.haply:HaplyDevice",
         "scripted": "operator_node.haptics.devices.scripted:ScriptedDevice",
-        "touch": "operator_node.ros.haptics.touch:TouchDevice",
+        "touch": "operator_node.haptics.devices.touch_topics:TouchDevice",
         "virtual": "operator_node.haptics.devices.virtual:VirtualDevice",
     },
 )

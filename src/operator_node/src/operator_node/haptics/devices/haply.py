@@ -15,7 +15,7 @@ from operator_node.device import DeviceError
 from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
 from robot_model.geometry import ZERO, Vector, minus, norm
 
-from .haply_messages import command_of, device_in, state_in
+from .haply_json import command_of, device_in, state_in
 
 try:
     from websockets.exceptions import WebSocketException

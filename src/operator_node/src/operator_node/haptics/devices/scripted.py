@@ -6,10 +6,8 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Count, Metres, NonNegative, Positive, PositiveMetres
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
-from operator_node.haptics.hand import Hand, PressMotion
+from operator_node.haptics.emulated import EmulatedDevice, Hand, PressMotion
 from robot_model.geometry import Vector
-
-from .emulated import EmulatedDevice
 
 SPREAD = 0.15
 """Share by which depths, times and the properties of the hand vary with the seed."""

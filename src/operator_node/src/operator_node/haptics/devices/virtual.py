@@ -13,9 +13,8 @@ from pydantic import Field
 from custom_ros_tools.schema import NonNegative, Positive, PositiveMetres, Switch
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
+from operator_node.haptics.emulated import EmulatedDevice
 from robot_model.geometry import ZERO, Vector, shortened_to
-
-from .emulated import EmulatedDevice
 
 FROM_WINDOW = struct.Struct("=4d")
 """x, y, z of the mouse [m] and whether the button is held."""

@@ -1,1 +1,0 @@
-"""Nodes of input devices."""

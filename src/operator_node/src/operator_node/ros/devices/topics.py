@@ -1,22 +1,5 @@
-"""Topics of a device other than `joy`."""
+"""Former import path of the base class of a device's topics."""
 
-from collections.abc import Callable
+from operator_node.devices.device_topics import DeviceTopics
 
-import rospy
-
-from operator_node.device import Device, Reading
-
-
-class DeviceTopics:
-    """Publishes the events of a device, and subscribes to its inputs; base class.
-
-    Args:
-        device: The device.
-        post: Schedules an action in the thread of the device; every access to the device has to use it.
-    """
-
-    def __init__(self, device: Device, post: Callable[[Callable[[], None]], None]) -> None:
-        self.device, self.post = device, post
-
-    def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes the parts of a reading other than axes and buttons."""
+__all__ = ["DeviceTopics"]

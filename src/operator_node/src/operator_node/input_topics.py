@@ -1,0 +1,82 @@
+"""Topics of user input: stamps, and subscriptions that detect that their input has ceased."""
+
+import time
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import rospy
+from pydantic import Field
+
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.schema import ConfigModel, Unit
+
+SecondsOrOff = Annotated[float, Field(ge=0), Unit("s")]
+"""A time [s]; 0 means forever."""
+QUEUE_SIZE = 10
+"""Largest number of queued messages; older input is useless."""
+
+
+def stamp() -> rospy.Time:
+    """Returns the present ROS time; wall time if simulated time has not started."""
+    now = rospy.Time.now()
+    return rospy.Time.from_sec(time.time()) if now.is_zero() else now
+
+
+def has_begun() -> bool:
+    """Returns whether ROS time has started; for TF, transforms with earlier wall stamps would be newer than all later
+    ones.
+    """
+    return not rospy.Time.now().is_zero()
+
+
+class InputParameters(ConfigModel):
+    """Time after which input counts as lost; it also does once it has no publisher."""
+
+    input_timeout_s: SecondsOrOff = Field(
+        0.0,
+        description="Time without input after which it counts as lost; 0 waits forever, for devices that report "
+        "changes only.",
+    )
+
+
+class WatchedInput:
+    """Subscribes to a topic, and detects when its input has ceased.
+
+    It has ceased when the topic has no publisher any more, or no message has arrived within the timeout.
+
+    Args:
+        topic: The topic.
+        message_type: Its type.
+        on_message: Called with each message.
+        timeout_s: The timeout [s]; 0 disables it.
+    """
+
+    def __init__(
+        self, topic: str, message_type: type, on_message: Callable[[Any], None], timeout_s: float = 0.0
+    ) -> None:
+        self._on_message, self._timeout_s = on_message, timeout_s
+        self._last_s: float | None = None
+        self._warn = ThrottledWarning()
+        self._subscriber = rospy.Subscriber(topic, message_type, self._note, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    @property
+    def topic(self) -> str:
+        """Full name of the topic."""
+        return str(self._subscriber.resolved_name)
+
+    def has_ceased(self, consequence: str) -> bool:
+        """Returns whether the input has ceased; False before its first message. If so, warns about the consequence."""
+        if self._last_s is None:
+            return False
+        if self._subscriber.get_num_connections() == 0:
+            reason = "it has no publisher any more"
+        elif self._timeout_s and time.monotonic() - self._last_s > self._timeout_s:
+            reason = f"no message for {self._timeout_s:g} s"
+        else:
+            return False
+        self._warn(self.topic, f"{reason}: {consequence}")
+        return True
+
+    def _note(self, message: Any) -> None:
+        self._last_s = time.monotonic()
+        self._on_message(message)

@@ -1,0 +1,167 @@
+"""Base of the nodes that map `joy` to `operator_node/signal`."""
+
+import math
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+import rospy
+from numpy.typing import ArrayLike
+from pydantic import Field
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Float64MultiArray
+
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.plugins import cause_of
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import leave_ros_on_signals
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.rospy_internals import DirectSending
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.schema import HzOrOff
+from custom_ros_tools.toggle import Toggle
+from operator_node.input_topics import QUEUE_SIZE, InputParameters, WatchedInput
+
+NAME = "operator_node"
+LOOK_HZ = 50.0
+"""Rate of the check for ceased input."""
+
+
+class OperatorParameters(StartParameters, InputParameters):
+    """Parameters of the nodes that map a device."""
+
+    repeat_hz: HzOrOff = Field(
+        20.0, description="Rate at which a nonzero signal is repeated while the input stays the same; 0 never repeats."
+    )
+
+
+class OperatorNode(ABC):
+    """Publishes a signal while it is switched on; `operator_node/toggle` switches it.
+
+    A subclass computes the signal in `callback` and passes it to `publish`. It stays in force until the next one, and
+    is repeated `~repeat_hz` times a second unless it is zero, so that subscribers can distinguish a user who holds
+    still from a node that has gone. When the node is switched off, when input ceases (`~input_timeout_s`) or a message
+    is refused, the signal ends with one zero signal.
+
+    In a process that is no node yet, it makes the node `operator_node`; `run_node` is the alternative.
+
+    Attributes:
+        config: The parameter `~config`, a mapping.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node(NAME, disable_signals=True)
+            leave_ros_on_signals()
+        self.config = rospy.get_param("~config", {})
+        self._lock = threading.RLock()
+        self._is_on = False
+        self._in_force: tuple[float, ...] = ()
+        self._warn = ThrottledWarning()
+        self.post_init()
+        parameters = private_parameters(OperatorParameters)
+        self._publisher = rospy.Publisher(
+            "operator_node/signal", Float64MultiArray, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        )
+        self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
+        self._toggle = Toggle("operator node", self._start, self._end)
+        if parameters.start_on_init:
+            self.start()
+        self._joy = WatchedInput("joy", Joy, self._on_joy, parameters.input_timeout_s)
+        ToggleService("operator_node/toggle", self.start, self.stop)
+        rospy.on_shutdown(self._end)
+        WallTimer(LOOK_HZ, self._look)
+        if parameters.repeat_hz:
+            WallTimer(parameters.repeat_hz, self._repeat)
+
+    def post_init(self) -> None:  # noqa: B027 (most need none)
+        """Prepares the subclass before the first message; `config` is available."""
+
+    @abstractmethod
+    def callback(self, joy: Joy) -> None:
+        """Maps a message to a signal and publishes it; its numbers are finite.
+
+        Raises:
+            ValueError: If it is invalid; states why.
+        """
+
+    def start(self) -> tuple[bool, str]:
+        """Switches it on; returns whether that changed anything, and a message."""
+        return self._toggle.on()
+
+    def stop(self) -> tuple[bool, str]:
+        """Switches it off; returns whether that changed anything, and a message."""
+        return self._toggle.off()
+
+    def publish(self, signal: ArrayLike) -> None:
+        """Publishes a signal, one or more numbers.
+
+        Raises:
+            ValueError: If it is empty or not finite.
+        """
+        values = tuple(np.asarray(signal, dtype=float).ravel().tolist())
+        if not values or not all(map(math.isfinite, values)):
+            raise ValueError(f"its signal must be finite, got {', '.join(f'{v:g}' for v in values) or 'none'}")
+        with self._lock:
+            if self._is_on:
+                self._in_force = values
+                self._send(values)
+
+    def spin(self) -> None:
+        """Waits until ROS shuts down."""
+        rospy.spin()
+
+    def _start(self) -> None:
+        with self._lock:
+            self._is_on = True
+
+    def _end(self) -> None:
+        with self._lock:
+            self._end_signal()
+            self._is_on = False
+
+    def _end_signal(self) -> None:
+        with self._lock:
+            if self._in_force:
+                self._send([0.0] * len(self._in_force))
+                self._in_force = ()
+
+    def _on_joy(self, joy: Joy) -> None:
+        with self._lock:
+            if not self._is_on:
+                return
+            try:
+                if not all(map(math.isfinite, joy.axes)):
+                    raise ValueError(f"axes must be finite, got {', '.join(f'{v:g}' for v in joy.axes)}")
+                self.callback(joy)
+            except Exception as error:  # whatever fails in a user's class, the signal ends
+                reason = str(error) if isinstance(error, ValueError) else cause_of(error)
+                self._warn(self._joy.topic, f"message refused: {reason}")
+                self._end_signal()
+
+    def _look(self) -> None:
+        with self._lock:
+            if any(self._in_force) and self._joy.has_ceased("the signal is zero"):
+                self._end_signal()
+
+    def _repeat(self) -> None:
+        with self._lock:
+            if any(self._in_force):
+                self._send(self._in_force)
+
+    def _send(self, values: Sequence[float]) -> None:
+        """Sends a signal before it returns: rospy's own thread might lose the last one of a node that ends."""
+        if self._sending is not None:
+            self._sending.wrap_connections()
+        self._publisher.publish(Float64MultiArray(data=values))
+        flush_buffered_sockets()
+
+
+def main(node: type[OperatorNode]) -> None:
+    """Runs the node of a subclass until ROS shuts down."""
+    node().spin()

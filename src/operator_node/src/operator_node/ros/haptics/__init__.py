@@ -1,1 +1,0 @@
-"""The haptic node, and devices that communicate by topics."""
