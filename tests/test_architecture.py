@@ -171,7 +171,7 @@ def test_only_the_world_calls_pybullet_in_the_simulator_node():
     """Rule 1: nothing in the ROS layer reaches into PyBullet, but the robot's description on request."""
     for path in (SRC / "ros_pybullet_interface/src/rpbi/ros").rglob("*.py"):
         calls = re.findall(r"\bpb\.\w+", path.read_text())
-        assert path.name == "info.py" or calls == [], path
+        assert path.name == "robot_info.py" or calls == [], path
 
 
 FAMILIES = {

@@ -16,7 +16,7 @@ from session import Session
 
 from custom_ros_tools.config import load_config, replace_package
 from rpbi.config.object_entry import ObjectEntry
-from rpbi.ros.reference.interface_table import PUBLISHES, endpoints
+from rpbi.ros.interface_table import PUBLISHES, endpoints
 from rpbi.world import World
 from rpbi.world.loading import load_world_dict
 from rpbi_examples.scenes import SCENES

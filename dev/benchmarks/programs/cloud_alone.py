@@ -10,8 +10,7 @@ from io import BytesIO
 import numpy as np
 from std_msgs.msg import Header
 
-from rpbi.render.camera import Intrinsics, depth_in_metres
-from rpbi.render.depth import PointCloud
+from rpbi.render.camera import Intrinsics, PointCloud, depth_in_metres
 from rpbi.ros.cameras.topics import cloud_message
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.render.camera import looking_at
+from rpbi.render.channel import DrawnScene
 from rpbi.render.frame import Camera, Frame
-from rpbi.render.messages import DrawnScene
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import Renderer, open_renderer
 

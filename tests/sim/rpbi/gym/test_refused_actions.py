@@ -12,7 +12,7 @@ from gymnasium import spaces
 from gymnasium.utils.env_checker import data_equivalence
 
 from rpbi.gym.checks import check_action
-from rpbi.gym.vector.env import WorldVectorEnv
+from rpbi.gym.vector_env import WorldVectorEnv
 
 DELAYED = {"delays": {"observation_s": [0.02, 0.02], "action_s": [0.02, 0.02]}}
 GOOD = np.array([0.9], np.float32)

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 from custom_ros_tools.errors import InterfaceError, PluginError
-from rpbi.gym.vector.env import WorldVectorEnv
+from rpbi.gym.vector_env import WorldVectorEnv
 
 VARIED = {"poses": [{"object": "box", "position": [0.02, 0.02, 0.0]}]}
 COUNT = 3

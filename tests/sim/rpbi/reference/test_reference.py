@@ -14,7 +14,7 @@ from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
 from rpbi.ros.headers import FRAMES
-from rpbi.ros.reference.interface_table import FOLLOWS, endpoints
+from rpbi.ros.interface_table import FOLLOWS, endpoints
 from rpbi.ros.reference.reference_world import FOLLOWED, reference_world
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World

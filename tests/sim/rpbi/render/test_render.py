@@ -19,8 +19,7 @@ from rendering import ALL, CAMERA, INTRINSICS, Rendering, back_project, project,
 
 from custom_ros_tools.processes.child import is_stopped
 from rpbi.geometry import Pose
-from rpbi.render.camera import Intrinsics
-from rpbi.render.depth import DepthNoise
+from rpbi.render.camera import DepthNoise, Intrinsics
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import open_renderer

@@ -13,7 +13,7 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 from custom_ros_tools.errors import ConfigError
 from robot_model.geometry import rotation_between
 from rpbi.geometry import Pose
-from rpbi.ros.reference.interface_table import endpoints
+from rpbi.ros.interface_table import endpoints
 from rpbi.samples import AprilTagsSample, ViconSample
 from rpbi.world import World
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rpbi.render.depth import DepthNoise
+from rpbi.render.camera import DepthNoise
 
 NEAR_M, FAR_M = 0.1, 10.0
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from rendering import back_project
 
-from rpbi.render.camera import Intrinsics
-from rpbi.render.depth import PointCloud
+from rpbi.render.camera import Intrinsics, PointCloud
 
 INTRINSICS = Intrinsics(width_px=32, height_px=24, fov_deg=60.0, near_m=0.1, far_m=5.0)
 SHAPE = INTRINSICS.height_px, INTRINSICS.width_px

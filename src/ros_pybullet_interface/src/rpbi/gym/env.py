@@ -251,6 +251,6 @@ def register(name: str, world: str, task: Any, **options: Any) -> None:
     gymnasium.register(
         name,
         entry_point="rpbi.gym.env:WorldEnv",
-        vector_entry_point="rpbi.gym.vector.env:make_vector",
+        vector_entry_point="rpbi.gym.vector_env:make_vector",
         kwargs={"world": world, "task": task, **options},
     )

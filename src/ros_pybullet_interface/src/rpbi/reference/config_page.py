@@ -1,13 +1,25 @@
-"""The page of all YAML files and their keys."""
+"""The page of all YAML files and their keys, and the JSON Schemas of these files."""
 
+import re
 from collections.abc import Container, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from custom_ros_tools.schema.json_schema import Schema, mapping_in, name_of, resolved, unit_in, yaml_text
+from custom_ros_tools.node_configs import NODE_CONFIGS
+from custom_ros_tools.schema.json_schema import (
+    Schema,
+    json_schema,
+    mapping_in,
+    name_of,
+    resolved,
+    schema_texts,
+    unit_in,
+    yaml_text,
+)
 from custom_ros_tools.schema.type_names import constants_in, type_name
 from rpbi.config.object_entry import FILES
 from rpbi.world.legacy import MAIN, old_keys
-from rpbi.world.schemas import WORLD, kind_of, sections
+from rpbi.world.schemas import WORLD, file_schemas, kind_of, schemas, sections
 
 from .markdown import WRITTEN_BY, block, code, link, page, table
 
@@ -47,6 +59,9 @@ GUIDES = {
 }
 """Page that explains the keys under a heading."""
 HEAD = ("key", "type", "default", "meaning")
+FIRST_EXAMPLES = "basic_example_kuka_lwr"
+"""Folder whose files are examples of their kind; others are if it has none."""
+_SCHEMA_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 class Place(NamedTuple):
@@ -67,6 +82,28 @@ class Place(NamedTuple):
 
 Places = dict[str, Place]
 """By the name of the mapping's definition, which is the same in all files."""
+
+
+def config_files(root: Path) -> dict[Path, str]:
+    """Returns the text of the page and of all schemas of a workspace, by their paths."""
+    nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
+    return {
+        **schema_texts(root / "src/ros_pybullet_interface/schema", schemas()),
+        **schema_texts(root / "src/custom_ros_tools/schema", nodes),
+        root / "docs/config_reference.md": config_page(file_schemas(), nodes, _examples(root)),
+    }
+
+
+def _examples(root: Path) -> dict[str, str]:
+    """Returns an example of each kind of file, without its first line, which names the schema for editors."""
+    examples: dict[str, str] = {}
+    paths = (root / "src/rpbi_examples/configs").rglob("*.yaml")
+    for path in sorted(paths, key=lambda path: (path.parent.name != FIRST_EXAMPLES, len(path.parts), path)):
+        text = path.read_text()
+        named = _SCHEMA_LINE.match(text)
+        if named:
+            examples.setdefault(named[1], text[named.end() :])
+    return examples
 
 
 def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], examples: Mapping[str, str]) -> str:

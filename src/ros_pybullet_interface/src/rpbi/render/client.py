@@ -14,12 +14,11 @@ from custom_ros_tools.processes.child import is_stopped
 from rpbi.samples import SceneSample
 from rpbi.world.load_log import LoadLogReader, LogEntry
 
-from .channel import Channel
-from .frame import NO_DEMAND, Camera, Demand
-from .messages import (
+from .channel import (
     Alive,
     CameraAdded,
     CameraRemoved,
+    Channel,
     Demanded,
     DrawnScene,
     Ready,
@@ -29,6 +28,7 @@ from .messages import (
     Shown,
     WorldChanged,
 )
+from .frame import NO_DEMAND, Camera, Demand
 
 log = logging.getLogger(__name__)
 

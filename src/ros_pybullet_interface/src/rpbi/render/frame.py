@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from rpbi.config.sensors import RgbdSensorConfig
 
-from .camera import Intrinsics
-from .depth import DepthNoise
+from .camera import DepthNoise, Intrinsics
 
 
 class Camera(NamedTuple):

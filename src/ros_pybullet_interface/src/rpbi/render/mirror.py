@@ -1,26 +1,62 @@
 """The renderer's own copy of the world."""
 
 import logging
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from robot_model.geometry import Vector
 from rpbi.bodies import Body
 from rpbi.engine.client import Client
-from rpbi.render.shapes.soft_shapes import SoftShapes
-from rpbi.render.shapes.tessellation import FineShapes
-from rpbi.render.shapes.transparency import Transparency, TransparentShape
 from rpbi.samples import BodyState
 from rpbi.world.load_log import LogEntry, apply
 
 from .camera import depth_in_metres
+from .channel import DrawnScene
 from .frame import Camera, Frame
-from .messages import DrawnScene
 from .renderers import Renderer
+from .tessellation import FineShapes
+from .transparency import Transparency, TransparentShape
 
 log = logging.getLogger(__name__)
+
+SHORTEST_STEP_S = 1e-9
+"""Length of a step with negligible motion [s]."""
+
+
+class SoftShapes:
+    """Sets the shapes of soft bodies in a client without physics.
+
+    PyBullet draws a soft body as it was after the last step, so there must be a step now and then.
+
+    Args:
+        pb: The client, whose world has just been set up.
+    """
+
+    def __init__(self, pb: Client) -> None:
+        self._pb = pb
+        if pb.is_deformable:
+            pb.setGravity(0.0, 0.0, 0.0)
+            pb.setTimeStep(SHORTEST_STEP_S)
+
+    def still(self, body: Body) -> None:
+        """Disables collisions and forces of a new body."""
+        if self._pb.is_deformable:
+            body.detach()
+            for link in (-1, *body.joint_indices):
+                self._pb.setCollisionFilterGroupMask(body.body_id, link, 0, 0)
+
+    def show(self, nodes: Sequence[tuple[Body, Sequence[Vector]]]) -> None:
+        """Sets corners of soft bodies; rigid bodies must be placed afterwards.
+
+        Args:
+            nodes: Soft bodies and the places of all of their simulated corners [m].
+        """
+        for body, places in nodes:
+            self._pb.resetMeshData(body.body_id, places)
+        self._pb.stepSimulation()
 
 
 class Mirror:

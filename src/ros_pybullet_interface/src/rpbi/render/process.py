@@ -9,13 +9,11 @@ from typing import Any
 
 from rpbi.engine.priority import run_normally, yield_to_simulator
 
-from .channel import Channel
-from .egl import EglError
-from .frame import NO_DEMAND, Camera, Demand, Sink
-from .messages import (
+from .channel import (
     Alive,
     CameraAdded,
     CameraRemoved,
+    Channel,
     Demanded,
     DrawnScene,
     Ready,
@@ -25,6 +23,8 @@ from .messages import (
     Shown,
     WorldChanged,
 )
+from .egl import EglError
+from .frame import NO_DEMAND, Camera, Demand, Sink
 from .mirror import Mirror
 from .renderers import Renderer, open_renderer
 

@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from robot_model.geometry import Pose
 from rpbi.engine.client import Client
-from rpbi.render.shapes.transparency import TransparentShape
 
 from .camera import Intrinsics, view_matrix
 from .egl import Egl, EglError
 from .frame import Camera
+from .transparency import TransparentShape
 
 log = logging.getLogger(__name__)
 

@@ -5,23 +5,24 @@ from typing import Any
 
 import geometry_msgs.msg
 import rospy
-from geometry_msgs.msg import Vector3, WrenchStamped
+from geometry_msgs.msg import PoseStamped, Vector3, WrenchStamped
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.rospy_internals import close_poller_with
+from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.external_wrenches import TIMEOUT_S, ExternalWrench
 from rpbi.control.joint_command import JointCommand, WrongQuantityError
 from rpbi.control.motors import QUANTITIES, ResolvedCommand
 from rpbi.control.planar_base import PlanarVelocity
 from rpbi.engine.inputs import Input, PoseInput
-from rpbi.geometry import Twist
+from rpbi.geometry import Pose, Twist
 from rpbi.world import World
 
 from .endpoints import Topic, find_topic
-from .headers import prefixed, to_ros_time
+from .headers import prefixed, to_ros_time, world_frame
 from .tf_follower import TfFollower, refusal
 
 
@@ -51,6 +52,20 @@ def _external_wrench(message: WrenchStamped) -> ExternalWrench:
     )
 
 
+def _pose_target(message: PoseStamped) -> PoseTarget:
+    position, quat = message.pose.position, message.pose.orientation
+    frame = message.header.frame_id.lstrip("/")
+    if frame not in ("", world_frame()):
+        raise ValueError(f"expected a pose in '{world_frame()}', got one in '{frame}'")
+    pose = Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))
+    return PoseTarget(pose, message.header.stamp.to_nsec())
+
+
+def _controller_target(message: JointState) -> JointCommand:
+    stamp_ns = message.header.stamp.to_nsec()
+    return JointCommand(tuple(message.name), tuple(message.position), (), tuple(message.effort), stamp_ns)
+
+
 TOPIC_INPUTS: dict[str, Topic] = {
     "target": Topic(
         "rpbi/{name}/joint_states/target",
@@ -72,6 +87,15 @@ TOPIC_INPUTS: dict[str, Topic] = {
     ),
 }
 """The topic of each kind of input that comes by topic."""
+POSE_TARGET = Topic(
+    "rpbi/{name}/target", PoseStamped, _pose_target, "Target of the point that the controller holds, in the world."
+)
+JOINT_TARGET = Topic(
+    "rpbi/{name}/target",
+    JointState,
+    _controller_target,
+    "Targets of the controller's joints [rad or m]; efforts [N m or N], if any, are added.",
+)
 
 
 def topic_input(key: str, taken: Input) -> Topic:

@@ -19,26 +19,26 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.urdf.files import write_description
 from rpbi.engine.priority import RealTimePriority
-from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
-from rpbi.ros.publishers.static_frames import StaticFrames
+from rpbi.ros.publishers.transforms import StaticFrames
 from rpbi.ros.publishers.world_markers import WorldMarkers
-from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
-from rpbi.ros.window.topics import WindowTopics
 from rpbi.world import World
 from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
 from rpbi.world_warnings import world_warnings
 
+from .attachments import AttachmentPublisher
 from .endpoints import serve
 from .headers import use_own_frames, use_prefix
 from .initial_state import start_where_robots_are
+from .interface_table import endpoints
 from .requests import Requests
 from .services.object_lifecycle import ObjectLifecycle
 from .services.prediction import MAX_TICKS, Predictor
 from .services.states import state_folder
 from .simulation import Simulation
+from .window_topics import WindowTopics
 
 
 def configured_world(robot_description: str | None) -> LoadedWorld:

@@ -16,8 +16,7 @@ from rpbi.urdf.joints import Joint
 from rpbi.urdf.subtree import LinkStates, Subtree
 
 from .filters import LowPass, SeededNoise, Zeroing
-from .sensed import SensedBody, SensedWorld
-from .sensor import Sensor
+from .sensor import SensedBody, SensedWorld, Sensor
 
 
 class ForceTorqueSensor(Sensor):

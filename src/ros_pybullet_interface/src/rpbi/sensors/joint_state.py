@@ -5,8 +5,7 @@ import math
 from custom_ros_tools.errors import PhysicsError
 from rpbi.samples import JointStateSample
 
-from .sensed import SensedRobot
-from .sensor import Sensor
+from .sensor import SensedRobot, Sensor
 
 
 class JointStateSensor(Sensor):

@@ -6,8 +6,7 @@ from custom_ros_tools.errors import PhysicsError
 from rpbi.geometry import Pose
 from rpbi.samples import LinkPoseSample
 
-from .sensed import SensedBody
-from .sensor import Sensor
+from .sensor import SensedBody, Sensor
 
 
 def index_of_link(body: SensedBody, link: str | None) -> int | None:

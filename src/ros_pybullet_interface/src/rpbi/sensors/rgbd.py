@@ -8,8 +8,7 @@ from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.samples import SceneSample
 
-from .sensed import SensedBody
-from .sensor import Sensor
+from .sensor import SensedBody, Sensor
 
 
 class RgbdSensor(Sensor):

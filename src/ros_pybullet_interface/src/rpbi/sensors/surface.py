@@ -5,8 +5,7 @@ import math
 from custom_ros_tools.errors import PhysicsError
 from rpbi.samples import SurfaceSample
 
-from .sensed import SensedBody
-from .sensor import Sensor
+from .sensor import SensedBody, Sensor
 
 
 class SurfaceSensor(Sensor):

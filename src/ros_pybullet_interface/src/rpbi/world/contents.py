@@ -20,8 +20,7 @@ from rpbi.plugins import plugin_errors
 from rpbi.sensors import SENSOR_TYPES
 from rpbi.sensors.contacts.contacts import ContactReader
 from rpbi.sensors.rgbd import RgbdSensor
-from rpbi.sensors.sensed import SensedWorld
-from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
 from .attachments import Attachments
 from .load_log import LogEntry, apply

@@ -17,7 +17,7 @@ from custom_ros_tools.foreign import printable
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.ros.headers import use_own_frames, use_prefix
 from rpbi.ros.publishers.status import STATE
-from rpbi.ros.publishers.topic_publisher import TF
+from rpbi.ros.publishers.transforms import TF
 from rpbi.world import World
 from rpbi_data.bags.bag_reader import BagMessage, BagReader
 from rpbi_data.bags.nanoseconds import PER_SECOND, to_seconds

@@ -7,8 +7,9 @@ from typing import Any
 
 from rpbi.plugins import plugin_errors
 from rpbi.ros.endpoints import Topic
+from rpbi.ros.publishers.sample_publishers import SampleKey
 from rpbi.ros.publishers.sample_topics import sample_topic
-from rpbi.ros.publishers.topic_publisher import TF, SampleKey, TransformCollector
+from rpbi.ros.publishers.transforms import TF, TransformCollector
 from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 

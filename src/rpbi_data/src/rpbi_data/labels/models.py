@@ -16,7 +16,7 @@ from custom_ros_tools.transforms import matrix_of
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes
 from rpbi.meshes.triangles import read_triangles
-from rpbi.render.shapes import surfaces
+from rpbi.render import surfaces
 
 Array = npt.NDArray[np.float64]
 MM = 1000.0

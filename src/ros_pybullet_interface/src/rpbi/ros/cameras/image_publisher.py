@@ -14,10 +14,10 @@ from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.run_node import init_node
 from custom_ros_tools.ros.rospy_internals import RecorderQueues
-from rpbi.render.depth import PointCloud
+from rpbi.render.camera import PointCloud
 from rpbi.render.frame import Camera, Demand, Frame
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.messages.topics import StateTopic
+from rpbi.ros.state_topic import StateTopic
 
 from .topics import camera_info, camera_topics, cloud_message, compressed_message, image_message
 

@@ -12,7 +12,7 @@ from custom_ros_tools.errors import InterfaceError, Problem
 from custom_ros_tools.foreign import printable_lines
 from rpbi.bodies import BODY_TYPES
 from rpbi.images import drawing_times
-from rpbi.ros.reference.interface_table import Endpoint, endpoints
+from rpbi.ros.interface_table import Endpoint, endpoints
 from rpbi.world import World
 from rpbi.world.loading import load_world
 from rpbi.world_warnings import world_warnings

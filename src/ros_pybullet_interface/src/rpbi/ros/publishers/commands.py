@@ -12,7 +12,7 @@ from ros_pybullet_interface.msg import WorldCommand as WorldCommandMessage
 from ros_pybullet_interface.msg import WorldCommands
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.state_topic import FastTopic
 from rpbi.world import World
 from rpbi.world.saved.command_log import WorldCommand
 from rpbi.world.saved.values import to_text

@@ -1,18 +1,74 @@
 """Publishers of a world's samples, and the order of messages of a tick."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 from rpbi.engine.inputs import PoseInput
+from rpbi.plugins import plugin_errors, raise_plugin_error
 from rpbi.ros.cameras.publisher import ScenePublisher
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.inputs import topic_input
-from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.state_topic import FastTopic
 from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 
 from .sample_topics import sample_topic
 from .status import ClockPublisher
-from .topic_publisher import SampleKey, TopicPublisher, TransformPublisher
+from .transforms import TransformPublisher
+
+SampleKey = tuple[type, str]
+"""Type and name of the samples of a sensor: sensors of a body may have its name."""
+
+
+class TopicPublisher:
+    """Samples of sensors, each on a topic of its own."""
+
+    def __init__(self) -> None:
+        self._routes: dict[SampleKey, tuple[FastTopic, Callable[[Any, int], Any]]] = {}
+        """The topic of each sensor, and what makes its messages."""
+        self._last: dict[SampleKey, tuple[Any, int]] = {}
+
+    def open(self, key: SampleKey, row: Topic) -> None:
+        """Advertises the topic of a sensor; any thread may call it."""
+        assert row.handler is not None  # rows of samples have one
+        topic = FastTopic(row.name.format(name=key[1]), row.message_type)
+        self._routes = {**self._routes, key: (topic, row.handler)}
+
+    def publish(self, sample: Any, stamp_ns: int) -> None:
+        """Sends a sample.
+
+        Raises:
+            PluginError: If another package makes no message of it that can be sent.
+        """
+        key = type(sample), sample.name
+        self._last[key] = sample, stamp_ns
+        route = self._routes.get(key)  # no such stream as long as the body is new
+        if route is not None and route[0].has_subscribers:
+            topic, to_message = route
+            try:
+                topic.publish(to_message(sample, stamp_ns))
+            except Exception as error:
+                raise_plugin_error(to_message, f"the message of '{sample.name}'", error)
+                raise
+
+    def serve_late(self) -> None:
+        """Sends the last samples to new subscribers."""
+        for key, (topic, to_message) in self._routes.items():
+            if key in self._last:
+                with plugin_errors(to_message, f"the message of '{key[1]}'"):
+                    topic.serve_late(partial(to_message, *self._last[key]))
+
+    def restart(self) -> None:
+        """Drops all stored samples; the topics stay open."""
+        self._last.clear()
+
+    def forget(self, key: SampleKey) -> FastTopic | None:
+        """Drops the stored samples of a sensor; returns its topic, which the caller closes."""
+        self._last.pop(key, None)
+        topic, _ = self._routes.get(key, (None, None))
+        self._routes = {other: route for other, route in self._routes.items() if other != key}
+        return topic
 
 
 class SamplePublishers:

@@ -1,33 +1,55 @@
 """The topic of each type of samples, and the samples as messages."""
 
+from collections.abc import Sequence
+from typing import Any
+
+import genpy
+from apriltag_ros.msg import AprilTagDetection, AprilTagDetectionArray
 from control_msgs.msg import JointTrajectoryControllerState
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
+from trajectory_msgs.msg import JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 from ros_pybullet_interface.msg import ControllerState as ControllerStateMessage
+from rpbi.control.controllers.manager import ControllerStateSample
+from rpbi.control.trajectories.trajectory import TrajectoryStateSample
 from rpbi.ros.endpoints import Topic, find_topic
-from rpbi.ros.headers import prefixed, stamped_header, to_ros_time, world_frame
-from rpbi.ros.messages.controllers import controller_state_message
-from rpbi.ros.messages.trajectories import CONTROLLER, state_message
+from rpbi.ros.headers import named_frame, prefixed, stamped_header, to_ros_time, world_frame
 from rpbi.samples import (
+    AprilTagsSample,
     BaseStateSample,
     ContactArrowsSample,
     ContactsSample,
     JointStateSample,
     LinkPoseSample,
     SurfaceSample,
+    ViconSample,
     WrenchSample,
 )
 from rpbi.sensors import SENSOR_TYPES, Sensor
 
 from .packed_messages import PackedJointState
 
+CONTROLLER = "joint_trajectory_controller"
+"""Namespace of a trajectory follower below `rpbi/NAME/`."""
 _ARROW = Vector3(0.015, 0.03, 0.04)
 """Diameters of shaft and head and length of the head [m]."""
 _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
@@ -101,6 +123,61 @@ def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
     return marker
 
 
+def controller_state_message(sample: ControllerStateSample, stamp_ns: int) -> ControllerStateMessage:
+    """Returns the state of a controller as message."""
+    message = ControllerStateMessage(
+        name=sample.name.split("/", 1)[1],
+        type=sample.type,
+        active=sample.active,
+        message=sample.message,
+        value_names=list(sample.values),
+        values=list(sample.values.values()),
+    )
+    message.header.stamp = to_ros_time(stamp_ns)
+    return message
+
+
+def state_message(state: TrajectoryStateSample, stamp_ns: int) -> JointTrajectoryControllerState:
+    """Returns the message of a follower's state."""
+    return fill_state(JointTrajectoryControllerState(), state, stamp_ns)
+
+
+def fill_state(message: Any, state: TrajectoryStateSample, stamp_ns: int) -> Any:
+    """Fills in a message with the fields of a follower's state, and returns it."""
+    desired = state.desired
+    since_start = genpy.Duration.from_sec(state.time_from_start_s)
+    message.header.stamp = to_ros_time(stamp_ns)
+    message.joint_names = state.joint_names
+    message.desired = JointTrajectoryPoint(desired.position, desired.velocity, desired.acceleration, (), since_start)
+    message.actual = JointTrajectoryPoint(state.position, state.velocity, (), (), since_start)
+    off = _difference(desired.position, state.position), _difference(desired.velocity, state.velocity)
+    message.error = JointTrajectoryPoint(*off, (), (), since_start)
+    return message
+
+
+def _vicon_message(sample: ViconSample, stamp_ns: int) -> TransformStamped:
+    header = Header(stamp=to_ros_time(stamp_ns - sample.age_ns), frame_id=world_frame())
+    transform = Transform(Vector3(*sample.pose.position), Quaternion(*sample.pose.quat_xyzw))
+    return TransformStamped(header, prefixed(sample.frame), transform)
+
+
+def _detections_message(sample: AprilTagsSample, stamp_ns: int) -> AprilTagDetectionArray:
+    header = Header(stamp=to_ros_time(stamp_ns - sample.age_ns), frame_id=named_frame(sample.frame))
+    message = AprilTagDetectionArray(header=header)
+    for tag in sample.tags:
+        pose = PoseWithCovariance(pose=Pose(Point(*tag.pose.position), Quaternion(*tag.pose.quat_xyzw)))
+        message.detections.append(AprilTagDetection([tag.id], [tag.size], PoseWithCovarianceStamped(header, pose)))
+    return message
+
+
+def _vicon_on_tf(sample: ViconSample, stamp_ns: int) -> tuple[LinkPoseSample, int]:
+    return LinkPoseSample(sample.name, (sample.frame,), (sample.pose,)), stamp_ns - sample.age_ns
+
+
+def _difference(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
 def _header(stamp_ns: int) -> Header:
     return stamped_header(stamp_ns, world_frame())
 
@@ -149,6 +226,19 @@ TRAJECTORY_STATE = Topic(
     JointTrajectoryControllerState,
     state_message,
     "Where joints are to be on the trajectory, and where they are; `state_publish_rate`.",
+)
+VICON = Topic(
+    "vicon/{name}",
+    TransformStamped,
+    _vicon_message,
+    "Pose of a link in the world [m] as vicon_bridge reports it, on TF too; `hz` of a sensor `vicon`.",
+    on_tf=_vicon_on_tf,
+)
+APRIL_TAGS = Topic(
+    "tag_detections",
+    AprilTagDetectionArray,
+    _detections_message,
+    "Tags that a camera sees, in its optical frame [m], as apriltag_ros reports them; `hz` of a sensor `april_tags`.",
 )
 
 

@@ -19,7 +19,7 @@ from rpbi.engine.pacer import Load, Pacer
 from rpbi.engine.priority import RealTimePriority
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.state_topic import FastTopic
 from rpbi.world import World
 
 log = logging.getLogger(__name__)

@@ -28,14 +28,16 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot import Robot
 from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
-from rpbi.ros.messages.trajectories import CONTROLLER
-from rpbi.ros.requests import Requests
-from rpbi.ros.robots.controllers import controllers, robots_with_controllers, set_gains, switch_controllers
-from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
-from rpbi.ros.robots.info import publish_description, robot_info
-from rpbi.ros.robots.motion import (
+from rpbi.ros.publishers.sample_topics import CONTROLLER
+from rpbi.ros.requests import BodyContext, Requests
+from rpbi.ros.simulation import Simulation
+from rpbi.sensors.filters import Zeroing
+
+from .robot_controllers import controllers, robots_with_controllers, set_gains, switch_controllers
+from .robot_ik import inverse_kinematics, move_by_ik, moved_by_ik
+from .robot_info import publish_description, robot_info
+from .robot_motion import (
     move_to_eff_state,
     move_to_init_joint_state,
     move_to_initial_joint_state,
@@ -46,10 +48,8 @@ from rpbi.ros.robots.motion import (
     set_target,
     stop_motion,
 )
-from rpbi.ros.robots.trajectory_action import open_trajectory_action
-from rpbi.ros.robots.trajectory_commands import follow_command, followers, query_state
-from rpbi.ros.simulation import Simulation
-from rpbi.sensors.filters import Zeroing
+from .trajectory_action import open_trajectory_action
+from .trajectory_commands import follow_command, followers, query_state
 
 SAMPLES = 100
 """Number of samples of a force-torque sensor that are averaged."""

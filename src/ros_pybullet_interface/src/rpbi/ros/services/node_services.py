@@ -55,6 +55,7 @@ from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import NS_PER_S
+from rpbi.ros.attachments import apply_wrench, attach, detach
 from rpbi.ros.endpoints import MAX_BYTES, Answer, Service
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.publishers.sample_topics import address
@@ -63,7 +64,6 @@ from rpbi.ros.simulation import Simulation
 from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.loading import load_object, type_of
 
-from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
 from .prediction import Predictor, cancel_prediction, planned_input, predict
 from .states import restore, save, save_keyframe

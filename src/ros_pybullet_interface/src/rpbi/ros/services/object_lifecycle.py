@@ -13,11 +13,11 @@ from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.plugins import plugin_errors
 from rpbi.ros.initial_state import with_initial_state
 from rpbi.ros.inputs import Inputs
-from rpbi.ros.messages.topics import FastTopic
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.requests import Requests
 from rpbi.ros.services.body_endpoints import BodyEndpoints
 from rpbi.ros.simulation import Simulation
+from rpbi.ros.state_topic import FastTopic
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.world.saved.state import MAX_TICKS, WorldState
 

@@ -3,8 +3,7 @@
 from robot_model.geometry import plus, scaled
 from rpbi.config.sensors import ContactsConfig
 from rpbi.samples import ContactArrowsSample
-from rpbi.sensors.sensed import SensedBody, SensedWorld
-from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.sensor import SensedBody, SensedWorld, Sensor
 
 from .contacts import ContactReader, ContactsSensor
 from .mean import MeanContactsSensor

@@ -10,8 +10,7 @@ from custom_ros_tools.errors import PhysicsError
 from robot_model.geometry import scaled
 from rpbi.engine.client import Client
 from rpbi.samples import ContactPoint, ContactsSample
-from rpbi.sensors.sensed import SensedBody, SensedWorld
-from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.sensor import SensedBody, SensedWorld, Sensor
 
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""

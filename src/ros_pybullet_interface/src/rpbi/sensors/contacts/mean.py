@@ -6,7 +6,7 @@ from math import hypot
 
 from robot_model.geometry import Vector, cross, minus, plus, scaled
 from rpbi.samples import ContactPoint, ContactsSample
-from rpbi.sensors.sensed import SensedBody
+from rpbi.sensors.sensor import SensedBody
 
 from .contacts import ContactsSensor
 

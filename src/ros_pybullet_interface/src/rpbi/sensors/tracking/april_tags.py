@@ -28,8 +28,7 @@ from rpbi.geometry import Pose, rotated
 from rpbi.samples import AprilTagsSample, SeenTag
 from rpbi.sensors.link_pose import index_of_link
 from rpbi.sensors.rgbd import RgbdSensor
-from rpbi.sensors.sensed import SensedWorld
-from rpbi.sensors.sensor import BodySensor
+from rpbi.sensors.sensor import BodySensor, SensedWorld
 
 from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
@@ -88,7 +87,7 @@ class AprilTagsSensor(BodySensor):
 
     Config = AprilTagsConfig
     sample_type = AprilTagsSample
-    ros_topic = "rpbi.ros.publishers.tracking:APRIL_TAGS"
+    ros_topic = "rpbi.ros.publishers.sample_topics:APRIL_TAGS"
 
     def __init__(self, body: Any, config: AprilTagsConfig) -> None:
         super().__init__(body, config)

@@ -10,8 +10,7 @@ from custom_ros_tools.schema import Text, optional
 from rpbi.geometry import Pose
 from rpbi.samples import ViconSample
 from rpbi.sensors.link_pose import index_of_link
-from rpbi.sensors.sensed import SensedWorld
-from rpbi.sensors.sensor import BodySensor
+from rpbi.sensors.sensor import BodySensor, SensedWorld
 
 from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
@@ -34,7 +33,7 @@ class ViconSensor(BodySensor):
 
     Config = ViconConfig
     sample_type = ViconSample
-    ros_topic = "rpbi.ros.publishers.tracking:VICON"
+    ros_topic = "rpbi.ros.publishers.sample_topics:VICON"
 
     def __init__(self, body: Any, config: ViconConfig) -> None:
         super().__init__(body, config)

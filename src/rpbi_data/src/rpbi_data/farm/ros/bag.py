@@ -19,8 +19,8 @@ from rpbi.ros.cameras.topics import camera_info, compressed_message
 from rpbi.ros.headers import named_frame, to_ros_time
 from rpbi.ros.inputs import input_messages
 from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION, commands_message
-from rpbi.ros.publishers.static_frames import TF_STATIC, static_frames_message
 from rpbi.ros.publishers.status import CLOCK, FREE_RUNNING_CLOCK_HZ, STATE, clock_message, state_message
+from rpbi.ros.publishers.transforms import TF_STATIC, static_frames_message
 from rpbi.world import World
 from rpbi_data.episodes.config import DEFAULT_TOPICS
 from rpbi_data.episodes.sample_messages import SampleMessages

@@ -12,7 +12,8 @@ WRITERS = (
     "rpbi_utils.schemas:schema_files",
     "safe_robot.schemas:schema_files",
     "rpbi.gym.schemas:schema_files",
-    "rpbi.ros.reference.write:reference_files",
+    "rpbi.reference.config_page:config_files",
+    "rpbi.ros.interface_page:interface_files",
     "custom_ros_tools.console.page:console_files",
     "rpbi_examples.plugins_page:plugin_files",
 )

@@ -22,19 +22,14 @@ from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
 from rpbi.control.trajectories.trajectory import TrajectoryStateSample
 from rpbi.engine.clock import Clock
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Service
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.messages.topics import FastTopic
-from rpbi.ros.messages.trajectories import (
-    CONTROLLER,
-    fill_state,
-    goal_tolerances,
-    trajectory_request,
-)
+from rpbi.ros.publishers.sample_topics import CONTROLLER, fill_state
+from rpbi.ros.requests import BodyContext
+from rpbi.ros.state_topic import FastTopic
 from rpbi.world.actions import RecordedTrajectory
 
-from .trajectory_commands import followers
+from .trajectory_commands import followers, goal_tolerances, trajectory_request
 
 log = logging.getLogger(__name__)
 

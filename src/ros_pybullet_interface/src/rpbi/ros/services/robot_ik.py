@@ -17,8 +17,8 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.kinematics import IKProblem, PybulletSolution
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.headers import to_ros_time
+from rpbi.ros.requests import BodyContext
 
 NEAR_M, NEAR_RAD = 0.01, 0.02
 """Tolerances of a moved link: joints within 0.01 rad of their goals may add up to this error."""

@@ -1,4 +1,4 @@
-"""Which topics and services a world has, without starting anything."""
+"""All topics, services and parameters of a world, listed without starting anything."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
@@ -7,27 +7,74 @@ from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.bodies import Body
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.topics import camera_topics
-from rpbi.ros.endpoints import Service, Topic
-from rpbi.ros.inputs import topic_input
-from rpbi.ros.node_topics import NODE_TOPICS
+from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION
 from rpbi.ros.publishers.sample_topics import sample_topic
-from rpbi.ros.publishers.static_frames import TF_STATIC
-from rpbi.ros.publishers.topic_publisher import TF
+from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATE, STATUS
+from rpbi.ros.publishers.transforms import TF, TF_STATIC
 from rpbi.ros.publishers.world_markers import MARKERS
-from rpbi.ros.robots.trajectory_action import ACTION
 from rpbi.ros.services.body_endpoints import BODY_SERVICES, BODY_TOPICS
 from rpbi.ros.services.node_services import NODE_SERVICES
-from rpbi.ros.window.debug_camera import GET, RESET
-from rpbi.ros.window.topics import published_topics
+from rpbi.ros.services.trajectory_action import ACTION
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.world import World
 
+from .attachments import ATTACHMENTS
+from .endpoints import Service, Topic
+from .inputs import topic_input
+from .window_topics import GET, RESET, published_topics
+
+NODE_TOPICS = (STATUS, STATE, ATTACHMENTS, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
+"""Topics that the node publishes."""
+ACTION_MEANING = "An action: the robot follows a trajectory and reports its errors."
 PUBLISHES = "publishes"
 SUBSCRIBES = "subscribes"
 SERVES = "serves"
 FOLLOWS = "listens to TF"
 OF_WINDOW = "PyBullet's window"
 """Note of what belongs to it."""
+
+
+class NodeParameter(NamedTuple):
+    """A parameter of the node.
+
+    Attributes:
+        name: Its name, with `NAME` for a robot.
+        is_set: Whether the node sets it, else it reads it.
+        meaning: Its purpose, in a sentence.
+    """
+
+    name: str
+    is_set: bool
+    meaning: str
+
+
+PARAMETERS = (
+    NodeParameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
+    NodeParameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
+    NodeParameter("~state_folder", False, "Folder of `rpbi/save` and `rpbi/restore`; the user's home by default."),
+    NodeParameter(
+        "~max_predicted_ticks", False, "Most ticks of all candidates of a `rpbi/predict`; 1,000,000 by default."
+    ),
+    NodeParameter(
+        "~real_time_priority",
+        False,
+        "Whether the node runs with real-time priority while it needs less than half a processor; true by default.",
+    ),
+    NodeParameter(
+        "~config",
+        False,
+        "The main YAML file as a mapping, or with `~config_file` the keys that differ; one of both is required.",
+    ),
+    NodeParameter(
+        "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."
+    ),
+    NodeParameter(
+        "robot_description",
+        False,
+        "URDF of robots whose `fileName` is `robot_description`; from here or a namespace above.",
+    ),
+    NodeParameter("rpbi/NAME/robot_description", True, "URDF of a robot, for RViz and robot_state_publisher."),
+)
 
 
 class Endpoint(NamedTuple):
@@ -46,9 +93,6 @@ class Endpoint(NamedTuple):
     type: str
     note: str = ""
     meaning: str = ""
-
-
-ACTION_MEANING = "An action: the robot follows a trajectory and reports its errors."
 
 
 def endpoints(world: World) -> list[Endpoint]:

@@ -8,8 +8,8 @@ from ros_pybullet_interface.srv import SwitchControllersRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot
 from rpbi.control.controllers.manager import ControllerSwitch, ControllerUpdate
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import MAX_BYTES, Answer
+from rpbi.ros.requests import BodyContext
 
 
 def robots_with_controllers(body: Body) -> list[str]:

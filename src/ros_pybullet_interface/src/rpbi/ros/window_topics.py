@@ -1,22 +1,35 @@
-"""Events and image of PyBullet's window as topics."""
+"""PyBullet's window in ROS: its keys, mouse, image and camera."""
 
+import logging
 import struct
 import time
-from typing import IO
+from collections.abc import Callable, Iterator
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
+import pybullet
 import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64MultiArray
 
+from custom_ros_tools.errors import ConfigError, InterfaceError
 from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import KeyboardEvent
 from ros_pybullet_interface.msg import MouseEvent as MouseMessage
+from ros_pybullet_interface.msg import ResetDebugVisualizerCamera as CameraMessage
+from ros_pybullet_interface.srv import GetDebugVisualizerCamera
+from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+from rpbi.config.world import WorldConfig
 from rpbi.engine.clock import Clock
-from rpbi.ros.endpoints import Topic
-from rpbi.ros.headers import to_ros_time
-from rpbi.window import DOWN, PRESSED, RELEASED, MouseEvent, Window, WindowKeyEvent
+from rpbi.window import DOWN, PRESSED, RECORD, RELEASED, MouseEvent, Window, WindowKeyEvent
+from rpbi.world import World
+
+from .endpoints import Service, Topic, serve, subscribe
+from .headers import to_ros_time
+from .requests import Requests
+
+log = logging.getLogger(__name__)
 
 KEYBOARD = Topic(
     "rpbi/keyboard", KeyboardEvent, meaning="Keys; with `enable_keyboard_publisher`.", key="enable_keyboard_publisher"
@@ -36,6 +49,10 @@ NUMBERS = Topic(
     meaning="The same as red, green, blue, alpha of each pixel, row by row.",
     key="publish_visualizer_image_hz",
 )
+CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Where the window looks from now; 30 Hz.")
+WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
+"""Topics that the window publishes."""
+CAMERA_HZ = 30.0
 LARGEST_SHARE = 0.25
 """Largest share of wall time for drawing; images come less often rather than exceed it."""
 HELD_HZ = 60.0
@@ -151,3 +168,113 @@ class _Numbers(Int64MultiArray):
         """Writes an empty layout, the count of the numbers and the numbers."""
         buff.write(struct.pack("<III", 0, 0, self._rgba.size))
         buff.write(self._rgba.astype("<i8").tobytes())
+
+
+class DebugCamera:
+    """Publishes the camera of the window while it has subscribers.
+
+    Args:
+        window: The window; without it, nothing is published, and nothing can be changed.
+        configured: The initial camera of a window.
+    """
+
+    def __init__(self, window: Window | None, configured: ResetDebugVisualizerCamera) -> None:
+        self._window, self._configured = window, configured
+        self._rate = WallRate(CAMERA_HZ)
+        self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
+
+    def poll(self) -> None:
+        """Publishes it if it is due."""
+        if self._window is None or self._publisher is None or not self._rate.is_due():
+            return
+        if self._publisher.get_num_connections():
+            self._publisher.publish(_camera_message(self._window.camera()))
+
+    def serve(self, ask: Requests) -> None:
+        """Opens the service that returns it and the topic that changes it."""
+        self._ask = ask
+        serve(GET, self)
+        subscribe(RESET, self)
+
+    def get(self, _: Any) -> CameraMessage:
+        """Returns the camera of the window; without a window, the configured one."""
+        window = self._window
+        return _camera_message(self._configured if window is None else self._ask(window.camera))
+
+    def reset(self, message: CameraMessage) -> None:
+        """Moves the camera of the window.
+
+        Raises:
+            InterfaceError: If there is no window.
+            ValueError: If the message is not sound.
+        """
+        given = {key: getattr(message, key) for key in ResetDebugVisualizerCamera.model_fields}
+        try:
+            camera = ResetDebugVisualizerCamera.parse(given, RESET.name)
+        except ConfigError as error:
+            raise ValueError("; ".join(f"{one.key}: {one.message}" for one in error.problems)) from None
+        window = self._window
+        if window is None:
+            raise InterfaceError("there is no window (connection_mode: DIRECT)")
+        self._ask(lambda: window.look(camera))
+
+
+def _camera_message(camera: ResetDebugVisualizerCamera) -> CameraMessage:
+    return CameraMessage(**camera.model_dump())
+
+
+GET = Service("rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera, DebugCamera.get)
+RESET = Topic(
+    "rpbi/reset_debug_visualizer_camera",
+    CameraMessage,
+    DebugCamera.reset,
+    "Where the window is to look from.",
+)
+
+
+class WindowTopics:
+    """Opens the configured topics of the window, and warns if there is no window."""
+
+    def __init__(self, world: World) -> None:
+        self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)
+        self.polls: tuple[Callable[[], None], ...] = ()
+        """To be called at every pass of the loop."""
+        if world.window is None:
+            _warn_of_idle_keys(world.config)
+        else:
+            self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
+
+    def serve(self, ask: Requests) -> None:
+        """Opens the services that the simulation thread answers."""
+        self._camera.serve(ask)
+
+
+def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callable[[], None]]:
+    keyboard, mouse = config.enable_keyboard_publisher, config.enable_mouse_publisher
+    if keyboard and not _asks_for_shortcuts(config):
+        window.leave_keys_to_others()
+    if keyboard or mouse:
+        yield GuiEvents(window, clock, keyboard, mouse).poll
+    if config.publish_visualizer_image_hz:
+        size = config.visualizer_image_width, config.visualizer_image_height
+        yield VisualizerImage(window, clock, config.publish_visualizer_image_hz, *size).poll
+
+
+def published_topics(config: WorldConfig) -> list[Topic]:
+    """Returns the topics of the window that a world with this configuration publishes."""
+    if config.connect.connection_mode == pybullet.DIRECT:
+        return []
+    return [topic for topic in WINDOW_TOPICS if not topic.key or getattr(config, topic.key)]
+
+
+def _warn_of_idle_keys(config: WorldConfig) -> None:
+    keys = [key for key in dict.fromkeys(topic.key for topic in WINDOW_TOPICS) if key and getattr(config, key)]
+    if RECORD in (config.connect.options or ""):
+        keys.append(f"connect.options {RECORD}")
+    if keys:
+        log.warning("%s: no effect without a window (connection_mode: DIRECT)", ", ".join(keys))
+
+
+def _asks_for_shortcuts(config: WorldConfig) -> bool:
+    configured = config.configureDebugVisualizer
+    return configured.enable and pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS in configured.flag

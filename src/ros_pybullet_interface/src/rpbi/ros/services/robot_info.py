@@ -14,8 +14,8 @@ from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.publishers.sample_topics import joint_state_message
+from rpbi.ros.requests import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.urdf.copies import description_for_ros
 from rpbi.urdf.joints import Joint

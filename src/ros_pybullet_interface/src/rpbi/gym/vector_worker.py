@@ -1,4 +1,4 @@
-"""Entry point of a process with environments: `python -m rpbi.gym.vector.worker FD`."""
+"""Entry point of a process with environments: `python -m rpbi.gym.vector_worker FD`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 
 from custom_ros_tools.errors import InterfaceError
 
-from .arrays import SharedArrays
+from .shared_arrays import SharedArrays
 
 Info = dict[str, Any]
 

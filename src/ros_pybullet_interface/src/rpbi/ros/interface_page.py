@@ -1,15 +1,25 @@
 """The page of all topics, services, frames and parameters of the simulator."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
-from rpbi.ros.headers import FRAMES
-from rpbi.ros.node_topics import PARAMETERS
+from rpbi.ros.reference.reference_world import CONTROLLERS, JOINT, reference_world
 from rpbi.world import World
 
-from .interface_table import OF_WINDOW, PUBLISHES, SERVES, SUBSCRIBES, Endpoint, endpoints, of_body, of_camera
-from .reference_world import CONTROLLERS, JOINT
+from .headers import FRAMES
+from .interface_table import (
+    OF_WINDOW,
+    PARAMETERS,
+    PUBLISHES,
+    SERVES,
+    SUBSCRIBES,
+    Endpoint,
+    endpoints,
+    of_body,
+    of_camera,
+)
 
 INTRODUCTION = """\
 Topics, services and parameters of the node `ros_pybullet_interface_node.py`. `./rpbi check WORLD.yaml` lists the same
@@ -41,6 +51,17 @@ The nodes of custom_ros_tools, which remap joint states and publish transforms a
 [force_torque.md](force_torque.md#a-zero-and-the-weight-of-a-payload), [tracking.md](tracking.md) and
 [real_robots.md](real_robots.md#the-stand-in)."""
 HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
+PACKAGES = ("ros_pybullet_interface", "compatibility/cob_srvs", "compatibility/custom_srvs")
+"""Folders with the messages and services that the node has."""
+
+
+def interface_files(root: Path) -> dict[Path, str]:
+    """Returns the text of the page of a workspace, by its path."""
+    world = reference_world()
+    try:
+        return {root / "docs/topics_and_services.md": interface_page(world, _definitions(root))}
+    finally:
+        world.close()
 
 
 def interface_page(world: World, definitions: Mapping[str, str]) -> str:
@@ -108,3 +129,8 @@ def _names(kinds: list[str]) -> str:
 def _parameters() -> str:
     rows = ((code(each.name), "set" if each.is_set else "read", each.meaning) for each in PARAMETERS)
     return table(("name", "", "meaning"), rows)
+
+
+def _definitions(root: Path) -> dict[str, str]:
+    files = [path for package in PACKAGES for path in sorted((root / "src" / package).glob("[ms][sr][gv]/*"))]
+    return {f"{path.parent.parent.name}/{path.stem}": path.read_text() for path in files}

@@ -1,75 +1,21 @@
-"""Publishers of samples: a topic for each sensor, and TF for poses of links."""
+"""Transforms on TF: poses of links, and frames of the main file."""
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any
+from collections.abc import Sequence
 
-from geometry_msgs.msg import TransformStamped
+import rospy
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
-from rpbi.plugins import plugin_errors, raise_plugin_error
+from rpbi.config.world import StaticFrame
 from rpbi.ros.endpoints import Topic
-from rpbi.ros.headers import prefixed, to_ros_time, world_frame
-from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.headers import named_frame, prefixed, to_ros_time, world_frame
+from rpbi.ros.state_topic import FastTopic
 from rpbi.samples import LinkPoseSample
 
 from .packed_messages import PackedTransforms
 
 TF = Topic("/tf", TFMessage, meaning="Where it is, see [frames](#frames).")
-
-
-SampleKey = tuple[type, str]
-"""Type and name of the samples of a sensor: sensors of a body may have its name."""
-
-
-class TopicPublisher:
-    """Samples of sensors, each on a topic of its own."""
-
-    def __init__(self) -> None:
-        self._routes: dict[SampleKey, tuple[FastTopic, Callable[[Any, int], Any]]] = {}
-        """The topic of each sensor, and what makes its messages."""
-        self._last: dict[SampleKey, tuple[Any, int]] = {}
-
-    def open(self, key: SampleKey, row: Topic) -> None:
-        """Advertises the topic of a sensor; any thread may call it."""
-        assert row.handler is not None  # rows of samples have one
-        topic = FastTopic(row.name.format(name=key[1]), row.message_type)
-        self._routes = {**self._routes, key: (topic, row.handler)}
-
-    def publish(self, sample: Any, stamp_ns: int) -> None:
-        """Sends a sample.
-
-        Raises:
-            PluginError: If another package makes no message of it that can be sent.
-        """
-        key = type(sample), sample.name
-        self._last[key] = sample, stamp_ns
-        route = self._routes.get(key)  # no such stream as long as the body is new
-        if route is not None and route[0].has_subscribers:
-            topic, to_message = route
-            try:
-                topic.publish(to_message(sample, stamp_ns))
-            except Exception as error:
-                raise_plugin_error(to_message, f"the message of '{sample.name}'", error)
-                raise
-
-    def serve_late(self) -> None:
-        """Sends the last samples to new subscribers."""
-        for key, (topic, to_message) in self._routes.items():
-            if key in self._last:
-                with plugin_errors(to_message, f"the message of '{key[1]}'"):
-                    topic.serve_late(partial(to_message, *self._last[key]))
-
-    def restart(self) -> None:
-        """Drops all stored samples; the topics stay open."""
-        self._last.clear()
-
-    def forget(self, key: SampleKey) -> FastTopic | None:
-        """Drops the stored samples of a sensor; returns its topic, which the caller closes."""
-        self._last.pop(key, None)
-        topic, _ = self._routes.get(key, (None, None))
-        self._routes = {other: route for other, route in self._routes.items() if other != key}
-        return topic
+TF_STATIC = Topic("/tf_static", TFMessage, meaning="Where the frames under `poses` are; latched.")
 
 
 class TransformCollector:
@@ -132,7 +78,29 @@ class TransformPublisher(TransformCollector):
         self._topic.serve_late(self.last)
 
 
+class StaticFrames:
+    """Puts frames on TF once and for all; without any there is no topic."""
+
+    def __init__(self, poses: Sequence[StaticFrame]) -> None:
+        if poses:
+            self._publisher = rospy.Publisher(TF_STATIC.name, TF_STATIC.message_type, queue_size=1, latch=True)
+            self._publisher.publish(static_frames_message(poses))
+
+
+def static_frames_message(poses: Sequence[StaticFrame]) -> TFMessage:
+    """Returns frames with their poses as transforms."""
+    return TFMessage([_static_transform(each) for each in poses])
+
+
 def _transform(frame: str) -> TransformStamped:
     message = TransformStamped(child_frame_id=prefixed(frame))
     message.header.frame_id = world_frame()
+    return message
+
+
+def _static_transform(frame: StaticFrame) -> TransformStamped:
+    position, quat = frame.pose
+    message = TransformStamped(child_frame_id=named_frame(frame.tf_id))
+    message.header.frame_id = named_frame(frame.parent)
+    message.transform = Transform(Vector3(*position), Quaternion(*quat))
     return message

@@ -1,4 +1,4 @@
-"""The plain topic and service of a follower of trajectories."""
+"""The topic and service of a follower of trajectories, and requests read from messages."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,16 +7,34 @@ from trajectory_msgs.msg import JointTrajectory
 
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot
+from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, TrajectoryPoint, TrajectoryRequest
 from rpbi.control.trajectories.trajectory import DesiredState
 from rpbi.engine.clock import NS_PER_S
-from rpbi.ros.body_context import BodyContext
-from rpbi.ros.messages.trajectories import trajectory_request
+from rpbi.ros.requests import BodyContext
 from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
     """Returns the owner of what every robot with a follower of trajectories has."""
     return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
+
+
+def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
+    """Returns the request of a message; efforts beside positions are ignored."""
+    points = tuple(
+        TrajectoryPoint(
+            point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
+        )
+        for point in message.points
+    )
+    return TrajectoryRequest(tuple(message.joint_names), points, message.header.stamp.to_nsec())
+
+
+def goal_tolerances(goal: Any) -> GoalTolerances:
+    """Returns the tolerances of a control_msgs/FollowJointTrajectoryGoal; accelerations are not looked at."""
+    return GoalTolerances(
+        _tolerances(goal.path_tolerance), _tolerances(goal.goal_tolerance), goal.goal_time_tolerance.to_sec()
+    )
 
 
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
@@ -42,3 +60,7 @@ def query_state(context: BodyContext, request: Any) -> Any:
 
     state = context.ask_body(desired)
     return follower.joint_names, *state
+
+
+def _tolerances(messages: Sequence[Any]) -> dict[str, JointTolerance]:
+    return {message.name: JointTolerance(message.position, message.velocity) for message in messages}

@@ -16,11 +16,11 @@ from rpbi.config.pybullet_args import CONTROL_MODES
 from rpbi.control.joint_command import JointCommand
 from rpbi.control.motion import Motion, MotionResult
 from rpbi.control.motors import MODE_NAMES, MotorGains
-from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Answer
+from rpbi.ros.requests import BodyContext
 from rpbi.world.actions import TimedGoal
 
-from .ik import arrival, solve_for_robot
+from .robot_ik import arrival, solve_for_robot
 
 
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:

@@ -21,10 +21,10 @@ from gymnasium.vector.utils import batch_space, iterate
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.processes.child import start_child
-from rpbi.gym.checks import check_action
-from rpbi.gym.env import WorldEnv, require_arguments
 
-from .arrays import SharedArrays
+from .checks import check_action
+from .env import WorldEnv, require_arguments
+from .shared_arrays import SharedArrays
 
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Variables of workers, so that their libraries start no threads, which would contend for the processors."""
@@ -209,7 +209,7 @@ class _Process:
         ours, theirs = Pipe()
         with theirs:
             self._process = start_child(
-                [sys.executable, "-P", "-m", "rpbi.gym.vector.worker", str(theirs.fileno())],
+                [sys.executable, "-P", "-m", "rpbi.gym.vector_worker", str(theirs.fileno())],
                 signal.SIGKILL,
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},

@@ -1,1 +1,0 @@
-"""Many environments at once, in processes of their own."""

@@ -1,1 +1,0 @@
-"""Shapes as the renderer draws them."""

@@ -1,1 +1,0 @@
-"""Messages of topics, made from samples and read."""

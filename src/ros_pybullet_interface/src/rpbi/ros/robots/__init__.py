@@ -1,1 +1,0 @@
-"""Topics, services and actions of robots beside their samples."""

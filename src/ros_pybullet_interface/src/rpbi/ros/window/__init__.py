@@ -1,1 +1,0 @@
-"""PyBullet's window in ROS."""
