@@ -64,7 +64,7 @@ class Balance(Controller):
     """
 
     Config = BalanceConfig
-    inputs = {"target": "rpbi.ros.publishers.sample_topics:POSE_TARGET"}
+    inputs = {"target": "rpbi.ros.inputs:POSE_TARGET"}
 
     def __init__(self, arm: ControlledRobot, config: Any) -> None:
         super().__init__(arm, config)

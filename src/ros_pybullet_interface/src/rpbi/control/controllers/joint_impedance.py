@@ -32,7 +32,7 @@ class JointImpedanceController(Controller):
     """
 
     Config = JointImpedanceConfig
-    inputs = {"target": "rpbi.ros.publishers.sample_topics:JOINT_TARGET"}
+    inputs = {"target": "rpbi.ros.inputs:JOINT_TARGET"}
 
     def __init__(self, arm: ControlledRobot, config: JointImpedanceConfig) -> None:
         super().__init__(arm, config)
