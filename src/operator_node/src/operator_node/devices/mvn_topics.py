@@ -28,7 +28,7 @@ from operator_node.mvn.checks import Finding
 from operator_node.mvn.frame_messages import FramePacker, PersonMarkers
 from operator_node.mvn.receiver import Silence
 from operator_node.mvn.segments import CenterOfMass, JointAngles, Message, PersonInfo, SegmentFrame
-from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.state_topic import FastTopic
 
 from .device_topics import DeviceTopics
 from .mvn import Mvn
