@@ -64,7 +64,7 @@ def _imports(path: Path) -> set[str]:
     return set(imported_names(path, module))
 
 
-BY_FEATURE = {"operator_node", "rpbi_data", "rpbi_utils"}
+BY_FEATURE = {"operator_node", "robot_model", "rpbi_data", "rpbi_utils", "safe_robot"}
 """Packages whose folders are features, each with its modules that need ROS, see test_layout.py."""
 COMPATIBILITY = SRC / "compatibility"
 
@@ -126,7 +126,7 @@ ROBOTS_IN_THE_SIMULATOR = ("rpbi.geometry", "rpbi.urdf", "rpbi.kinematics")
 """Robots and their geometry as PyBullet has them; everything else uses `robot_model`."""
 ADAPTERS = {
     "ik_ros.solvers.pybullet_solver": "solves by the simulator's inverse kinematics",
-    "safe_robot.geometry.bullet": "measures distances by PyBullet",
+    "safe_robot.bullet": "measures distances by PyBullet",
 }
 """Modules outside of the simulator that use its robots, and what for."""
 

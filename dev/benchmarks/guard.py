@@ -17,10 +17,10 @@ import numpy as np
 from result import Result, Target
 from session import Session
 
+from robot_model.model import RobotModel
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
 
 LWR = Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 PERIOD_S = 0.002
@@ -108,7 +108,7 @@ def _through_ros(seconds: float) -> list[Result]:
 
 def _durations_ms(policy: str, count: int, amplitude: float, checks: dict[str, Any]) -> list[float]:
     options = {"policy": policy, "period_s": PERIOD_S, "start_from": "target", "limits": LIMITS, "checks": checks}
-    guard = Guard(GuardConfig.parse(options, "benchmark"), GuardedRobot(str(LWR)), "benchmark")
+    guard = Guard(GuardConfig.parse(options, "benchmark"), RobotModel(str(LWR)), "benchmark")
     guard.start()
     durations = []
     for k in range(count):

@@ -15,10 +15,10 @@ from result import Result, Target
 from session import Session
 from virtual_screen import virtual_screen
 
+from robot_model.model import RobotModel
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
 
 LWR = Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 DEVICES = ("spacenav", "keyboard", "mouse")
@@ -93,7 +93,7 @@ def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[di
 def stops_at(targets: np.ndarray, **options: Any) -> int:
     """Returns how many of the targets a guard halts at, which is started again each time."""
     config = GuardConfig.parse({**REFUSING, **options}, "benchmark")
-    guard = Guard(config, GuardedRobot(str(LWR)), "benchmark")
+    guard = Guard(config, RobotModel(str(LWR)), "benchmark")
     stops = 0
     for target in targets.tolist():
         if guard.is_halted:

@@ -17,16 +17,16 @@ from custom_ros_tools.errors import InterfaceError
 from ik_ros.formulation.robot import PinocchioRobot
 from operator_node.avatar.human_urdf import urdf_offsets
 from robot_model.chain import Chain
+from robot_model.model import RobotModel
 from robot_model.urdf.document import UrdfDocument, mimics_of
 from robot_model.urdf.files import write_description
+from robot_model.urdf.for_ros import description_for_ros
 from rpbi.engine.client import Client
 from rpbi.kinematics import Kinematics
 from rpbi.render.mirror import Mirror
-from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 from rpbi.world.loading import load_world
 from rpbi.world.saved.description import WorldDescription
-from safe_robot.robot import GuardedRobot
 
 from .meshes import write_mesh
 from .urdfs import FIFO, write_urdf
@@ -127,7 +127,7 @@ def _urdf_readers(path: Path, folder: Path) -> Readers:
     file = str(path)
     return {
         "kinematics": lambda: _solve(file),
-        "guard": lambda: GuardedRobot(file),
+        "guard": lambda: RobotModel(file),
         "ik": lambda: _ik(file),
         "ros": lambda: description_for_ros(file),
         "mimics": lambda: mimics_of(file),

@@ -13,14 +13,14 @@ import numpy as np
 import pybullet
 import yaml
 
+from robot_model.collision.distances import Pair
+from robot_model.model import RobotModel
 from rpbi.world import World
 from safe_robot.check import CheckContext
 from safe_robot.checks.environment import Environment
 from safe_robot.checks.self_collision import SelfCollision
 from safe_robot.config import GuardConfig
-from safe_robot.geometry.distances import Pair
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
 
 LWR = str(Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_lwr.urdf")
 PERIOD_S, DURATION_S, SHOWN_S = 0.01, 4.0, 5.0
@@ -52,7 +52,7 @@ def write_world(folder: Path) -> str:
     return str(folder / "world.yaml")
 
 
-def new_guard(robot: GuardedRobot, world: str) -> Guard:
+def new_guard(robot: RobotModel, world: str) -> Guard:
     """Returns a guard that knows the table."""
     options = {
         "period_s": PERIOD_S,
@@ -122,7 +122,7 @@ def main() -> None:
     figure, axes = plt.subplots(2, 3, figsize=(13.0, 7.0), layout="constrained")
     with tempfile.TemporaryDirectory() as folder:
         path = write_world(Path(folder))
-        robot = GuardedRobot(LWR)
+        robot = RobotModel(LWR)
         judge = new_guard(robot, path)
         for row, (title, goal, kind) in enumerate(
             (("at the table", AT_TABLE, Environment), ("into itself", folded(judge), SelfCollision))

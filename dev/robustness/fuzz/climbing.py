@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from safe_robot.geometry.distances import Geometry, LinkDistances
+from robot_model.collision.distances import Geometry
+from safe_robot.checks.proximity_check import link_distances
 from safe_robot.guard import Guard
 
 from .scenes import MARGIN_M, Scene
@@ -57,7 +58,7 @@ class Climber:
         self, scene: Scene, guard: Guard, generator: np.random.Generator, geometry: Geometry = "hulls"
     ) -> None:
         self._scene, self._guard, self._generator = scene, guard, generator
-        self._distances = LinkDistances(guard.robot, geometry)
+        self._distances = link_distances(guard.robot, geometry)
         boxes = scene.around.obstacles or ()
         self._distances.place_obstacles(boxes)
         links = [link for link in self._distances.links if self._distances.reach((link, 0)).any()]

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet_data
 
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Vector
+from robot_model.model import RobotModel
 from rpbi.geometry import Pose
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
-from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
 
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 PERIOD_S = 0.01
@@ -71,7 +71,7 @@ class Scene(NamedTuple):
             "checks": {"environment": shapes, "self_collision": shapes},
             "shape": {"time_s": 0.03} if shape else None,
         }
-        guard = Guard(GuardConfig.parse(options, "fuzz"), GuardedRobot(str(self.urdf)), "fuzz")
+        guard = Guard(GuardConfig.parse(options, "fuzz"), RobotModel(str(self.urdf)), "fuzz")
         guard.start()
         return guard
 

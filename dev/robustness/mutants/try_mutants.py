@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""Whether tests of the guard fail when it is wrong: changes a copy of its code, line by line, and runs a test on each.
+"""Checks that tests of the guard fail when it is wrong: changes a copy of its code, and runs a test on each change.
 
     ./rpbi shell -c 'python3 dev/robustness/mutants/try_mutants.py'
 
-The changes are in guard.yaml beside this file: `file` of the package, the text `before`, which is there once, what is
-there `after`, and the `test` that is to fail. It ends with 1 if a test does not fail, or fails without a change.
+The changes are in guard.yaml in this folder. Each has the `file`, from its package on, the text `before`, which is there
+once, the text `after`, and the `test` that has to fail. The exit status is 1 if a test does not fail, or fails without a
+change.
 """
 
 import argparse
@@ -19,13 +20,13 @@ from typing import Any
 import yaml
 
 ROOT = Path(__file__).resolve().parents[3]
-PACKAGE = ROOT / "src/safe_robot/src/safe_robot"
+PACKAGES = (ROOT / "src/safe_robot/src/safe_robot", ROOT / "src/robot_model/src/robot_model")
 MESSAGES = ROOT / "devel/lib/python3/dist-packages/safe_robot"
 TESTS = ("tests/unit/safe_robot", "tests/ros/safe_robot/test_guard_faults.py")
 
 
 def passes(folder: Path, tests: str) -> bool:
-    """Returns whether tests pass, such as `one or another`, with the package that is in a folder.
+    """Returns whether tests pass, such as `one or another`, with the packages in a folder.
 
     Raises:
         RuntimeError: If there are no such tests, or they cannot be run.
@@ -44,9 +45,9 @@ def is_caught(folder: Path, mutant: dict[str, Any]) -> bool:
     """Returns whether the test of a change fails with it.
 
     Raises:
-        ValueError: If what is to be changed is not there, or more than once.
+        ValueError: If the text to be changed is missing, or there more than once.
     """
-    file = folder / "safe_robot" / mutant["file"]
+    file = folder / mutant["file"]
     text = file.read_text()
     if (count := text.count(mutant["before"])) != 1:
         raise ValueError(f"{mutant['file']}: expected once, got {count} times: {mutant['before']}")
@@ -66,7 +67,8 @@ def main() -> int:
     survivors = 0
     with tempfile.TemporaryDirectory(prefix="rpbi-mutants-") as name:
         folder = Path(name)
-        shutil.copytree(PACKAGE, folder / "safe_robot", ignore=shutil.ignore_patterns("__pycache__"))
+        for package in PACKAGES:
+            shutil.copytree(package, folder / package.name, ignore=shutil.ignore_patterns("__pycache__"))
         for generated in ("msg", "srv"):
             if (MESSAGES / generated).exists():
                 (folder / "safe_robot" / generated).symlink_to(MESSAGES / generated)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from safe_robot.ros.target_queue import TargetQueue
+from safe_robot.target_queue import TargetQueue
 
 PROGRAM = Path(__file__).resolve().parents[3] / "dev/benchmarks/programs/guard_faults.py"
 SOON_S = 0.15

@@ -18,7 +18,7 @@ from robot_model.geometry import Pose
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
 from rpbi.ros.publishers.world_markers import deletion, shape_marker
 from safe_robot.check import CheckContext
-from safe_robot.ros.live_obstacles import LiveObstacles
+from safe_robot.ros.measurements import LiveObstacles
 
 BASE = "rpbi/arm/base"
 UPRIGHT = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.config import load_config
+from robot_model.model import RobotModel
 from robot_model.urdf.files import write_description
 from rpbi.samples import JointStateSample
 from rpbi.world import World
 from rpbi.world.loading import robots_description
 from rpbi_examples.two_hands import APPROACH_S, MirroredHands
 from safe_robot.check import CheckContext
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.robot import GuardedRobot
+from safe_robot.checks.proximity_check import link_distances
 from safe_robot.ros.parameters import guard_of
 
 FOLDER = "{rpbi_examples}/configs/basic_example_dual_iiwa"
@@ -27,16 +27,16 @@ CROSSING_M = 0.3
 
 
 @pytest.fixture(scope="module")
-def robot() -> GuardedRobot:
-    return GuardedRobot(write_description(robots_description(FILE, ARMS).replace("file://", "")))
+def robot() -> RobotModel:
+    return RobotModel(write_description(robots_description(FILE, ARMS).replace("file://", "")))
 
 
-def least_distance(robot: GuardedRobot, is_guarded: bool) -> tuple[float, int]:
+def least_distance(robot: RobotModel, is_guarded: bool) -> tuple[float, int]:
     """Sends targets that cross the arms; returns the least measured distance [m], and how many were not safe."""
     world = World.from_file(FILE)
     guard, _ = guard_of({**load_config(f"{FOLDER}/guard.yaml"), "period_s": 0.9 * PERIOD_S}, robot.urdf_path, "guard")
     guard.start()
-    distances = LinkDistances(robot)
+    distances = link_distances(robot)
     pairs = [(a, b) for a in distances.links for b in distances.links if a < b and a[:4] != b[:4]]
     measured: dict[str, float] = {}
     least, unsafe = math.inf, 0

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from robot_model.model import RobotModel
 from safe_robot.check import Check, CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Decision, Guard
-from safe_robot.robot import GuardedRobot
 
 KUKA = str(Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf")
 HOME = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)
@@ -51,21 +51,21 @@ class BrokenCheck(Check):
         raise ZeroDivisionError
 
 
-def folding(folder: Path) -> GuardedRobot:
+def folding(folder: Path) -> RobotModel:
     """Returns the robot that can fold itself into itself."""
     path = folder / "folding.urdf"
     path.write_text(FOLDING)
-    return GuardedRobot(str(path))
+    return RobotModel(str(path))
 
 
-def slider(folder: Path) -> GuardedRobot:
+def slider(folder: Path) -> RobotModel:
     """Returns the robot without shapes."""
     path = folder / "slider.urdf"
     path.write_text(SLIDER)
-    return GuardedRobot(str(path))
+    return RobotModel(str(path))
 
 
-def guard_of(robot: GuardedRobot, start: bool = True, **config: Any) -> Guard:
+def guard_of(robot: RobotModel, start: bool = True, **config: Any) -> Guard:
     """Returns a guard that takes targets from where the first one is."""
     options = {"period_s": PERIOD_S, "start_from": "target", "limits": LIMITS, **config}
     guard = Guard(GuardConfig.parse(options, "guard.yaml"), robot, "guard.yaml")

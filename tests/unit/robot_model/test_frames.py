@@ -11,7 +11,7 @@ from custom_ros_tools.errors import ConfigError, UnknownNameError
 from robot_model.conformance import MIMIC, SKEW
 from robot_model.frames import MAX_MATRIX_PRODUCTS
 from robot_model.geometry import ZERO
-from robot_model.joints import AffineMap, followed
+from robot_model.joint_map import AffineMap, followed
 from robot_model.model import RobotModel
 from robot_model.urdf.elements import Mimic
 

@@ -13,7 +13,8 @@ from robot_model.model import RobotModel
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import text_of
 from robot_model.urdf.files import write_description
-from rpbi.urdf.copies import description_for_ros, files_of, for_pybullet, joined_for_ros
+from robot_model.urdf.for_pybullet import files_of, for_pybullet
+from robot_model.urdf.for_ros import description_for_ros, joined_for_ros
 
 
 def urdf(folder: Path, inner: str) -> str:

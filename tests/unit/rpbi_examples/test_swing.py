@@ -12,9 +12,8 @@ import yaml
 from robot_model.asset_files import find_file
 from robot_model.model import RobotModel
 from rpbi_examples.motions import SWING_PERIOD_S, TO_MIDDLE_S, Swing
+from safe_robot.checks.proximity_check import link_distances
 from safe_robot.checks.self_collision import pairs_that_may_meet
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.robot import GuardedRobot
 
 EXAMPLES = Path(__file__).parents[3] / "src/rpbi_examples"
 ARM = [f"panda_joint{i}" for i in range(1, 8)]
@@ -76,12 +75,12 @@ def test_panda_swings_without_self_collision():
     launch = ElementTree.parse(EXAMPLES / "launch/basic_example_panda.launch")
     node = next(each for each in launch.iter("node") if each.get("name") == "basic_robot_example")
     parameters = {each.get("name"): each.get("value") for each in node.iter("param")}
-    robot = GuardedRobot(f"{pybullet_data.getDataPath()}/{config['loadURDF']['fileName']}", ARM)
+    robot = RobotModel(f"{pybullet_data.getDataPath()}/{config['loadURDF']['fileName']}", ARM)
     home = np.radians([config["initial_joint_position"].get(name, 0.0) for name in ARM])
     lower, upper = ([getattr(joint, side) for joint in robot.joints] for side in ("lower", "upper"))
     middle = home if parameters["about_start"] == "true" else None
     swing = Swing(home, lower, upper, middle, float(parameters["amplitude"]))
-    distances = LinkDistances(robot)
+    distances = link_distances(robot)
     pairs = pairs_that_may_meet(robot, distances, MARGIN_M)
     assert len(pairs) > 20
     for time_s in np.arange(0.0, TO_MIDDLE_S + len(ARM) * SWING_PERIOD_S, 0.2):

@@ -7,17 +7,16 @@ import pytest
 from guarded_arm import HOME, KUKA, LIMITS, folding, slider
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 from rpbi.kinematics import Kinematics
 from safe_robot.braking import Brake
 from safe_robot.check import CheckContext
-from safe_robot.checks import CHECKS
+from safe_robot.checks import CHECKS, make_checks
 from safe_robot.conformance import CheckConformance
-from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.limits import LimitsConfig, MotionLimits
-from safe_robot.lookup import make_checks
 from safe_robot.motion import CommandedMotion, State
-from safe_robot.robot import GuardedRobot
 
 FOLDED = (1.8, 1.72, 0.97, -2.05, -0.24, 2.09, 0.1)
 """The ball of the arm's tool is in its shoulder."""
@@ -110,7 +109,7 @@ class TestTracking(Arm):
 
     def measured(self, error: float):
         motion, _ = self.by(0.0)
-        names = GuardedRobot(KUKA).joint_names
+        names = RobotModel(KUKA).joint_names
         return motion, CheckContext(measured={name: q + error for name, q in zip(names, HOME)})
 
     def safe(self):
@@ -139,14 +138,14 @@ def test_every_check_is_held_to_the_conformance_suite():
     assert held == set(CHECKS)
 
 
-def check_of(name: str, guarded: GuardedRobot, limits: dict | None = None, /, **options):
+def check_of(name: str, guarded: RobotModel, limits: dict | None = None, /, **options):
     joint_limits = MotionLimits.of(guarded, LimitsConfig(**(limits or {})), "guard.yaml")
     return next(c for c in make_checks({name: options}, guarded, joint_limits, "guard.yaml") if c.name == name)
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf"])
 def test_non_finite_measured_force_is_too_large(bad):
-    check = check_of("force", GuardedRobot(KUKA))
+    check = check_of("force", RobotModel(KUKA))
     motion = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     assert check.check(motion, CheckContext(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
 
@@ -165,7 +164,7 @@ def test_tracking_accepts_the_expected_lag_and_rejects_a_stalled_robot(tmp_path)
 @pytest.mark.quick
 @pytest.mark.parametrize("name", ["force", "tracking"])
 def test_without_a_measurement_nothing_is_safe(name):
-    check = check_of(name, GuardedRobot(KUKA))
+    check = check_of(name, RobotModel(KUKA))
     motion = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     violation = check.check(motion, CheckContext())
     assert violation is not None and "age" in violation.subject
@@ -173,7 +172,7 @@ def test_without_a_measurement_nothing_is_safe(name):
 
 def test_origins_of_links_are_those_of_pybullet(tmp_path):
     generator = np.random.default_rng(3)
-    for robot, link in ((GuardedRobot(KUKA), "lwr_arm_7_link"), (slider(tmp_path), "hand")):
+    for robot, link in ((RobotModel(KUKA), "lwr_arm_7_link"), (slider(tmp_path), "hand")):
         q = generator.uniform(-1.0, 1.0, (20, len(robot.joint_names)))
         kinematics = Kinematics(robot.urdf_path)
         assert kinematics.joint_names == robot.joint_names
@@ -203,7 +202,7 @@ def test_link_speed_is_that_of_its_origin(tmp_path):
 
 @pytest.mark.parametrize("name", ["link_box", "link_velocity"])
 def test_bound_by_reach_skips_computation_without_changing_the_result(name):
-    robot, link, generator, safe = GuardedRobot(KUKA), "lwr_arm_7_link", np.random.default_rng(5), 0
+    robot, link, generator, safe = RobotModel(KUKA), "lwr_arm_7_link", np.random.default_rng(5), 0
     low, high, most = np.array((-0.66, -0.04, 0.52)), np.array((-0.59, 0.04, 0.58)), 0.3
     boxes = {link: dict(zip("xyz", np.stack((low, high), axis=1).tolist()))}
     check = check_of(name, robot, **({"boxes": boxes} if name == "link_box" else {"links": {link: most}}))
@@ -267,7 +266,7 @@ def test_the_middle_of_a_braking_is_tried_too(tmp_path):
 
 @pytest.mark.quick
 def test_links_that_are_too_near_may_only_move_apart():
-    check = check_of("self_collision", GuardedRobot(KUKA))
+    check = check_of("self_collision", RobotModel(KUKA))
     generator = np.random.default_rng(4)
     q = np.array(FOLDED)
     pair = check.check(CommandedMotion(check.robot, State.at_rest(np.array(HOME)), q, 0.01), CheckContext()).subject
@@ -284,7 +283,7 @@ def test_links_that_are_too_near_may_only_move_apart():
 
 
 def test_distances_that_are_remembered_change_no_answer():
-    robot = GuardedRobot(KUKA)
+    robot = RobotModel(KUKA)
     check = check_of("self_collision", robot)
     generator = np.random.default_rng(5)
     q = np.array(HOME)
@@ -353,7 +352,7 @@ RAIL = """<robot name="rail"><link name="base"/>
 def test_joint_motion_since_the_last_distance_query_counts(tmp_path):
     path = tmp_path / "rail.urdf"
     path.write_text(RAIL)
-    check = check_of("environment", GuardedRobot(str(path)))
+    check = check_of("environment", RobotModel(str(path)))
     around = CheckContext(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
     still, there, too_far = (np.linspace(0.0, brake_m, 40) for brake_m in (0.0, 0.32, 0.36))
     too_far_and_back = np.concatenate((np.linspace(0.0, 0.41, 40), np.linspace(0.41, 0.0, 40)))
@@ -437,32 +436,32 @@ def test_a_world_that_cannot_be_taken_is_named(tmp_path, options, message):
 
 def test_pairs_can_be_read_changed_and_read_again(tmp_path):
     path = tmp_path / "pairs.yaml"
-    first = check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path))
+    first = check_of("self_collision", RobotModel(KUKA), pairs_file=str(path))
     assert "[lwr_arm_0_link, lwr_arm_7_link]" in path.read_text()
     path.write_text("pairs:\n- [lwr_arm_0_link, lwr_arm_7_link]\n")
-    assert check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path)).pairs == [
+    assert check_of("self_collision", RobotModel(KUKA), pairs_file=str(path)).pairs == [
         ("lwr_arm_0_link", "lwr_arm_7_link")
     ]
     assert ("lwr_arm_0_link", "lwr_arm_7_link") in first.pairs
     assert ("lwr_arm_0_link", "lwr_arm_1_link") not in first.pairs
     path.write_text("pairs:\n- [lwr_arm_0_link, lwr_arm_0_link]\n")
     with pytest.raises(ConfigError, match=r"pairs.yaml: pairs: expected two links, got 'lwr_arm_0_link' twice"):
-        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path))
+        check_of("self_collision", RobotModel(KUKA), pairs_file=str(path))
     with pytest.raises(ConfigError, match="checks.self_collision.pairs_file: expected a file that can be written"):
-        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(tmp_path / "nowhere" / "pairs.yaml"))
+        check_of("self_collision", RobotModel(KUKA), pairs_file=str(tmp_path / "nowhere" / "pairs.yaml"))
 
 
 def test_srdf_disables_pairs_and_that_of_another_robot_is_refused(tmp_path):
     path = tmp_path / "arm.srdf"
     path.write_text('<robot name="a"><disable_collisions link1="lwr_arm_7_link" link2="lwr_arm_0_link"/></robot>')
-    pairs = check_of("self_collision", GuardedRobot(KUKA), srdf=str(path)).pairs
+    pairs = check_of("self_collision", RobotModel(KUKA), srdf=str(path)).pairs
     assert ("lwr_arm_0_link", "lwr_arm_7_link") not in pairs and ("lwr_arm_0_link", "lwr_arm_6_link") in pairs
     path.write_text('<robot name="b"><disable_collisions link1="panda_link7" link2="panda_link0"/></robot>')
     with pytest.raises(ConfigError, match=r"arm.srdf: panda_link0: expected a link of .*kuka_lwr.urdf"):
-        check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
+        check_of("self_collision", RobotModel(KUKA), srdf=str(path))
     path.write_text('<robot name="b"><group name="arm"/></robot>')
     with pytest.raises(ConfigError, match=r"arm.srdf: expected pairs of links .* as disable_collisions, got none"):
-        check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
+        check_of("self_collision", RobotModel(KUKA), srdf=str(path))
 
 
 UNKNOWN = [("link_box", {"boxes": {"hnd": {}}}), ("link_velocity", {"links": {"hnd": 1.0}})]
@@ -482,7 +481,7 @@ def test_reversed_box_is_refused(tmp_path):
 
 
 def test_stamps_must_not_decrease_and_moving_robot_needs_targets():
-    check = check_of("staleness", GuardedRobot(KUKA))
+    check = check_of("staleness", RobotModel(KUKA))
     still = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     moving = State(np.array(HOME), np.full(7, 0.1), np.zeros(7))
     assert check.check(still, CheckContext(stamp_step_s=0.01, since_command_s=60.0)) is None

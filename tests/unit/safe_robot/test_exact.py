@@ -11,11 +11,11 @@ import pytest
 from guarded_arm import guard_of
 
 from custom_ros_tools.errors import MissingDependency
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 from safe_robot.check import CheckContext
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.robot import GuardedRobot
+from safe_robot.checks.proximity_check import link_distances
 
 PEG = """<robot name="peg"><link name="base"/>
   <joint name="x" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
@@ -34,10 +34,10 @@ FACES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (
 
 
 @pytest.fixture
-def peg(tmp_path) -> GuardedRobot:
+def peg(tmp_path) -> RobotModel:
     path = tmp_path / "peg.urdf"
     path.write_text(PEG)
-    return GuardedRobot(str(path))
+    return RobotModel(str(path))
 
 
 def mesh_of(path, boxes) -> Obstacle:
@@ -67,7 +67,7 @@ def end_of(guard, start, target, around) -> list[float]:
 
 def distance(robot, obstacle, geometry, at) -> float:
     """Returns how far the peg is from an obstacle, as a check would have it, no more than the margin [m]."""
-    distances = LinkDistances(robot, geometry)
+    distances = link_distances(robot, geometry)
     distances.place_obstacles([obstacle])
     distances.place(np.array(at))
     return min(distances.contact(("peg", 0), 10.0, MARGIN_M).distance, MARGIN_M)
@@ -101,7 +101,7 @@ def test_body_inside_a_closed_mesh_is_in_collision(peg, tmp_path):
     (tmp_path / "parts.urdf").write_text(
         PEG.replace('<box size="0.04 0.04 0.04"/>', f'<mesh filename="{parts.mesh_file}"/>')
     )
-    dumb_bell = GuardedRobot(str(tmp_path / "parts.urdf"))
+    dumb_bell = RobotModel(str(tmp_path / "parts.urdf"))
     assert distance(dumb_bell, case, "exact", (0.0, 0.0)) < 0.0, "its second part is inside"
     assert distance(dumb_bell, case, "exact", (0.25, 0.0)) == MARGIN_M, "the case is between its parts"
 
@@ -119,6 +119,6 @@ def test_edges_of_boxes_count_as_sharp(peg, geometry):
 
 def test_exact_geometry_without_its_library_names_the_install_command(peg, monkeypatch):
     monkeypatch.setitem(sys.modules, "hppfcl", None)
-    monkeypatch.delitem(sys.modules, "safe_robot.geometry.exact", raising=False)
+    monkeypatch.delitem(sys.modules, "robot_model.collision.exact", raising=False)
     with pytest.raises(MissingDependency, match="rpbi setup ik"):
         guard_of(peg, checks={"environment": {"geometry": "exact"}})

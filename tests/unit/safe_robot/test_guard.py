@@ -10,9 +10,9 @@ import pytest
 from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, BrokenCheck, decide, folding, guard_of, slider, worst_shares
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.model import RobotModel
 from safe_robot.check import CheckContext, Violation
 from safe_robot.guard import Decision
-from safe_robot.robot import GuardedRobot
 
 ROUNDING = 1e-6
 """Relative, of the oracle's differences."""
@@ -29,7 +29,7 @@ def smooth(robot, seconds: float, amplitude: float = 0.3, at: tuple[float, ...] 
 
 @pytest.mark.parametrize("policy", ["reject", "limit"])
 def test_safe_targets_pass_to_the_last_bit(policy):
-    robot = GuardedRobot(KUKA)
+    robot = RobotModel(KUKA)
     guard = guard_of(robot, policy=policy)
     for target in smooth(robot, 3.0, at=HOME):
         decision = decide(guard, target)

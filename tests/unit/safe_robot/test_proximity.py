@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from guarded_arm import HOME, KUKA
 
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 from safe_robot.braking import Brake
 from safe_robot.checks.proximity import Proximity, _spread
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.geometry.obstacles import Obstacle
+from safe_robot.checks.proximity_check import link_distances
 from safe_robot.motion import CommandedMotion, State
-from safe_robot.robot import GuardedRobot
 
 MARGIN_M = 0.02
 ROWS = 40
@@ -24,7 +24,7 @@ PAIRS = [(link, 0) for link in ("lwr_arm_5_link", "lwr_arm_6_link", "end_effecto
 
 @pytest.fixture(scope="module")
 def distances():
-    distances = LinkDistances(GuardedRobot(KUKA))
+    distances = link_distances(RobotModel(KUKA))
     distances.place_obstacles([TABLE])
     return distances
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from guarded_arm import KUKA
 
+from robot_model.collision.separation import Separation
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose, normalized
+from robot_model.model import RobotModel
+from safe_robot.checks.proximity_check import link_distances
 from safe_robot.checks.self_collision import pairs_that_may_meet
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.geometry.separation import Separation
-from safe_robot.robot import GuardedRobot
 
 FAR_M = 10.0
 LOOSE_M = 0.015
@@ -34,7 +34,7 @@ OBSTACLES = (
 
 @pytest.fixture(scope="module")
 def distances():
-    distances = LinkDistances(GuardedRobot(KUKA))
+    distances = link_distances(RobotModel(KUKA))
     distances.place_obstacles(OBSTACLES)
     return distances
 
@@ -42,7 +42,7 @@ def distances():
 @pytest.fixture(scope="module")
 def pairs(distances):
     moving = [link for link in distances.links if distances.reach((link, 0)).any()]
-    own = pairs_that_may_meet(GuardedRobot(KUKA), distances, 0.01)
+    own = pairs_that_may_meet(RobotModel(KUKA), distances, 0.01)
     return [*own, *((link, i) for i in range(len(OBSTACLES)) for link in moving)]
 
 
@@ -141,8 +141,8 @@ BENT = """<robot name="bent"><link name="base"/>
 def test_shapes_are_where_the_description_puts_them(tmp_path):
     path = tmp_path / "bent.urdf"
     path.write_text(BENT.format(mesh=MESH))
-    robot = GuardedRobot(str(path))
-    distances = LinkDistances(robot)
+    robot = RobotModel(str(path))
+    distances = link_distances(robot)
     distances.place_obstacles([OBSTACLES[0]._replace(pose=Pose((0.0, 0.0, -2.0)))])
     pairs = [("hand", 0), ("cart", 0)]
     separation = separation_of(distances, pairs)

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robot_model.collision.distances import LinkDistances
+from robot_model.collision.shapes import Obstacle
 from robot_model.conformance import MIMIC
 from robot_model.geometry import Pose
-from safe_robot.geometry import distances
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.robot import GuardedRobot
+from robot_model.model import RobotModel
+from safe_robot.checks import proximity_check
+from safe_robot.checks.proximity_check import link_distances
 
 KUKA = str(Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf")
 RADII_M = {"root": 0.05, "thigh": 0.02, "rod": 0.03, "tip": 0.04}
@@ -31,11 +32,11 @@ def library(request, monkeypatch) -> str:
 def choose(name: str, monkeypatch) -> None:
     if name == "fcl":
         pytest.importorskip("hppfcl")
-    monkeypatch.setattr(distances, "find_spec", lambda _: True if name == "bullet" else None)
+    monkeypatch.setattr(proximity_check, "find_spec", lambda _: True if name == "bullet" else None)
 
 
 @pytest.fixture
-def robot(tmp_path) -> GuardedRobot:
+def robot(tmp_path) -> RobotModel:
     """A robot with a sphere on some links; its last joint mimics its first one."""
     text = MIMIC
     for link, radius in RADII_M.items():
@@ -43,21 +44,21 @@ def robot(tmp_path) -> GuardedRobot:
         shape = f"<collision>{place}<geometry><sphere radius='{radius}'/></geometry></collision>"
         text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{shape}</link>')
     (tmp_path / "balls.urdf").write_text(text)
-    return GuardedRobot(str(tmp_path / "balls.urdf"))
+    return RobotModel(str(tmp_path / "balls.urdf"))
 
 
-def configurations(robot: GuardedRobot, count: int) -> np.ndarray:
+def configurations(robot: RobotModel, count: int) -> np.ndarray:
     generator = np.random.default_rng(3)
     return np.array([robot.limits.random(generator, robot.limits.middle) for _ in range(count)])
 
 
-def centre(robot: GuardedRobot, q: np.ndarray, link: str) -> np.ndarray:
+def centre(robot: RobotModel, q: np.ndarray, link: str) -> np.ndarray:
     frame, pose = robot.frames.place(link)
     return (robot.frames.at(q[None])[0, frame] @ pose @ (*OFF_M, 1.0))[:3]
 
 
 def test_distance_of_spheres_is_centre_distance_minus_radii(library, robot):
-    measured = LinkDistances(robot)
+    measured = link_distances(robot)
     assert measured.links == tuple(RADII_M)
     for q in configurations(robot, 5):
         measured.place(q)
@@ -68,7 +69,7 @@ def test_distance_of_spheres_is_centre_distance_minus_radii(library, robot):
 
 
 def test_an_obstacle_is_where_it_was_put_and_goes(library, robot):
-    measured, q = LinkDistances(robot), np.zeros(2)
+    measured, q = link_distances(robot), np.zeros(2)
     measured.place(q)
     at = centre(robot, q, "tip") + (0.0, 0.0, 0.5)
     ball = Obstacle("ball", "sphere", (0.2, 0.2, 0.2), Pose(tuple(at.tolist())))
@@ -81,7 +82,7 @@ def test_an_obstacle_is_where_it_was_put_and_goes(library, robot):
 
 
 def test_gradients_are_the_finite_differences_of_distances(library, robot):
-    measured, pair, step = LinkDistances(robot), ("root", "tip"), 1e-3
+    measured, pair, step = link_distances(robot), ("root", "tip"), 1e-3
     for q in configurations(robot, 5):
         measured.place(q)
         gradient = measured.gradient(pair, measured.contact(pair, 10.0), q)
@@ -96,10 +97,10 @@ def _distance(measured: LinkDistances, q: np.ndarray, pair: tuple[str, str]) -> 
 
 
 def test_hulls_of_meshes_are_as_far_apart_in_both_libraries(monkeypatch):
-    robot, both = GuardedRobot(KUKA), []
+    robot, both = RobotModel(KUKA), []
     for name in ("bullet", "fcl"):
         choose(name, monkeypatch)
-        both.append(LinkDistances(robot))
+        both.append(link_distances(robot))
     links = both[0].links
     assert links == both[1].links
     pairs = [(first, second) for i, first in enumerate(links) for second in links[i + 2 :]]

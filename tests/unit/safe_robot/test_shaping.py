@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of, slider, worst_shares
 
+from robot_model.model import RobotModel
 from safe_robot.guard import Decision
-from safe_robot.robot import GuardedRobot
 
 QUICK_LIMITS = {"acceleration": 10.0, "jerk": 1000.0}
 SMOOTHING = ({}, {"policy": "limit"}, {"shape": {}})
@@ -27,7 +27,7 @@ def trembling() -> np.ndarray:
 
 
 def test_targets_that_joints_can_follow_pass_to_the_last_bit():
-    guard = guard_of(GuardedRobot(KUKA), shape={})
+    guard = guard_of(RobotModel(KUKA), shape={})
     for target in map(tuple, swung(np.arange(0.0, 4.0, PERIOD_S)).tolist()):
         assert decide(guard, target) == Decision(target)
 
@@ -35,7 +35,7 @@ def test_targets_that_joints_can_follow_pass_to_the_last_bit():
 def test_trembling_targets_are_followed_smoothly_and_without_a_stop():
     targets = list(map(tuple, trembling().tolist()))
     options = {"limits": QUICK_LIMITS, "checks": {"self_collision": {"active": False}}}
-    guards = [guard_of(GuardedRobot(KUKA), **options, **each) for each in SMOOTHING]
+    guards = [guard_of(RobotModel(KUKA), **options, **each) for each in SMOOTHING]
     rough, limited, decisions = ([decide(guard, target) for target in targets] for guard in guards)
     assert any(decision.is_halted for decision in rough), "there was nothing to smooth"
     assert not any(decision.violation for decision in decisions)

@@ -9,8 +9,8 @@ import pytest
 from guarded_arm import decide, guard_of
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.model import MAX_OUTSIDE, RobotModel
 from safe_robot.guard import Guard
-from safe_robot.robot import MAX_OUTSIDE, GuardedRobot
 
 CRANE = """<robot name="crane"><link name="base"/><link name="boom"/><link name="trolley"/><link name="hook"/>
   <joint name="turn" type="revolute"><parent link="base"/><child link="boom"/><axis xyz="0 0 1"/>
@@ -23,13 +23,13 @@ CRANE = """<robot name="crane"><link name="base"/><link name="boom"/><link name=
 </robot>"""
 
 
-def crane(folder: Path, limits: str = 'lower="0" upper="1"') -> GuardedRobot:
+def crane(folder: Path, limits: str = 'lower="0" upper="1"') -> RobotModel:
     path = folder / "crane.urdf"
     path.write_text(CRANE.format(limits=limits))
-    return GuardedRobot(str(path))
+    return RobotModel(str(path))
 
 
-def started(robot: GuardedRobot, out: float, **config: object) -> Guard:
+def started(robot: RobotModel, out: float, **config: object) -> Guard:
     guard = guard_of(robot, **config)
     assert decide(guard, (0.0, out)).violation is None
     return guard

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from guarded_arm import decide, guard_of
 
-from safe_robot.robot import GuardedRobot
+from robot_model.model import RobotModel
 
 TWO_ARMS = """<robot name="two_arms"><link name="table"/>
   <link name="left"><collision><geometry><box size="0.2 0.1 0.1"/></geometry></collision></link>
@@ -27,7 +27,7 @@ def smooth(t: float) -> float:
 def test_arms_keep_away_from_each_other(tmp_path, left_m, right_m, is_safe):
     path = tmp_path / "two_arms.urdf"
     path.write_text(TWO_ARMS)
-    guard = guard_of(GuardedRobot(str(path)), checks={"self_collision": {"margin_m": 0.05}})
+    guard = guard_of(RobotModel(str(path)), checks={"self_collision": {"margin_m": 0.05}})
     for k in range(301):
         share = smooth(k / 300.0)
         violation = decide(guard, (share * left_m, share * right_m)).violation

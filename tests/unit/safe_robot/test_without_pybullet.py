@@ -15,19 +15,19 @@ sys.modules["pybullet"] = sys.modules["pybullet_data"] = None  # importing one r
 from robot_model.geometry import Pose
 from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
-from safe_robot.geometry.obstacles import Obstacle
+from robot_model.collision.shapes import Obstacle
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
+from robot_model.model import RobotModel
 
 options = {"start_from": "target", "start_tolerance": 10.0, "checks": {"environment": {}}}
-guard = Guard(GuardConfig.parse(options, "guard.yaml"), GuardedRobot(sys.argv[1]), "guard.yaml")
+guard = Guard(GuardConfig.parse(options, "guard.yaml"), RobotModel(sys.argv[1]), "guard.yaml")
 home, folded = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0), (1.0, 2.09, -2.9, 1.7, -0.5, -2.09, -1.3)
 pole = Obstacle("pole", "cylinder", (0.1, 0.1, 2.0), Pose((-0.5, 0.6, 1.0)))
 wall = Obstacle("wall", "box", (0.2, 2.0, 2.0), Pose((0.0, 0.0, 0.8)))
 guard.start()
 assert guard.decide(home, CheckContext(obstacles=(pole,))).command == home
 print(guard.decide(tuple(each + 1e-4 for each in home), CheckContext(obstacles=(wall,))).violation)
-folding = Guard(GuardConfig.parse(options, "guard.yaml"), GuardedRobot(sys.argv[1]), "guard.yaml")
+folding = Guard(GuardConfig.parse(options, "guard.yaml"), RobotModel(sys.argv[1]), "guard.yaml")
 folding.start()
 there = dict(zip(folding.joint_names, home))
 print(folding.decide(folded, CheckContext(obstacles=(), measured=there)).violation)

@@ -17,7 +17,7 @@ from custom_ros_tools.errors import UnknownNameError
 from robot_model.geometry import Pose, Quaternion, angle_between, normalized
 from robot_model.limits import Limits
 from robot_model.model import RobotModel
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
 from .problem import IKProblem, IKSolution
 from .solver import Solver

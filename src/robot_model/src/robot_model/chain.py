@@ -9,7 +9,7 @@ import numpy as np
 from custom_ros_tools.errors import UnknownNameError
 
 from .frames import origin_of
-from .joints import AffineMap, followed
+from .joint_map import AffineMap, followed
 from .limits import Limits
 from .model import read_robot
 from .reach import Reach

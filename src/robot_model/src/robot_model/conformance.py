@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from .geometry import Pose, rotation_between
-from .joints import Array
+from .joint_map import Array
 from .limits import Limits
 from .model import RobotModel
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from custom_ros_tools.transforms import matrix_of, quat_of
 
 from .geometry import Vector
-from .joints import AffineMap, Array
+from .joint_map import AffineMap, Array
 from .urdf.elements import UrdfJoint
 
 MAX_MATRIX_PRODUCTS = 24

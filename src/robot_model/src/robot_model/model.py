@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from functools import cached_property
+
+import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.transforms import finite_vector, pose_of
 
 from .frames import LinkFrames
 from .geometry import Pose
-from .joints import AffineMap
+from .joint_map import AffineMap, Array
 from .limits import Limits
 from .urdf.document import UrdfDocument
 from .urdf.elements import UrdfJoint
@@ -18,6 +21,8 @@ from .urdf.structure import check_structure
 
 MAX_JOINTS = 500
 """Largest number of joints that are not fixed; memory and time of kinematics grow with its square."""
+MAX_OUTSIDE = 0.1
+"""Distance outside its limits up to which `RobotModel.reach` holds for a prismatic joint [rad or m]."""
 
 
 def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
@@ -86,6 +91,16 @@ class RobotModel:
         self._above = {joint.child: joint for joint in self.all_joints.values()}
 
     @cached_property
+    def still(self) -> frozenset[str]:
+        """Names of the fixed joints; joint states may include them."""
+        return frozenset(name for name, joint in self.all_joints.items() if joint.type == "fixed")
+
+    @cached_property
+    def telescopic(self) -> tuple[str, ...]:
+        """Names of the driven prismatic joints that move links which other driven joints turn."""
+        return tuple(dict.fromkeys(name for link in self.links for name in self._telescopic_to(link)))
+
+    @cached_property
     def frames(self) -> LinkFrames:
         """Frames of all links."""
         return LinkFrames(self.all_joints.values(), self.map_to)
@@ -133,3 +148,61 @@ class RobotModel:
             joints.append(self._above[link])
             link = joints[-1].parent
         return joints[::-1]
+
+    def reach(self, link: str, radius_m: float, other: str | None = None) -> Array:
+        """Returns upper bounds of the distances that n joints move any point of a link in another link.
+
+        Each bound is for a motion of its joint by 1 rad or 1 m.
+
+        Args:
+            link: The link.
+            radius_m: Distance of the farthest point of its shape from its origin [m].
+            other: The other link, by default the root; joints above both have no effect.
+
+        Raises:
+            ConfigError: If a distance has no bound.
+        """
+        factors, _ = self._joint_motions
+        common = {joint.name for joint in self.chain(self.root if other is None else other)}
+        reach, beyond = np.zeros(len(self.joint_names)), radius_m
+        for joint in reversed(self.chain(link)):
+            if joint.name in common:
+                break
+            if joint.is_moving:
+                moved = factors[joint.name].nonzero()  # the others are not needed, even if they have no limits
+                reach[moved] += factors[joint.name][moved] * (beyond if joint.is_revolute else 1.0)
+            beyond += math.hypot(*joint.xyz)
+            if joint.is_moving and not joint.is_revolute:
+                beyond += self._travel(joint.name)
+        if not np.isfinite(reach).all():
+            name = self.joint_names[int(np.argmin(np.isfinite(reach)))]
+            message = f"expected limits for prismatic joints between joint '{name}' and link '{link}'"
+            raise ConfigError([Problem(self.urdf_path, "", message)])
+        return reach
+
+    @cached_property
+    def _joint_motions(self) -> tuple[dict[str, Array], dict[str, float]]:
+        """Absolute values of the map to joints that move: by name, its n factors and its offset [rad or m]."""
+        moving = [joint.name for joint in self.all_joints.values() if joint.is_moving]
+        factors, offsets = self.map_to(moving)
+        return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))
+
+    def _travel(self, name: str) -> float:
+        """Returns the largest distance of a joint from its position 0 [rad or m]."""
+        factors, offsets = self._joint_motions
+        farthest = (max(abs(joint.lower), abs(joint.upper)) + MAX_OUTSIDE for joint in self.joints)
+        travels = (factor * most for factor, most in zip(factors[name].tolist(), farthest) if factor)
+        return offsets[name] + sum(travels)
+
+    def _telescopic_to(self, link: str) -> list[str]:
+        """Returns the names of the driven joints that slide a link which other driven joints turn."""
+        factors, _ = self._joint_motions
+        turned, telescopic = False, []
+        for joint in self.chain(link):
+            if not joint.is_moving or not factors[joint.name].any():
+                continue
+            if joint.is_revolute:
+                turned = True
+            elif turned:
+                telescopic.append(self.joint_names[int(factors[joint.name].argmax())])
+        return telescopic

@@ -1,4 +1,4 @@
-"""The space that a chain of joints reaches."""
+"""Targets of a link: whether a chain of joints can reach one, and how far the link is from it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from typing import NamedTuple
 
 from .geometry import Vector
 from .limits import Axis
-from .residual import POSITION_TOLERANCE_M
+
+POSITION_TOLERANCE_M = 1e-3
+"""Largest position error of a target that counts as reached [m]."""
+ORIENTATION_TOLERANCE_RAD = 0.01
+"""Largest orientation error of a target that counts as reached [rad]."""
 
 
 class Reach(NamedTuple):
     """Ball that contains all positions of the tip of a chain of joints.
 
     Attributes:
-        anchor: Its centre, the position of the first moving joint in the base [m].
-        radius_m: Its radius [m], inf for endless rails.
+        anchor: Its centre, the position of the first moving joint in the base frame [m].
+        radius_m: Its radius [m]; inf if a prismatic joint has no limits.
     """
 
     anchor: Vector
@@ -27,16 +31,47 @@ class Reach(NamedTuple):
         """Returns the reach of a chain of moving joints.
 
         Args:
-            anchor: See above.
+            anchor: Position of the first moving joint in the base frame [m].
             lengths: Distances from each joint to the next one, and to the tip [m].
+            joints: The moving joints.
         """
         travel = [max(abs(joint.lower), abs(joint.upper)) for joint in joints if not joint.is_revolute]
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Returns whether the tip may reach a position in the base [m] within the tolerance of success.
+        """Returns whether the tip may reach a position in the base frame [m].
 
-        Args:
-            tolerance_m: Further distance from the position that is accepted [m].
+        The ball counts as larger by `POSITION_TOLERANCE_M`, and by a further tolerance [m].
         """
         return math.dist(position, self.anchor) <= self.radius_m + tolerance_m + POSITION_TOLERANCE_M
+
+
+class Residual(NamedTuple):
+    """Distance between a link and its target.
+
+    Attributes:
+        position_m: Distance [m].
+        orientation_rad: Angle [rad]; 0 if the target has no orientation.
+    """
+
+    position_m: float
+    orientation_rad: float
+
+    @property
+    def size(self) -> float:
+        """The larger of both errors in multiples of its tolerance; the target counts as reached up to 1."""
+        return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
+
+    def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
+        """Returns a sentence that says whether a link has reached a target, and its errors.
+
+        Args:
+            link: Name of the link.
+            has_orientation: Whether the target has an orientation, whose error is included.
+            target: The target, for the sentence.
+        """
+        angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
+        if self.size <= 1.0:
+            return f"'{link}' is within {self.position_m * 1e3:.3g} mm{angle} of {target}"
+        enough = f"{POSITION_TOLERANCE_M * 1e3:g} mm" + (f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if angle else "")
+        return f"'{link}' misses {target} by {self.position_m * 1e3:.4g} mm{angle}; {enough} would do"

@@ -10,12 +10,12 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, Switch
+from robot_model.collision.shapes import Obstacle
+from robot_model.model import RobotModel
 from safe_robot.motion import Bound
 
-from .geometry.obstacles import Obstacle
 from .limits import MotionLimits
 from .motion import CommandedMotion
-from .robot import GuardedRobot
 
 
 class CheckConfig(ConfigModel):
@@ -130,7 +130,7 @@ class Check(ABC):
     watches: ClassVar[bool] = False
     takes_obstacles: ClassVar[bool] = False
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         self.config, self.robot, self.limits, self.file = config, robot, limits, file
 
     @abstractmethod

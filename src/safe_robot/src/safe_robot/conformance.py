@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.model import RobotModel
 
 from .check import Check, CheckContext
+from .checks import make_checks
 from .limits import LimitsConfig, MotionLimits
-from .lookup import make_checks
 from .motion import CommandedMotion, State
-from .robot import GuardedRobot
 
 
 class CheckConformance:
@@ -54,9 +54,9 @@ class CheckConformance:
         return CommandedMotion(self.robot, start, np.array(command, dtype=float), self.period_s)
 
     @property
-    def robot(self) -> GuardedRobot:
+    def robot(self) -> RobotModel:
         """The robot."""
-        return GuardedRobot(self.urdf)
+        return RobotModel(self.urdf)
 
     def make(self) -> Check:
         """Returns a new check."""

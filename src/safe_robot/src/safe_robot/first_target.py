@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem
+from robot_model.model import MAX_OUTSIDE, RobotModel
 from safe_robot.check import Check, CheckContext, Violation
 from safe_robot.config import GuardConfig
 from safe_robot.motion import CommandedMotion, State
-from safe_robot.robot import MAX_OUTSIDE, GuardedRobot
 
 SLOW_S = 1e6
 """Assumed duration of the motion to the first target [s]; long enough that its speed is never a violation."""
@@ -33,7 +33,7 @@ class FirstTarget:
         ConfigError: If the reach of links depends on limits that are not checked.
     """
 
-    def __init__(self, config: GuardConfig, robot: GuardedRobot, checks: Sequence[Check], file: str) -> None:
+    def __init__(self, config: GuardConfig, robot: RobotModel, checks: Sequence[Check], file: str) -> None:
         if robot.telescopic and not any(check.name == "joint_position" for check in checks):
             message = f"expected true, since joint '{robot.telescopic[0]}' moves links that others turn, got false"
             raise ConfigError([Problem(file, "checks.joint_position.active", message)])

@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem
+from robot_model.model import RobotModel
+from safe_robot.commands.safe_search import can_keep_bounds
 
 from .braking import Brake, Braking, BrakingCommands
 from .check import Check, CheckContext, MarginViolation, Violation
+from .checks import make_checks
 from .checks.staleness import Staleness
-from .commands.command_qp import can_keep_bounds
 from .commands.escape import EscapeDirection, find_escape
 from .commands.pursuit import ROUNDING
 from .commands.safe_search import SafeCommandSearch
@@ -20,9 +22,7 @@ from .commands.shaping import Shaper
 from .config import GuardConfig
 from .first_target import FirstTarget
 from .limits import MotionLimits
-from .lookup import make_checks
 from .motion import CommandedMotion, State
-from .robot import GuardedRobot
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class Guard:
         ConfigError: If the configuration does not fit the robot.
     """
 
-    def __init__(self, config: GuardConfig, robot: GuardedRobot, file: str = "~") -> None:
+    def __init__(self, config: GuardConfig, robot: RobotModel, file: str = "~") -> None:
         self.config, self.robot = config, robot
         self.joint_names = robot.joint_names
         self.limits = MotionLimits.of(robot, config.limits, file)

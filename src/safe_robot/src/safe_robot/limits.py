@@ -9,8 +9,7 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
 from custom_ros_tools.schema import ConfigModel, Positive
-
-from .robot import GuardedRobot
+from robot_model.model import RobotModel
 
 Factor = Annotated[float, Field(gt=0, le=1)]
 PerJoint = Positive | dict[str, Positive]
@@ -47,7 +46,7 @@ class MotionLimits(NamedTuple):
     jerk: np.ndarray
 
     @classmethod
-    def of(cls, robot: GuardedRobot, config: LimitsConfig, file: str) -> "MotionLimits":
+    def of(cls, robot: RobotModel, config: LimitsConfig, file: str) -> "MotionLimits":
         """Returns the limits of a robot.
 
         Raises:
@@ -76,7 +75,7 @@ class MotionLimits(NamedTuple):
 
 
 def _narrowed(
-    robot: GuardedRobot, key: str, own: Sequence[float], given: dict[str, float], problems: list[Problem], file: str
+    robot: RobotModel, key: str, own: Sequence[float], given: dict[str, float], problems: list[Problem], file: str
 ) -> list[float]:
     _check_names(robot, f"limits.{key}", given, problems, file)
     limits = list(own)
@@ -93,7 +92,7 @@ def _narrowed(
 
 
 def _largest(
-    robot: GuardedRobot,
+    robot: RobotModel,
     key: str,
     own: Sequence[float],
     given: float | dict[str, float] | None,
@@ -111,7 +110,7 @@ def _largest(
     return [min(most, by_joint.get(name, math.inf)) for name, most in zip(robot.joint_names, own)]
 
 
-def _check_names(robot: GuardedRobot, key: str, given: dict[str, float], problems: list[Problem], file: str) -> None:
+def _check_names(robot: RobotModel, key: str, given: dict[str, float], problems: list[Problem], file: str) -> None:
     for name in given:
         if name not in robot.joint_names:
             problems.append(Problem(file, f"{key}.{name}", f"unknown joint{hint(name, robot.joint_names)}"))

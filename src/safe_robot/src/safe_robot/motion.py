@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_model.model import RobotModel
+
 from .braking import Brake, BrakingCommands
-from .robot import GuardedRobot
 
 WAYPOINT_SPACING = 0.15
 """Largest motion of all joints together between two waypoints [rad or m], unless they move more in one period."""
@@ -71,7 +72,7 @@ class CommandedMotion:
 
     def __init__(
         self,
-        robot: GuardedRobot,
+        robot: RobotModel,
         start: State,
         command: np.ndarray,
         period_s: float,

@@ -9,9 +9,9 @@ from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.for_pybullet import frame_masses
 from rpbi.control.joint_command import JointCommand
 from rpbi.samples import JointStateSample, LinkPoseSample, WrenchSample
-from rpbi.urdf.copies import frame_masses
 from rpbi.world import World
 from rpbi.world_warnings import world_warnings
 

@@ -15,10 +15,10 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.urdf.for_ros import description_for_ros
 from rpbi.bodies import BODY_TYPES
 from rpbi.kinematics import Kinematics
 from rpbi.urdf import loading
-from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 from rpbi.world.loading import load_object
 

@@ -18,6 +18,7 @@ from worlds import ball, write_world
 
 from custom_ros_tools.errors import ConfigError
 from ik_ros.formulation.robot import PinocchioRobot
+from robot_model.model import RobotModel
 from robot_model.urdf.document import UrdfDocument
 from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.kinematics import Kinematics
@@ -26,7 +27,6 @@ from rpbi.meshes.trial import Mesh, Use
 from rpbi.urdf.loading import urdf_problems
 from rpbi.world import World
 from rpbi.world.loading import load_world
-from safe_robot.robot import GuardedRobot
 
 ROOT = Path(__file__).resolve().parents[4]
 sys.path.append(str(ROOT / "dev"))
@@ -171,7 +171,7 @@ def test_valid_urdf_has_no_problems(tmp_path):
     assert urdf_problems(str(path)) == [] and UrdfDocument(str(path)).root_link() == "a"
 
 
-@pytest.mark.parametrize("reader", [GuardedRobot, PinocchioRobot, Kinematics])
+@pytest.mark.parametrize("reader", [RobotModel, PinocchioRobot, Kinematics])
 def test_no_reader_takes_joints_by_the_hundred(tmp_path, reader):
     links = "".join(f"<link name='l{number}'/>" for number in range(502))
     ends = (f"<parent link='l{number}'/><child link='l{number + 1}'/>" for number in range(501))

@@ -11,8 +11,8 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-from rpbi.meshes.copies import cache_folder, kept
-from rpbi.urdf.copies import description_for_ros
+from robot_model.mesh_cache import cache_folder, kept
+from robot_model.urdf.for_ros import description_for_ros
 
 PANDA = f"{pybullet_data.getDataPath()}/franka_panda/panda.urdf"
 """In the materials of one of its meshes stand paths of a computer that ran Windows."""
@@ -52,7 +52,7 @@ def test_original_files_are_used_where_no_cache_can_be_written(tmp_path, monkeyp
 
 WRITES = """
 import sys, time
-from rpbi.meshes.copies import kept
+from robot_model.mesh_cache import kept
 
 def make(folder):
     for number in range(20):

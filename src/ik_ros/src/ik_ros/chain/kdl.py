@@ -9,7 +9,7 @@ import PyKDL
 from ik_ros.problem import IKProblem
 from robot_model.chain import Chain
 from robot_model.geometry import Pose
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 
 class KdlChain:

@@ -18,7 +18,7 @@ from ik_ros.solver import Solver, StartLimits
 from robot_model.asset_files import ExistingFile
 from robot_model.chain import Chain
 from robot_model.limits import Limits
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .kdl import Goal, KdlChain
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from custom_ros_tools.schema import KeyedError, ListOf, Text
 from ik_ros.problem import IKProblem
 from robot_model.geometry import Pose, normalized
-from robot_model.residual import Residual
+from robot_model.reach import Residual
 
 from .robot import PinocchioRobot, to_se3
 from .task import Linearization, Task, TaskConfig, keyed_errors

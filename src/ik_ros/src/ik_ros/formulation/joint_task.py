@@ -7,7 +7,7 @@ import numpy as np
 
 from custom_ros_tools.schema import KeyedError
 from ik_ros.problem import IKProblem
-from robot_model.residual import Residual
+from robot_model.reach import Residual
 
 from .robot import PinocchioRobot
 from .task import Linearization, Task, TaskConfig, keyed_errors

@@ -11,7 +11,7 @@ import numpy as np
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Positive, Switch, Text
 from ik_ros.problem import IKProblem
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .robot import PinocchioRobot
 

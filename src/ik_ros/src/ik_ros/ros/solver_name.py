@@ -32,4 +32,6 @@ def run_for_solver(kind: str, make: Callable[[str], object]) -> None:
         print(f"usage: ik_{kind}_node.py SOLVER, out of {', '.join(SOLVERS)}, or module:Class", file=sys.stderr)
         sys.exit(2)
     (name,) = arguments
-    run_node(f"ik_{kind}_{name.rpartition(':')[2]}", lambda: make(name), anonymous=True, loggers=["rpbi"])
+    run_node(
+        f"ik_{kind}_{name.rpartition(':')[2]}", lambda: make(name), anonymous=True, loggers=["robot_model", "rpbi"]
+    )

@@ -17,7 +17,7 @@ from ik_ros.solver import Solver
 from ik_ros.task_solver.formulation import Formulation
 from robot_model.asset_files import ExistingFile
 from robot_model.geometry import Pose
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
 from .tasks import TasksSolver
 

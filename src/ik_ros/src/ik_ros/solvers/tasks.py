@@ -10,7 +10,7 @@ from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver, StartLimits
-from robot_model.residual import Residual
+from robot_model.reach import Residual
 
 try:
     import daqp  # noqa: F401

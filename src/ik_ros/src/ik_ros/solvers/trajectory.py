@@ -20,7 +20,7 @@ from ik_ros.chain.kdl import Goal
 from ik_ros.chain.solver import refuse_mimics
 from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from ik_ros.shape import ShapeConfig
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .kdl import KdlConfig, KdlSolver
 

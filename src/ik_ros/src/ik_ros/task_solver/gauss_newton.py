@@ -10,7 +10,7 @@ import numpy as np
 from ik_ros.formulation.joint_task import JointTask
 from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import Linearization
-from robot_model.residual import Residual
+from robot_model.reach import Residual
 
 from .formulation import Part
 

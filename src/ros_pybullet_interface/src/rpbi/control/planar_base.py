@@ -13,10 +13,10 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import Element, UrdfJoint
+from robot_model.urdf.for_pybullet import Files, for_pybullet, mounted_on
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
-from rpbi.urdf.copies import Files, for_pybullet, mounted_on
 
 PLANAR_JOINTS = (0, 1, 2)
 """PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""

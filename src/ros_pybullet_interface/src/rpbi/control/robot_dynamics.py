@@ -6,7 +6,7 @@ import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem
 from robot_model.geometry import Quaternion, Vector
-from robot_model.joints import AffineMap, Array
+from robot_model.joint_map import AffineMap, Array
 from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, rotated_back

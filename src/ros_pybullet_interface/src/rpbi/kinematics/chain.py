@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_model.geometry import Quaternion, rotation_between
-from robot_model.reach import Reach
-from robot_model.residual import Residual
+from robot_model.reach import Reach, Residual
 from robot_model.urdf.files import write_description
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose

@@ -9,7 +9,7 @@ import pybullet
 
 from robot_model.limits import Limits
 from robot_model.linear_algebra import inverse
-from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
 from .chain import BulletChain, Target
 

@@ -9,7 +9,7 @@ import numpy as np
 import pybullet
 
 from robot_model.limits import TURN, Limits
-from robot_model.residual import POSITION_TOLERANCE_M, Residual
+from robot_model.reach import POSITION_TOLERANCE_M, Residual
 
 from .chain import BulletChain, Target
 from .methods import BREAK_S, DampedLeastSquares, SelectivelyDampedLeastSquares, Step, go_near, towards_posture

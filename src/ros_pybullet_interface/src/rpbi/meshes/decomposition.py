@@ -14,8 +14,8 @@ from pathlib import Path
 import pybullet
 
 from custom_ros_tools.processes.temporary import temporary_folder
+from robot_model.mesh_cache import content_hash, kept
 
-from .copies import content_hash, kept
 from .trial import limit_resources
 from .triangles import read_triangles
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from custom_ros_tools.processes.child import start_child
-
-from .copies import cache_folder, content_hash
+from robot_model.mesh_cache import cache_folder, content_hash
 
 TRIAL = 3
 """Version of the trial; meshes that passed another version are tried again."""

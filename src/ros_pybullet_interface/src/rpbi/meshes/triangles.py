@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from custom_ros_tools.config import read_file
-
-from .copies import content_hash, kept
+from robot_model.mesh_cache import content_hash, kept
 
 MAX_BYTES = 64_000_000
 """Longest file that is read; a longer one is an error."""

@@ -195,4 +195,4 @@ def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
     sys.setswitchinterval(SWITCH_S)
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
-    run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False)
+    run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False, loggers=["robot_model"])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
-from robot_model.joints import AffineMap, followed
+from robot_model.joint_map import AffineMap, followed
 from robot_model.limits import LIMIT_ROUNDING, MAX_MAGNITUDE
 from robot_model.urdf.elements import Mimic
 from rpbi.engine.client import Client

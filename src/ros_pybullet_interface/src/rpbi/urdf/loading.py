@@ -16,12 +16,19 @@ from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.elements import Element, text_of
 from robot_model.urdf.files import found_mesh
+from robot_model.urdf.for_pybullet import (
+    Files,
+    files_of,
+    for_pybullet,
+    frame_masses,
+    put_first_visuals_last,
+    put_root_first,
+    weigh_frames,
+)
 from robot_model.urdf.structure import MAX_PROBLEMS, check_structure, missing_parts, structure_problems
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
-
-from .copies import Files, files_of, for_pybullet, frame_masses, put_first_visuals_last, put_root_first, weigh_frames
 
 log = logging.getLogger(__name__)
 

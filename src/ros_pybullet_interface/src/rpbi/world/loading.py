@@ -11,12 +11,12 @@ from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from robot_model.geometry import Pose
+from robot_model.urdf.for_ros import joined_for_ros
 from rpbi.bodies.file_checks import file_problems, parts_with_files
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.object_entry import ObjectEntry, parse_object_entry
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.config.world import WorldConfig, main_file_model
-from rpbi.urdf.copies import joined_for_ros
 
 from .file_kinds import check_is_world, load_main_file, load_object_file
 from .legacy import MAIN

@@ -7,11 +7,11 @@ import pybullet
 
 from custom_ros_tools.errors import Problem
 from robot_model.urdf.document import Edge, UrdfDocument
+from robot_model.urdf.for_pybullet import weighed_by_pybullet
 from robot_model.urdf.structure import numbers_in
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.meshes.triangles import volumes
-from rpbi.urdf.copies import weighed_by_pybullet
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
 from rpbi.world.objects import ObjectConfig

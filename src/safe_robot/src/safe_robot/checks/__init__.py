@@ -1,7 +1,13 @@
 """The checks; to add one, write a class in its own file and a line here."""
 
+from collections.abc import Mapping
+from typing import Any
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.plugins.table import PluginTable
+from robot_model.model import RobotModel
 from safe_robot.check import Check
+from safe_robot.limits import MotionLimits
 
 CHECKS: PluginTable[Check] = PluginTable(
     "check",
@@ -21,3 +27,34 @@ CHECKS: PluginTable[Check] = PluginTable(
     },
 )
 """All checks, in the order in which a guard makes them."""
+
+
+def make_checks(
+    options: Mapping[str, Mapping[str, Any]], robot: RobotModel, limits: MotionLimits, file: str
+) -> list[Check]:
+    """Returns the checks of a guard: the default ones and those with options, except those that are not active.
+
+    Args:
+        options: Options by name of the check.
+        file: Source of the options, for messages.
+
+    Raises:
+        ConfigError: If a check is not known, or its options are wrong.
+    """
+    checks = []
+    for name in dict.fromkeys((*CHECKS, *options)):
+        try:
+            each: Any = CHECKS.find(name)
+        except (InterfaceError, ValueError) as error:
+            raise ConfigError([Problem(file, f"checks.{name}", str(error))]) from None
+        if name in options or each.is_default:
+            try:
+                config = each.Config.parse(options.get(name, {}), file)
+            except ConfigError as error:
+                problems = [
+                    Problem(one.file, f"checks.{name}.{one.key}".rstrip("."), one.message) for one in error.problems
+                ]
+                raise ConfigError(problems) from None
+            if config.active:
+                checks.append(each(config, robot, limits, file))
+    return checks

@@ -8,14 +8,15 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import NonNegativeMetres, Seconds, Text
+from robot_model.collision.distances import Geometry, Pair
+from robot_model.collision.shapes import Obstacle
+from robot_model.model import RobotModel
 from safe_robot.check import CheckConfig, CheckContext, Violation
-from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
-from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.limits import MotionLimits
 from safe_robot.motion import CommandedMotion
-from safe_robot.robot import GuardedRobot
 
-from .proximity import Proximity, ProximityCheck
+from .proximity import Proximity
+from .proximity_check import GEOMETRY, ProximityCheck, link_distances
 
 
 class EnvironmentConfig(CheckConfig):
@@ -45,13 +46,13 @@ class Environment(ProximityCheck):
     name = "environment"
     takes_obstacles = True
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self.distances = LinkDistances(robot, config.geometry)
+        self.distances = link_distances(robot, config.geometry)
         joints = {name for name, joint in robot.document.joints.items() if joint.is_moving}
         self._still: tuple[Obstacle, ...] = ()
         if config.world is not None:
-            from safe_robot.geometry.world_obstacles import obstacles_of_world  # loads the simulator
+            from safe_robot.world_obstacles import obstacles_of_world  # loads the simulator
 
             self._still = obstacles_of_world(config.world, joints, config.robot)
         self._links = [link for link in self.distances.links if self.distances.reach((link, 0)).any()]

@@ -7,10 +7,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from custom_ros_tools.schema import ConfigModel, KeyedError
+from robot_model.model import RobotModel
 from safe_robot.check import Check, CheckConfig, CheckContext, Violation
 from safe_robot.limits import MotionLimits
 from safe_robot.motion import Bound, CommandedMotion
-from safe_robot.robot import GuardedRobot
 
 STEP = 1e-6
 """Step of the joints for numerical derivatives of a link's motion [rad or m]."""
@@ -60,7 +60,7 @@ class LinkBox(Check):
     Config = LinkBoxConfig
     name = "link_box"
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._boxes: dict[str, Box] = {}
         self._room: dict[str, tuple[np.ndarray, float]] = {}  # largest value over random configurations

@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import Positive
+from robot_model.model import RobotModel
 from safe_robot.check import Check, CheckConfig, CheckContext, Violation
 from safe_robot.limits import MotionLimits
 from safe_robot.motion import CommandedMotion
-from safe_robot.robot import GuardedRobot
 
 
 class LinkVelocityConfig(CheckConfig):
@@ -24,7 +24,7 @@ class LinkVelocity(Check):
     Config = LinkVelocityConfig
     name = "link_velocity"
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._reach: dict[str, np.ndarray] = {}  # largest motion of a link by each joint, for 1 rad or m
         for link in config.links:

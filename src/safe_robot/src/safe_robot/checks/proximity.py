@@ -1,15 +1,12 @@
 """Pairs that come too near to each other while a robot moves."""
 
-import math
-from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from safe_robot.check import Check, MarginViolation, Violation
-from safe_robot.geometry.distances import Contact, LinkDistances, Pair
-from safe_robot.geometry.separation import Separation
+from robot_model.collision.distances import Contact, LinkDistances, Pair
+from robot_model.collision.separation import Separation
 from safe_robot.motion import Bound, CommandedMotion
 
 LEAST_SPACING_M = 0.01
@@ -233,55 +230,6 @@ class Proximity:
             contact = self._distances.contact(pair, within_m, within_m)
             if contact is not None and contact.distance < within_m:
                 yield pair, contact
-
-
-class ProximityCheck(Check):
-    """Base of the checks that keep pairs further apart than the margin of their configuration.
-
-    Attributes:
-        distances: Distances between shapes.
-        proximity: The pairs.
-    """
-
-    distances: LinkDistances
-    proximity: Proximity
-
-    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """See `Check`."""
-        return self.proximity.bounds(rows, spread, before)
-
-    def inside(self, q: np.ndarray) -> list[MarginViolation]:
-        """See `Check`."""
-        near = self.proximity.contacts(q, self.config.margin_m)
-        return [
-            MarginViolation(
-                self.name,
-                pair,
-                self.subject(pair),
-                contact.distance,
-                self.config.margin_m,
-                self.distances.gradient(pair, contact, q),
-            )
-            for pair, contact in near
-        ]
-
-    @abstractmethod
-    def subject(self, pair: Pair) -> str:
-        """Returns a description of a pair."""
-
-    def undefined(self, motion: CommandedMotion) -> Violation | None:
-        """Returns a violation for a motion with non-finite numbers, for which PyBullet would find no contact."""
-        if np.isfinite(motion.position).all():
-            return None
-        return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
-
-    def too_near(self, motion: CommandedMotion) -> Violation | None:
-        """Returns a violation by a pair that comes too near, None if none does."""
-        found = self.proximity.first(motion)
-        if found is None:
-            return None
-        subject, margin_m = self.subject(found.pair), self.config.margin_m
-        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
 
 
 def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:

@@ -12,14 +12,15 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
 from custom_ros_tools.schema import NonNegativeMetres, Text
+from robot_model.collision.distances import Geometry, LinkDistances, Pair
+from robot_model.model import RobotModel
 from robot_model.urdf.document import disabled_collisions
 from safe_robot.check import CheckConfig, CheckContext, Violation
-from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.limits import MotionLimits
 from safe_robot.motion import CommandedMotion
-from safe_robot.robot import GuardedRobot
 
-from .proximity import Proximity, ProximityCheck
+from .proximity import Proximity
+from .proximity_check import GEOMETRY, ProximityCheck, link_distances
 
 SAMPLES = 200
 """Number of random configurations that are used to find pairs that are always near."""
@@ -45,9 +46,9 @@ class SelfCollision(ProximityCheck):
     name = "self_collision"
     is_default = True
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self.distances = LinkDistances(robot, config.geometry)
+        self.distances = link_distances(robot, config.geometry)
         self.pairs = self._pairs()
         self.proximity = Proximity(self.distances, self.pairs, config.margin_m)
 
@@ -113,7 +114,7 @@ class SelfCollision(ProximityCheck):
         return [pair for pair in every if frozenset(pair) not in disabled]
 
 
-def pairs_that_may_meet(robot: GuardedRobot, distances: LinkDistances, margin_m: float) -> list[tuple[str, str]]:
+def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: float) -> list[tuple[str, str]]:
     """Returns the pairs of links that may come nearer than a margin [m].
 
     Pairs connected by a joint, or by several fixed ones, are left out, and so are pairs that are nearly always nearer
@@ -136,7 +137,7 @@ def pairs_that_may_meet(robot: GuardedRobot, distances: LinkDistances, margin_m:
     return [pair for pair in apart if touching[pair] < ALWAYS * SAMPLES]
 
 
-def _group(robot: GuardedRobot, link: str) -> str:
+def _group(robot: RobotModel, link: str) -> str:
     """Returns the first of the links that fixed joints connect to a link."""
     for joint in reversed(robot.chain(link)):
         if joint.is_moving:

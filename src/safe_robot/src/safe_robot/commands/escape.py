@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
+from robot_model.collision.distances import Pair
 from safe_robot.check import MarginViolation
-from safe_robot.geometry.distances import Pair
 from safe_robot.limits import MotionLimits
 
 STEP = 1e-3

@@ -19,13 +19,13 @@ from custom_ros_tools.ros.rospy_internals import DirectSending
 from safe_robot.check import Violation
 from safe_robot.checks.staleness import too_old
 from safe_robot.guard import Decision
+from safe_robot.target_queue import TargetQueue
 
 from .guard_markers import GuardMarkers
 from .guard_status import GuardStatus, violation_of
 from .master_connection import MasterConnection
 from .measurements import Measurements
 from .parameters import guard_of_parameters
-from .target_queue import TargetQueue
 
 NODE = "robot_safety_node"
 QUEUE_SIZE = 100
@@ -275,4 +275,4 @@ def _now() -> rospy.Time:
 def main() -> None:
     """Runs the node."""
     sys.setswitchinterval(SWITCH_S)
-    run_node(NODE, GuardNode, loggers=["rpbi"])
+    run_node(NODE, GuardNode, loggers=["robot_model", "rpbi"])

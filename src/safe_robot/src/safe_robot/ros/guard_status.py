@@ -7,8 +7,8 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from robot_model.collision.shapes import Obstacle
 from safe_robot.check import Violation
-from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
 from safe_robot.msg import Status
 from safe_robot.msg import Violation as ViolationMessage

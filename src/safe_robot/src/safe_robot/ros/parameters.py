@@ -8,11 +8,11 @@ import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.schema.type_names import shown
+from robot_model.model import RobotModel
 from robot_model.urdf.files import write_description
 from safe_robot import legacy
 from safe_robot.config import GuardConfig, NodeConfig
 from safe_robot.guard import Guard
-from safe_robot.robot import GuardedRobot
 
 DESCRIPTION = "robot_description"
 START_FROM_TARGET = (
@@ -49,9 +49,9 @@ def guard_of(given: Mapping[str, Any], path: str, node: str) -> tuple[Guard, Nod
     """
     given = dict(given)
     output = NodeConfig.parse({key: given.pop(key) for key in NodeConfig.model_fields if key in given}, node)
-    config = GuardConfig.parse(legacy.translated(given, list(GuardedRobot(path).joint_names), node), node)
+    config = GuardConfig.parse(legacy.translated(given, list(RobotModel(path).joint_names), node), node)
     try:
-        robot = GuardedRobot(path, config.joint_names)
+        robot = RobotModel(path, config.joint_names)
     except InterfaceError as error:
         raise ConfigError([Problem(node, "joint_names", str(error))]) from None
     return Guard(config, robot, node), output

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from robot_model.urdf.document import mimics_of
+from robot_model.urdf.for_pybullet import for_pybullet
 from rpbi.bodies.body import Body
 from rpbi.control.joint_command import JointCommand
 from rpbi.engine.client import Client
@@ -16,7 +17,6 @@ from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.copies import for_pybullet
 from rpbi.urdf.joints import Joint, JointModel
 from rpbi.urdf.loading import load_urdf, prepared_urdf
 

@@ -11,13 +11,13 @@ from geometry_msgs.msg import Point, Quaternion
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from robot_model.asset_files import find_file
+from robot_model.urdf.for_ros import description_for_ros
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.ros.publishers.sample_topics import joint_state_message
 from rpbi.ros.requests import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
-from rpbi.urdf.copies import description_for_ros
 from rpbi.urdf.joints import Joint
 from rpbi.world.loading import robots_description
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from custom_ros_tools.config import replace_package
 from robot_model.geometry import Pose, Vector, angle_between, minus, norm, quaternion_product
+from robot_model.model import RobotModel
 from rpbi_examples.scenes.parts.arm import LedArm, about_z, between, smooth
 from rpbi_examples.scenes.scene import Scene
-from safe_robot.geometry.distances import LinkDistances
-from safe_robot.robot import GuardedRobot
+from safe_robot.checks.proximity_check import link_distances
 
 FAR_M = 0.5
 """Distances beyond this are not computed [m]."""
@@ -51,8 +51,8 @@ class TwoArms:
         self._scene, self._robot, self._least_m, self._joints = scene, robot, least_m, dict(joints)
         self.arms = {name: LedArm(scene, robot, urdf, base_link, link, base) for name, link in links.items()}
         self._names = [*(joint for arm in self.arms.values() for joint in arm.joint_names), *joints]
-        guarded = GuardedRobot(replace_package(urdf), self._names)
-        self._distances = LinkDistances(guarded)
+        guarded = RobotModel(replace_package(urdf), self._names)
+        self._distances = link_distances(guarded)
         chains = {link: {joint.name for joint in guarded.chain(link)} for link in self._distances.links}
         first, second = (
             [link for link, chain in chains.items() if arm.joint_names[0] in chain] for arm in self.arms.values()

@@ -1,4 +1,4 @@
-"""Distances between collision shapes by hpp-fcl, which needs no simulator; shapes of meshes are their convex hulls."""
+"""Distances between collision shapes by hpp-fcl, without a simulator; meshes are replaced by their convex hulls."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from scipy.spatial import ConvexHull, QhullError
 from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.transforms import matrix_of
 from robot_model.geometry import Pose, Vector, minus, norm, scaled
-from robot_model.urdf.shapes import collision_shapes
-from safe_robot.robot import GuardedRobot
+from robot_model.model import RobotModel
 
 try:
     import hppfcl
 except ImportError:
     raise MissingDependency("hpp-fcl", "./rpbi setup ik") from None
 
-from .obstacles import Kind, Obstacle
+from .shapes import Obstacle, ObstacleKind, collision_shapes
 from .solids import ClosestPoints, Solid, balls_of, few_balls
 
 TOUCHING_M = 1e-9
@@ -44,10 +43,10 @@ class Hull(NamedTuple):
 
 
 class FclShapes:
-    """Collision shapes of a robot, and obstacles around it.
+    """Collision shapes of a robot and of obstacles in hpp-fcl, see `Shapes`.
 
     Args:
-        robot: The robot; its meshes have to be there.
+        robot: The robot; the files of its collision meshes must exist.
 
     Attributes:
         links: Links that have a collision shape.
@@ -56,7 +55,7 @@ class FclShapes:
         ConfigError: If a mesh cannot be read.
     """
 
-    def __init__(self, robot: GuardedRobot) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
         self._hulls: dict[str | int, list[Hull]] = {}
         for link in robot.links:
@@ -72,28 +71,24 @@ class FclShapes:
         self.place(np.zeros(len(robot.joint_names)))
 
     def place(self, q: np.ndarray) -> None:
-        """Puts the robot into a configuration of n positions [rad or m]."""
+        """See `Shapes`."""
         self._frames = self._robot.frames.at(q[None])[0]
 
     def put(self, number: int, obstacle: Obstacle) -> None:
-        """Puts an obstacle into the place of another one of its number, if there is one.
-
-        Raises:
-            ValueError: If its mesh cannot be read.
-        """
+        """See `Shapes`."""
         pose = matrix_of(*obstacle.pose)
-        self._hulls[number] = [_hull(obstacle.kind, sizes_of(obstacle), obstacle.mesh_file, 0, pose, obstacle.corners)]
+        self._hulls[number] = [_hull(obstacle.kind, obstacle.link_size, obstacle.mesh_file, 0, pose, obstacle.corners)]
 
     def move(self, number: int, pose: Pose) -> None:
-        """Moves an obstacle."""
+        """See `Shapes`."""
         self._hulls[number] = [hull._replace(pose=matrix_of(*pose)) for hull in self._hulls[number]]
 
     def remove(self, number: int) -> None:
-        """Removes an obstacle, if there is one of that number."""
+        """See `Shapes`."""
         self._hulls.pop(number, None)
 
     def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
-        """Returns where shapes of a link are nearest to those of another one or an obstacle, up to a distance [m]."""
+        """See `Shapes`."""
         found = []
         placed = [(hull.shape, transform(self._frames[hull.frame] @ hull.pose)) for hull in self._hulls[other]]
         for hull in self._hulls[link]:
@@ -110,22 +105,22 @@ class FclShapes:
         return found
 
     def solids_of(self, link: str) -> list[Solid]:
-        """Returns the shapes of a link in its frame."""
+        """See `Shapes`."""
         inverse = np.linalg.inv(self._robot.frames.place(link)[1])
         return [hull.solid.moved(0, inverse @ hull.pose) for hull in self._hulls[link]]
 
     def solids_of_obstacle(self, number: int) -> list[Solid]:
-        """Returns the shape of an obstacle in its frame."""
+        """See `Shapes`."""
         return [hull.solid for hull in self._hulls[number]]
 
     def radius_m(self, link: str, origin: np.ndarray) -> float:
-        """Returns the largest distance of its shapes from a point in the root [m], as the robot stands."""
+        """See `Shapes`."""
         placed = [hull.solid.moved(0, self._frames[hull.frame] @ hull.pose).balls for hull in self._hulls[link]]
         return max(float((np.linalg.norm(balls[:, :3] - origin, axis=1) + balls[:, 3]).max()) for balls in placed)
 
 
 def _hull(
-    kind: Kind, size: tuple[float, ...], file: str, frame: int, pose: np.ndarray, corners: Sequence[Vector] = ()
+    kind: ObstacleKind, size: tuple[float, ...], file: str, frame: int, pose: np.ndarray, corners: Sequence[Vector] = ()
 ) -> Hull:
     if kind in ("mesh", "points"):
         shape, points = _convex(tuple(corners) if kind == "points" else mesh_corners(file, size))
@@ -136,8 +131,8 @@ def _hull(
     return Hull(frame, pose, primitive(kind, size), Solid(0, balls_of(kind, size)))
 
 
-def primitive(kind: Kind, size: tuple[float, ...]) -> Any:
-    """Returns a box, sphere, cylinder or capsule in hpp-fcl, with sizes as those of a `CollisionShape`."""
+def primitive(kind: ObstacleKind, size: tuple[float, ...]) -> Any:
+    """Returns a box, sphere, cylinder or capsule in hpp-fcl, with the size of a `CollisionShape`."""
     if kind == "box":
         return hppfcl.Box(*size)
     if kind == "sphere":
@@ -145,15 +140,8 @@ def primitive(kind: Kind, size: tuple[float, ...]) -> Any:
     return (hppfcl.Cylinder if kind == "cylinder" else hppfcl.Capsule)(size[1], size[0])
 
 
-def sizes_of(obstacle: Obstacle) -> tuple[float, ...]:
-    """Returns the sizes of an obstacle as those of a `CollisionShape`."""
-    x, y, z = obstacle.size
-    round_ones = {"sphere": (max(x, y, z) / 2.0,), "cylinder": (z, max(x, y) / 2.0), "capsule": (z, max(x, y) / 2.0)}
-    return round_ones.get(obstacle.kind, obstacle.size)
-
-
 def transform(pose: np.ndarray) -> Any:
-    """Returns a pose, 4 x 4, as hpp-fcl has it."""
+    """Returns a pose, 4 x 4, for hpp-fcl."""
     return hppfcl.Transform3f(pose[:3, :3], pose[:3, 3])
 
 

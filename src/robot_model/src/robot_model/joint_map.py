@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .urdf.elements import Mimic
+from robot_model.urdf.elements import Mimic
 
 Array = NDArray[np.float64]
 

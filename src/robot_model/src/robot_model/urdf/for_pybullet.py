@@ -1,38 +1,27 @@
-"""Changed copies of a URDF for PyBullet and for ROS."""
+"""Changed copies of a URDF that PyBullet can load, without PyBullet itself."""
 
-import copy
 import logging
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
-from custom_ros_tools.transforms import rpy_of
-from robot_model.geometry import Pose
-from robot_model.urdf.document import UrdfDocument
-from robot_model.urdf.elements import (
-    READ,
-    Element,
-    UrdfJoint,
-    as_read,
-    end_of,
-    inertial,
-    joint_element,
-    new_element,
-    text_of,
-)
-from robot_model.urdf.files import beside_or_above, found_by_ros, found_mesh
-from rpbi.meshes.copies import with_textures_that_exist
+
+from .document import UrdfDocument
+from .elements import READ, Element, UrdfJoint, as_read, end_of, inertial, joint_element, new_element
+from .files import beside_or_above, found_mesh
 
 log = logging.getLogger(__name__)
 
 WORLD_LINK = "world"
 """Name of the link that PyBullet treats as the world: without inertia it has no mass, and as a root it is fixed."""
+LEAST_KG = "1e-06"
+"""Mass of a floating root without inertia and shape [kg]: PyBullet would fix a massless root to the world."""
 Files = tuple[tuple[tuple[str, str], str], ...]
-"""Absolute names of files by the tag and the `filename` of the elements that name them."""
+"""Absolute path of each file, with the tag and the `filename` of the elements that name it."""
 
 
 def files_of(document: UrdfDocument) -> Files:
-    """Returns the files that PyBullet reads beside a URDF; textures that are no ordinary files are left out.
+    """Returns the meshes and textures that PyBullet reads with a URDF; textures that do not exist are left out.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
@@ -64,9 +53,9 @@ def _named_files(document: UrdfDocument) -> tuple[tuple[str, str], ...]:
 
 
 def for_pybullet(document: UrdfDocument, files: Files) -> Element:
-    """Returns what PyBullet, which does not resolve ROS packages, reads of a URDF, with the file names of `files_of`.
+    """Returns the elements of a URDF that PyBullet reads, with the paths of `files_of`.
 
-    The result depends on the arguments alone.
+    PyBullet itself does not resolve names of ROS packages. The result depends on the arguments alone.
     """
     robot, known = as_read(document.root), dict(files)
     for parent in list(robot.iter()):
@@ -77,59 +66,6 @@ def for_pybullet(document: UrdfDocument, files: Files) -> Element:
             else:
                 element.set("filename", file)
     return robot
-
-
-def description_for_ros(path: str) -> str:
-    """Returns the text of a URDF file for ROS, which does not have its path.
-
-    Returns:
-        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay. Meshes whose textures
-        are missing are copies without them.
-
-    Raises:
-        ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
-    """
-    return text_of(_for_ros(UrdfDocument(path)))
-
-
-def joined_for_ros(robots: Mapping[str, tuple[str, Pose]]) -> str:
-    """Returns the text of one URDF of several robots, which are fixed to a root link `world`.
-
-    Args:
-        robots: File and pose of the root by name of the robot; names of links and joints get `NAME_` before them.
-
-    Raises:
-        ConfigError: If a file is no URDF, or a mesh belongs to an unknown package.
-    """
-    whole = new_element("robot", new_element("link", name=WORLD_LINK), name="_".join(robots))
-    for name, (path, pose) in robots.items():
-        document = UrdfDocument(path)
-        robot = _for_ros(document)
-        named = [(part, "name") for tag in ("link", "joint") for part in robot.findall(tag)]
-        named += [(part, "link") for end in ("parent", "child") for part in robot.iterfind(f"joint/{end}")]
-        named += [(part, "joint") for part in robot.iterfind("joint/mimic")]
-        for part, key in named:
-            part.set(key, f"{name}_{part.get(key)}")
-        x, y, z = rpy_of(pose.quat_xyzw).tolist()
-        mount = UrdfJoint(
-            f"{name}_base", "fixed", WORLD_LINK, f"{name}_{document.root_link()}", pose.position, (x, y, z)
-        )
-        whole.append(joint_element(mount))
-        whole.extend(part for part in robot if part.tag in ("link", "joint", "material"))
-    return text_of(whole)
-
-
-def _for_ros(document: UrdfDocument) -> Element:
-    robot = copy.deepcopy(document.root)
-    for tag in ("mesh", "texture"):
-        for element in robot.iterfind(f".//{tag}[@filename]"):
-            found = found_by_ros(element.get("filename", ""), document.source)
-            element.set("filename", found if isinstance(found, str) else f"file://{with_textures_that_exist(found)}")
-    return robot
-
-
-LEAST_KG = "1e-06"
-"""Mass of a floating root that is a mere frame [kg]: PyBullet would fix one without mass to the world."""
 
 
 def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
@@ -150,11 +86,11 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
 
 
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
-    """Returns the masses [kg] of links that are mere frames, to which PyBullet would assign 1 kg each.
+    """Returns the masses [kg] of links without inertia and shape, to which PyBullet would assign 1 kg each.
 
-    A frame is a link without inertia and shape. It has no mass, but PyBullet needs some mass on free bodies: a root
-    that is not fixed weighs `LEAST_KG`, if mass is fixed to it. Left out are frames on a moving joint that moves no
-    mass, and a root that is neither fixed nor has mass fixed to it.
+    Such links, called frames, get no mass. A root that is not fixed gets `LEAST_KG` if another link with mass is fixed
+    to it, since PyBullet needs some mass on free bodies. Two kinds of frames keep the 1 kg: those on a moving joint
+    that moves no other mass, and a root that is neither fixed nor has mass fixed to it.
 
     Args:
         is_fixed: Whether the base is fixed to the world.
@@ -163,7 +99,7 @@ def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
     if not frames:
         return {}
     above = {edge.child: edge for edge in document.edges}
-    # Mass that moves with a link, and that is fixed to it
+    # Links with which mass moves, and links to which mass is fixed
     carries, holds = (set(document.links) - document.frames - document.massless for _ in range(2))
     for link in reversed(_from_the_root(document)):
         edge = above.get(link)
@@ -181,7 +117,7 @@ def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
 
 
 def _from_the_root(document: UrdfDocument) -> list[str]:
-    """Returns all links, each one after that on which it hangs."""
+    """Returns all links, each after its parent."""
     below: dict[str, list[str]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge.child)
@@ -213,7 +149,7 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
 
 
 def put_root_first(robot: Element) -> None:
-    """Puts the root link of a robot before all others: PyBullet dies of others with URDF_MAINTAIN_LINK_ORDER."""
+    """Puts the root link of a robot before all others: else PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
     children = {end_of(joint, "child") for joint in robot.findall("joint")}
     for root in [link for link in robot.findall("link") if link.get("name") not in children]:
         robot.remove(root)
@@ -221,10 +157,9 @@ def put_root_first(robot: Element) -> None:
 
 
 def put_first_visuals_last(robot: Element) -> None:
-    """Puts the first visual of each link of a robot at its end.
+    """Moves the first visual of each link of a robot to the link's end.
 
-    PyBullet's window draws a whole link in the colour of its last visual; the first one is the link's main one, as
-    a rule.
+    PyBullet's window draws a whole link in the colour of its last visual; the first one is usually the main one.
     """
     for link in robot.findall("link"):
         if len(visuals := link.findall("visual")) > 1:

@@ -1,4 +1,4 @@
-"""Exact shapes: meshes as their triangles, by hpp-fcl, in place of convex hulls."""
+"""Distances between exact shapes by hpp-fcl: meshes are their triangles instead of convex hulls."""
 
 import math
 from collections.abc import Sequence
@@ -11,23 +11,22 @@ from scipy.sparse.csgraph import connected_components
 
 from custom_ros_tools.errors import MissingDependency
 from robot_model.geometry import ZERO, Vector, minus, scaled
-from robot_model.urdf.shapes import CollisionShape
 
 try:
     import hppfcl
 except ImportError:
     raise MissingDependency("hpp-fcl", "./rpbi setup ik") from None
 
-from .fcl import load_mesh, primitive, sizes_of, transform
-from .obstacles import Kind, Obstacle
+from .fcl import load_mesh, primitive, transform
+from .shapes import CollisionShape, Obstacle, ObstacleKind
 from .solids import ClosestPoints, Solid, extent_of
 
 TOUCHING_M = 1e-5
-"""Distance below which there is no direction [m]: convex hulls decide."""
+"""Distance up to which shapes count as penetrating [m], since nearer points have no direction."""
 OUT_OF_PLACE_M = 0.015
-"""Boxes around a link's exact shapes and around its hulls differ by less [m]."""
+"""Largest difference between the boxes around a link's exact shapes and around its hulls [m]."""
 SAME_M = 1e-7
-"""Corners that are nearer to each other are one [m]."""
+"""Corners of a mesh that are nearer to each other count as one [m]."""
 
 
 class Surface(NamedTuple):
@@ -35,7 +34,7 @@ class Surface(NamedTuple):
 
     Attributes:
         triangles: t x 3 x 3 [m].
-        points: A corner of each part that is not tied to the others, p x 3 [m].
+        points: A corner of each connected part, p x 3 [m].
         lower: Least x, y and z [m].
         upper: Greatest x, y and z [m].
     """
@@ -46,16 +45,17 @@ class Surface(NamedTuple):
     upper: np.ndarray
 
     def holds(self, points: np.ndarray) -> bool:
-        """Returns whether one of k points, k x 3, is inside: whether the triangles, seen from there, are all around.
+        """Returns whether one of k points, k x 3, is inside the mesh.
 
-        By the solid angles of the triangles, after Van Oosterom and Strackee (1983).
+        A point is inside if the solid angles of the triangles, by Van Oosterom and Strackee (1983), sum up to that of
+        the whole sphere.
         """
         for point in points[((points >= self.lower) & (points <= self.upper)).all(axis=1)]:
             a, b, c = (self.triangles - point).transpose(1, 0, 2)
             u, v, w = (np.linalg.norm(each, axis=1) for each in (a, b, c))
             volume = (a * np.cross(b, c)).sum(axis=1)
             rest = u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
-            if not abs(np.arctan2(volume, rest).sum()) < math.pi:  # half of all around
+            if not abs(np.arctan2(volume, rest).sum()) < math.pi:  # 2 pi inside, 0 outside
                 return True
         return False
 
@@ -64,9 +64,9 @@ class Piece(NamedTuple):
     """An exact shape that moves with a frame.
 
     Attributes:
-        frame: The frame that it moves with, see `LinkFrames`.
-        pose: Where it is in that frame, 4 x 4.
-        shape: What hpp-fcl has of it.
+        frame: Number of the frame, see `LinkFrames`.
+        pose: Its pose in that frame, 4 x 4.
+        shape: The shape in hpp-fcl.
         surface: Its triangles, None if it is no mesh.
     """
 
@@ -76,7 +76,7 @@ class Piece(NamedTuple):
     surface: Surface | None = None
 
     def moved(self, frame: int, pose: np.ndarray) -> "Piece":
-        """Returns it in another frame, in which its own one has a pose, 4 x 4."""
+        """Returns it in another frame, in which its present frame has a pose, 4 x 4."""
         return self._replace(frame=frame, pose=pose @ self.pose)
 
 
@@ -88,19 +88,19 @@ def pieces_of_link(shapes: Sequence[CollisionShape], solids: Sequence[Solid]) ->
         solids: Its hulls, in the same frame.
 
     Raises:
-        ValueError: If a mesh cannot be read, or is not where its hull is.
+        ValueError: If a mesh cannot be read, or its extent is not that of its hull.
     """
     return _placed([_piece(each.kind, each.size, each.mesh_file, each.pose) for each in shapes], solids)
 
 
 def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
-    """Returns an obstacle in its own frame, see `pieces_of_link`; none if it is no more than its hull."""
+    """Returns an obstacle in its own frame, see `pieces_of_link`; none if it equals its hull anyway."""
     if obstacle.kind in ("plane", "points"):
         return []
-    return _placed([_piece(obstacle.kind, sizes_of(obstacle), obstacle.mesh_file, np.eye(4))], solids)
+    return _placed([_piece(obstacle.kind, obstacle.link_size, obstacle.mesh_file, np.eye(4))], solids)
 
 
-def _piece(kind: Kind, size: tuple[float, ...], file: str, pose: np.ndarray) -> Piece:
+def _piece(kind: ObstacleKind, size: tuple[float, ...], file: str, pose: np.ndarray) -> Piece:
     return Piece(0, pose, *_mesh(file, size)) if kind == "mesh" else Piece(0, pose, primitive(kind, size))
 
 
@@ -114,13 +114,13 @@ def _placed(pieces: list[Piece], solids: Sequence[Solid]) -> list[Piece]:
 def nearest(
     firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float
 ) -> ClosestPoints | None:
-    """Returns how far two things are apart, inf if that is more than a distance; None if they are in each other.
+    """Returns the closest points of two groups of shapes; None if they penetrate.
 
     Args:
-        firsts: The shapes of one.
-        seconds: The shapes of the other.
+        firsts: Shapes of one group.
+        seconds: Shapes of the other.
         frames: m frames, m x 4 x 4.
-        within_m: The distance [m].
+        within_m: Largest distance that is measured [m]; it is inf beyond it.
     """
     found = ClosestPoints(math.inf, ZERO, ZERO, ZERO)
     request = hppfcl.CollisionRequest()
@@ -146,8 +146,11 @@ def nearest(
 
 
 def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
-    """Returns whether a part of a piece, which has a pose in another one and does not touch it, is inside of it."""
-    if other.surface is None:  # such shapes are solid
+    """Returns whether a connected part of a piece is inside another piece, in which it has a pose.
+
+    The surfaces of both do not touch.
+    """
+    if other.surface is None:  # hpp-fcl itself finds what is inside of such a shape
         return False
     points = np.zeros((1, 3)) if piece.surface is None else piece.surface.points
     return other.surface.holds(points @ pose[:3, :3].T + pose[:3, 3])
@@ -155,7 +158,7 @@ def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
 
 @lru_cache(maxsize=64)
 def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
-    """Returns a mesh, and its triangles.
+    """Returns a mesh in hpp-fcl, and its triangles.
 
     Raises:
         ValueError: If it cannot be read.
@@ -179,7 +182,7 @@ def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
 
 
 def _corners(piece: Piece) -> Solid:
-    """Returns the box around a shape that is no mesh, or the corners of a mesh."""
+    """Returns the corners of a mesh, or of the box around any other shape."""
     if piece.surface is None:
         piece.shape.computeLocalAABB()
         low, high = piece.shape.aabb_local.min_, piece.shape.aabb_local.max_

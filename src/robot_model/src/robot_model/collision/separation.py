@@ -1,4 +1,4 @@
-"""Lower bounds of distances: the gap between two parallel separating planes."""
+"""Lower bounds of distances: the gaps between parallel planes that separate shapes."""
 
 from collections.abc import Sequence
 
@@ -11,14 +11,14 @@ ROUNDING_M = 1e-4
 
 
 class Separation:
-    """Bounds the distances of p pairs from below, without measuring them.
+    """Lower bounds of the distances of p pairs, without measuring them.
 
-    The distance of two convex shapes is at least their gap along any direction, and it is just that along the line on
-    which they are nearest. So for each two shapes of a pair one direction is remembered, in the frame of the second
-    thing. As long as there is none, the bound is -inf.
+    A pair is two links, or a link and an obstacle. The distance of two convex shapes is at least their gap along any
+    direction, and equal to it along the line between their closest points. So one direction is stored for each two
+    shapes of a pair, in the frame of the second. Without a direction, the bound is -inf.
 
     Args:
-        pairs: The shapes of both things of each pair.
+        pairs: The shapes of both members of each pair.
     """
 
     def __init__(self, pairs: Sequence[tuple[Sequence[Solid], Sequence[Solid]]]) -> None:
@@ -32,12 +32,12 @@ class Separation:
         frames = np.array([(first.frame, second.frame) for first, second in both], int).reshape(-1, 2)
         self._first_frame, self._second_frame = frames.T.copy()
         self._direction = np.zeros((len(both), 3))
-        self._edge = np.full(len(both), np.inf)  # how far the second shape goes along its direction
+        self._edge = np.full(len(both), np.inf)  # extent of the second shape along its direction
         for i, (_, seconds) in enumerate(pairs):
             self.replace(i, seconds)
 
     def replace(self, i: int, seconds: Sequence[Solid]) -> None:
-        """Puts as many other shapes into the place of the second thing of a pair."""
+        """Replaces the shapes of the second member of a pair by as many others."""
         rows = self._rows[i]
         for row, solid in zip(rows.tolist(), list(seconds) * (len(rows) // len(seconds))):
             more = len(solid.balls) - self._second.shape[1]
@@ -50,21 +50,21 @@ class Separation:
                 self._edge[row] = (self._second[row] @ (*self._direction[row], 1.0)).max()
 
     def learn(self, i: int, directions: Sequence[Sequence[float]], frames: np.ndarray) -> None:
-        """Takes directions for a pair, for each two shapes that which puts them furthest apart.
+        """Stores directions for a pair: for each two shapes, the one with the largest gap.
 
         Args:
             i: Number of the pair.
-            directions: Unit vectors on lines on which its shapes are near each other, either way, in the root.
+            directions: Unit vectors on lines between closest points, in either sense, in the root link.
             frames: m frames, m x 4 x 4.
         """
         rows = self._rows[i]
         first, second = frames[self._first_frame[rows[0]]], frames[self._second_frame[rows[0]]]
-        ways = np.array(directions)
-        ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
-        at_first, at_second = ways @ first[:3, :3], ways @ second[:3, :3]
+        units = np.array(directions)
+        units /= np.sqrt((units * units).sum(axis=1))[:, None]
+        at_first, at_second = units @ first[:3, :3], units @ second[:3, :3]
         low, high = _extent(self._first[rows], at_first)
         low_other, high_other = _extent(self._second[rows], at_second)
-        shift = ways @ (first[:3, 3] - second[:3, 3])
+        shift = units @ (first[:3, 3] - second[:3, 3])
         gaps = np.concatenate((low + shift - high_other, low_other - shift - high), axis=1)
         best = np.where(np.isnan(gaps), -np.inf, gaps).argmax(axis=1)
         self._direction[rows] = np.concatenate((at_second, -at_second))[best]
@@ -81,11 +81,11 @@ class Separation:
         is_asked[which] = True
         rows = np.flatnonzero(is_asked[self._pair])
         first, second = frames.take(self._first_frame[rows], axis=1), frames.take(self._second_frame[rows], axis=1)
-        way = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[rows])
+        direction = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[rows])
         local = np.full((len(rows), len(frames), 4), -1.0)
-        local[..., :3] = np.einsum("kpij,kpi->pkj", first[..., :3, :3], way)
+        local[..., :3] = np.einsum("kpij,kpi->pkj", first[..., :3, :3], direction)
         nearest = (local @ self._first[rows].transpose(0, 2, 1)).min(axis=2).T  # of the first shape along the direction
-        shift = np.einsum("kpi,kpi->kp", way, first[..., :3, 3] - second[..., :3, 3])
+        shift = np.einsum("kpi,kpi->kp", direction, first[..., :3, 3] - second[..., :3, 3])
         gaps = nearest + shift - (self._edge[rows] + ROUNDING_M)
         starts = np.cumsum(self._counts[which]) - self._counts[which]
         bounds: np.ndarray = np.minimum.reduceat(gaps, starts, axis=1)
@@ -93,13 +93,13 @@ class Separation:
 
 
 def _balls(solids: Sequence[Solid], size: int = 1) -> np.ndarray:
-    """Returns the balls of p solids, as many of each: p x v x 4."""
+    """Returns the balls of p solids as one array, p x v x 4; the last ball of smaller solids is repeated."""
     size = max([size, *(len(solid.balls) for solid in solids)])
     balls = [np.pad(solid.balls, ((0, size - len(solid.balls)), (0, 0)), "edge") for solid in solids]
     return np.array(balls).reshape(-1, size, 4)
 
 
-def _extent(balls: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns from where to where p x v balls go along d unit vectors, each p x d."""
-    along, radius = balls[:, :, :3] @ ways.T, balls[:, :, 3:]
+def _extent(balls: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns least and greatest coordinates of p x v balls along d unit vectors, each p x d."""
+    along, radius = balls[:, :, :3] @ directions.T, balls[:, :, 3:]
     return (along - radius).min(axis=1), (along + radius).max(axis=1)

@@ -1,4 +1,4 @@
-"""A few balls whose convex hull contains a collision shape."""
+"""Convex hulls of a few balls that contain collision shapes."""
 
 import math
 from collections.abc import Sequence
@@ -26,9 +26,9 @@ class ClosestPoints(NamedTuple):
 
     Attributes:
         distance: Distance between the surfaces; negative if they penetrate [m].
-        direction: Unit vector from one to the other, either way, in the robot's root.
-        first: The point of one of them, in the root [m].
-        second: The point of the other, in the root [m].
+        direction: Unit vector from one to the other, in either sense, in the robot's root link.
+        first: The point of one of them, in the root link [m].
+        second: The point of the other, in the root link [m].
     """
 
     distance: float
@@ -41,9 +41,9 @@ class Solid(NamedTuple):
     """A convex shape that moves with a frame.
 
     Attributes:
-        frame: The frame that it moves with, see `LinkFrames`.
-        balls: v x 4: x, y and z in that frame, and a radius [m]. The convex hull of the balls holds the shape.
-        normal: Of a half-space that ends at the first ball, the way out of it; None for everything else.
+        frame: Number of the frame, see `LinkFrames`.
+        balls: v x 4: x, y and z in that frame, and a radius [m]. The convex hull of the balls contains the shape.
+        normal: Outward normal of a half-space, whose boundary passes through the first ball; None for other shapes.
     """
 
     frame: int
@@ -52,12 +52,12 @@ class Solid(NamedTuple):
 
     @property
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest x, y and z [m]; inf and -inf of nothing."""
+        """Least and greatest x, y and z [m]; inf and -inf without balls."""
         places, radius = self.balls[:, :3], self.balls[:, 3:]
         return (places - radius).min(axis=0, initial=np.inf), (places + radius).max(axis=0, initial=-np.inf)
 
     def moved(self, frame: int, pose: np.ndarray) -> "Solid":
-        """Returns it in another frame, in which its own one has a pose, 4 x 4."""
+        """Returns it in another frame, in which its present frame has a pose, 4 x 4."""
         turn, shift = pose[:3, :3], pose[:3, 3]
         balls = np.column_stack((self.balls[:, :3] @ turn.T + shift, self.balls[:, 3]))
         return Solid(frame, balls, None if self.normal is None else turn @ self.normal)
@@ -73,7 +73,7 @@ def extent_of(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
-    """Returns a box by its least and greatest x, y and z [m]; NaN if there is none between them."""
+    """Returns the box between least and greatest x, y and z [m]; a ball of NaN if least ones exceed greatest ones."""
     if (lower > upper).any():
         return Solid(0, np.full((1, 4), np.nan))
     corners = (lower + upper) / 2.0 + CUBE * (upper - lower) / 2.0
@@ -81,7 +81,7 @@ def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
 
 
 def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
-    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one."""
+    """Returns balls of a box, sphere, capsule or cylinder, v x 4; no balls of any other kind."""
     if kind == "box":
         half = np.array(size) / 2.0
         return box_of(-half, half).balls
@@ -98,16 +98,16 @@ def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
 
 
 def few_balls(points: Sequence[Vector]) -> np.ndarray:
-    """Returns balls around some of the corners of a mesh, v x 4, whose hull holds that of the mesh.
+    """Returns balls around some of the corners of a mesh, v x 4, whose hull contains the mesh.
 
-    The one that is furthest from all lines between those that are kept is kept next.
+    Corners are added one after the other: always the one that is furthest from all lines between those so far.
     """
     if not points:
         return np.empty((0, 4))
     corners = np.array(points)
     try:
         corners = corners[ConvexHull(corners).vertices]
-    except QhullError:  # a flat one
+    except QhullError:  # a flat mesh
         corners = np.unique(corners, axis=0)
     kept = [int(np.argmax(np.linalg.norm(corners - corners.mean(axis=0), axis=1)))]
     away = np.linalg.norm(corners - corners[kept[0]], axis=1)
@@ -120,7 +120,7 @@ def few_balls(points: Sequence[Vector]) -> np.ndarray:
 
 
 def _from_line(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Returns how far v points are from a line between two others."""
+    """Returns the distances of v points from the line segment between two others."""
     way = end - start
     share = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
     distance: np.ndarray = np.linalg.norm(points - start - share[:, None] * way, axis=1)

@@ -1,30 +1,30 @@
-"""Bodies of a world of the simulator as obstacles."""
+"""Bodies of a world of the simulator as obstacles of a guard."""
 
 from collections.abc import Iterator, Set
 
 import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import turned_to
 from rpbi.world import World
 
 from .bullet import NO_FILE, OF_PYBULLET
-from .obstacles import Obstacle
 
 
 def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) -> tuple[Obstacle, ...]:
-    """Returns the collision shapes of a world, where they are at its start, in the root of one of its robots.
+    """Returns the collision shapes of a world at its start, relative to the root link of one of its robots.
 
     Args:
         path: The main YAML file of the world.
         joints: Names of the joints of the guarded robot.
-        robot: Its name in the world, where it is left out. Without it, it is the only body of the world that has these
-            joints; if there is none, the world's origin is the robot's root.
+        robot: Name of the guarded robot in the world; its own shapes are left out. By default, it is the only body of
+            the world that has these joints; if there is none, its root link is at the world's origin.
 
     Raises:
-        ConfigError: If the world cannot be loaded, has no such robot, or a shape that cannot be taken.
+        ConfigError: If the world cannot be loaded, has no such robot, or a shape that no obstacle can have.
     """
     world = World.from_file(path, connection_mode=pybullet.DIRECT)
     try:

@@ -1,4 +1,4 @@
-"""Distances between collision shapes by PyBullet, in a client of its own; shapes of meshes are their convex hulls."""
+"""Distances between collision shapes by PyBullet, in a client of its own; meshes are replaced by their convex hulls."""
 
 import math
 import weakref
@@ -8,16 +8,15 @@ import numpy as np
 import pybullet
 
 from custom_ros_tools.transforms import matrix_of
+from robot_model.collision.shapes import Obstacle, ObstacleKind
+from robot_model.collision.solids import ClosestPoints, Solid, balls_of, box_of, few_balls
 from robot_model.geometry import Pose
+from robot_model.model import RobotModel
 from rpbi.engine.client import Client
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
-from safe_robot.robot import GuardedRobot
 
-from .obstacles import Kind, Obstacle
-from .solids import ClosestPoints, Solid, balls_of, box_of, few_balls
-
-OF_PYBULLET: dict[int, Kind] = {
+OF_PYBULLET: dict[int, ObstacleKind] = {
     pybullet.GEOM_BOX: "box",
     pybullet.GEOM_SPHERE: "sphere",
     pybullet.GEOM_CYLINDER: "cylinder",
@@ -28,18 +27,18 @@ OF_PYBULLET: dict[int, Kind] = {
 NO_FILE = ("", "unknown_file")
 """Names that PyBullet reports for a mesh without a file."""
 EDGE_M = (math.sqrt(3.0) - 1.0) * 1e-3
-"""Largest distance of the corners of boxes from those that PyBullet rounds, with a radius of 1 mm [m]."""
+"""Largest distance of a box's corner from its rounded corner in PyBullet, of radius 1 mm [m]."""
 EDGED = (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER)
-"""Shapes whose edges and corners it rounds."""
+"""Shapes whose edges and corners PyBullet rounds."""
 AABB_MARGIN_M = 6e-3
 """Largest excess of PyBullet's boxes around shapes [m]."""
 
 
 class BulletShapes:
-    """Collision shapes of a robot, and obstacles around it.
+    """Collision shapes of a robot and of obstacles in PyBullet, see `Shapes`.
 
     Args:
-        robot: The robot; its meshes have to be there.
+        robot: The robot; the files of its meshes must exist.
 
     Attributes:
         links: Links that have a collision shape.
@@ -48,7 +47,7 @@ class BulletShapes:
         ConfigError: If the robot cannot be loaded.
     """
 
-    def __init__(self, robot: GuardedRobot) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self._pb = Client(pybullet.DIRECT)
         weakref.finalize(self, self._pb.disconnect)
         self._body = load_urdf(self._pb, robot.urdf_path, {"fileName": robot.urdf_path, "useFixedBase": True})
@@ -64,30 +63,26 @@ class BulletShapes:
         self._missing_of_obstacle: dict[int, float] = {}
 
     def place(self, q: np.ndarray) -> None:
-        """Puts the robot into a configuration of n positions [rad or m]."""
+        """See `Shapes`."""
         self._pb.resetJointStatesMultiDof(self._body, self._moving, self._to_moving(q)[:, None].tolist())
 
     def put(self, number: int, obstacle: Obstacle) -> None:
-        """Puts an obstacle into the place of another one of its number, if there is one.
-
-        Raises:
-            ValueError: If PyBullet cannot have it.
-        """
+        """See `Shapes`."""
         self.remove(number)
         body = self._obstacles[number] = _add(self._pb, obstacle)
         self._missing_of_obstacle[number] = _missing_m(self._pb, body, -1)
 
     def move(self, number: int, pose: Pose) -> None:
-        """Moves an obstacle."""
+        """See `Shapes`."""
         self._pb.resetBasePositionAndOrientation(self._obstacles[number], *pose)
 
     def remove(self, number: int) -> None:
-        """Removes an obstacle, if there is one of that number."""
+        """See `Shapes`."""
         if number in self._obstacles:
             self._pb.removeBody(self._obstacles.pop(number))
 
     def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
-        """Returns where shapes of a link are nearest to those of another one or an obstacle, up to a distance [m]."""
+        """See `Shapes`."""
         if isinstance(other, str):
             body, index, missing_m = self._body, self._index[other], self._missing_m[other]
         else:
@@ -97,26 +92,26 @@ class BulletShapes:
         return [ClosestPoints(point[8] - missing_m, point[7], point[5], point[6]) for point in points]
 
     def solids_of(self, link: str) -> list[Solid]:
-        """Returns the shapes of a link in its frame, larger by what PyBullet measures too far."""
+        """See `Shapes`."""
         index = self._index[link]
         mass = matrix_of(*self._pb.getDynamicsInfo(self._body, index)[3:5])
         return [solid.moved(0, mass) for solid in _solids_of_link(self._pb, self._body, index)]
 
     def solids_of_obstacle(self, number: int) -> list[Solid]:
-        """Returns the shape of an obstacle in its frame."""
+        """See `Shapes`."""
         return _solids_of_link(self._pb, self._obstacles[number], -1)
 
     def radius_m(self, link: str, origin: np.ndarray) -> float:
-        """Returns the largest distance of its shapes from a point in the root [m], as the robot stands."""
+        """See `Shapes`."""
         lower, upper = self._pb.getAABB(self._body, self._index[link])
         return math.hypot(*np.maximum(np.subtract(upper, origin), np.subtract(origin, lower)))
 
 
 def _add(pb: Client, obstacle: Obstacle) -> int:
-    """Adds an obstacle, and returns PyBullet's number of it.
+    """Adds an obstacle, and returns PyBullet's id of it.
 
     Raises:
-        ValueError: If PyBullet refuses.
+        ValueError: If PyBullet cannot represent it.
     """
     x, y, z = obstacle.size
     options: dict[str, dict[str, Any]] = {
@@ -144,15 +139,16 @@ def _solids_of_link(pb: Client, body: int, link: int) -> list[Solid]:
 
 
 def _missing_m(pb: Client, body: int, link: int) -> float:
-    """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
+    """Returns how much too large PyBullet's distances from a link may be, since it rounds edges [m]."""
     return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
 
 
 def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the shapes as they are.
+    """Returns the collision shapes of a link, in the frame of its centre of mass, in their true size.
 
-    If PyBullet does not tell the corners of each, the link counts as the box around it, as it lies now. So it does if
-    some shapes are meshes of files and others are not, or lie askew to each other.
+    If PyBullet does not report the corners of all shapes, the result is the axis-aligned box around the link in its
+    present pose. This is also the case if only some of the shapes are meshes from files, or if meshes are rotated
+    relative to each other.
     """
     shapes = pb.getCollisionShapeData(body, link)
     if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):
@@ -167,14 +163,12 @@ def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
                 solids.append(Solid(0, few_balls(pb.getMeshData(body, link, collisionShapeIndex=i)[1])))
             else:
                 solids.append(Solid(0, balls_of(OF_PYBULLET.get(shape[2], ""), shape[3])).moved(0, place))
-    elif len(shapes_of_files) == len(
-        shapes
-    ):  # PyBullet makes several shapes of each, without a way to distinguish them
+    elif len(shapes_of_files) == len(shapes):  # PyBullet divides each into several shapes, and does not say which
         solids.append(Solid(0, few_balls(pb.getMeshData(body, link)[1])))
     boxes = [box_of(*each.moved(0, np.linalg.inv(place)).extent).moved(0, place) for each, place in zip(solids, places)]
     lower, upper = pb.getAABB(body, link)
     if boxes and all(np.isfinite(box.balls).all() for box in boxes):
-        # PyBullet's box is around the boxes of shapes, too: it is as large, unless there is more than it tells of
+        # PyBullet's box contains those of all shapes: it is larger only if some shapes were not reported
         least, most = box_of(*Solid(0, np.concatenate([box.balls for box in boxes])).extent).moved(0, pose).extent
         if (least - AABB_MARGIN_M <= lower).all() and (most + AABB_MARGIN_M >= upper).all():
             return solids

@@ -1,0 +1,92 @@
+"""Cache of files that are made from meshes, by a hash of the meshes, in the user's cache folder."""
+
+import errno
+import hashlib
+import io
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import shortened
+
+MAX_FILE_BYTES = 1_000_000_000
+"""Largest length of a file."""
+MAX_FILES = 100
+"""Largest number of files of a mesh, with its materials and textures."""
+
+
+def cache_folder() -> Path:
+    """Returns the user's cache folder for meshes, which may not exist yet."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "rpbi" / "meshes"
+
+
+def content_hash(file: str, *parameters: object) -> str:
+    """Returns a hash of all files that PyBullet reads for a mesh, of its version if it is installed, and of parameters.
+
+    Raises:
+        OSError: If one of its files exists, but is no ordinary file, or if it names too many.
+    """
+    digest = hashlib.blake2b(f"{parameters} {_pybullet_version()}".encode(), digest_size=16)
+    waiting, seen = [Path(file)], set()
+    while waiting:
+        path = waiting.pop()
+        if path in seen:
+            continue
+        seen.add(path)
+        if len(seen) > MAX_FILES:
+            raise OSError(errno.EMFILE, f"names more than {MAX_FILES} files")
+        try:
+            data = read_file(path, MAX_FILE_BYTES)
+        except OSError as error:
+            if len(seen) > 1 and os.path.exists(path):  # missing files are ignored
+                raise OSError(error.errno, f"names '{shortened(path.name)}', which {error.strerror}") from None
+            continue
+        digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
+        if path.suffix.lower() in (".obj", ".mtl"):
+            waiting += [path.parent / name for _, name in files_named_in(data)]
+    return digest.hexdigest()
+
+
+def _pybullet_version() -> str:
+    try:
+        return version("pybullet")
+    except PackageNotFoundError:
+        return ""
+
+
+def files_named_in(data: bytes) -> Iterator[tuple[bytes, str]]:
+    """Yields each line of an OBJ file, or of its materials, that names a file, with that name."""
+    for line in io.BytesIO(data):
+        words = line.split(None, 1)
+        if len(words) == 2 and (words[0] == b"mtllib" or words[0].startswith(b"map_")) and b"\0" not in line:
+            yield line, os.fsdecode(words[1].rstrip())
+
+
+def kept(name: str, make: Callable[[Path], None]) -> Path:
+    """Returns a folder of the cache, which is made if it is missing.
+
+    If several processes make it at the same time, the first result is kept.
+
+    Args:
+        name: Its name, with a hash of everything that its content depends on.
+        make: Fills an empty folder.
+
+    Raises:
+        OSError: If the cache cannot be written.
+    """
+    folder = cache_folder() / name
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{name}-") as parent:
+            made = Path(parent) / "made"
+            made.mkdir()
+            make(made)
+            try:
+                made.rename(folder)
+            except OSError:
+                if not folder.is_dir():
+                    raise
+    return folder
