@@ -3,9 +3,9 @@
 
     ./rpbi shell -c 'python3 dev/robustness/mutants/try_mutants.py'
 
-The changes are in guard.yaml in this folder. Each has the `file`, from its package on, the text `before`, which is there
-once, the text `after`, and the `test` that has to fail. The exit status is 1 if a test does not fail, or fails without a
-change.
+The changes are in guard.yaml in this folder. Each has the `file`, which begins with its package, the text `before`,
+which occurs once, the text `after`, and the `test` that has to fail. The exit status is 1 if a test does not fail, or
+fails without a change.
 """
 
 import argparse
