@@ -192,7 +192,7 @@ def run_set_up(case: SetUp, ticks: int = TICKS, passivity: bool = True, is_resol
                 controller.observe_wrench((0.0, 0.0, felt), now_s)
         # the haptic node
         force = controller.tick(now_s, HapticReading(measured(hand.position, case.resolution_m)))
-        there.send(controller.snapshot.way[2], now_s)
+        there.send(controller.snapshot.displacement[2], now_s)
         # the hand, and the energy put into the handle: previous force times displacement
         largest_n = max(largest_n, math.hypot(*force))
         hand.step(wanted(now_s), force, DT_S)

@@ -27,9 +27,9 @@ class TimedHand(ScriptedDevice):
         super().__init__(config)
         self._file, self._times = config.file, array("d")
 
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         """Returns where the hand wants the handle."""
-        return super().wanted(time_s % self._press.duration_s)
+        return super().goal(time_s % self._press.duration_s)
 
     def read(self) -> HapticReading | None:
         """Returns where the handle is."""

@@ -28,14 +28,14 @@ class Rig:
 
     def tick(
         self,
-        wanted: Vector = ZERO,
+        goal: Vector = ZERO,
         wrench: Vector | None = None,
         reading: Callable[[HapticReading], HapticReading] | None = lambda reading: reading,
     ) -> Vector:
         """Goes on by a tick and returns the force.
 
         Args:
-            wanted: Where the hand wants the handle.
+            goal: Position to which the hand pulls the handle.
             wrench: What the simulator says, None if it is silent.
             reading: Changes what the device says; None if it is silent.
         """
@@ -44,5 +44,5 @@ class Rig:
             self.controller.observe_wrench(wrench, self.now_s)
         true = HapticReading(self.hand.position, self.hand.velocity)
         force = self.controller.tick(self.now_s, reading and reading(true))
-        self.hand.step(wanted, force, DT_S)
+        self.hand.step(goal, force, DT_S)
         return force

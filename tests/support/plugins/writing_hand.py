@@ -61,7 +61,7 @@ class WritingHand(EmulatedDevice):
         super().close()
         os.close(self._file)
 
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         return self.config.to
 
     def send(self, force: Vector, expires_s: float) -> None:

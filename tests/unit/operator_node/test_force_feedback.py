@@ -83,7 +83,7 @@ def test_nothing_jumps_at_start_reset_and_return():
         for tick in range(4):
             now_s += DT_S
             rig.controller.tick(now_s, HapticReading(tuple(p + 0.0003 * tick for p in place)))
-            way = rig.controller.snapshot.way
+            way = rig.controller.snapshot.displacement
             assert math.dist(way, last) <= most_m, (case, tick)
             if tick == 0:
                 assert rig.controller.snapshot.deviation == (0.0, 0.0, 0.0)
@@ -102,14 +102,14 @@ def test_clutch_moves_the_tool_only_while_its_button_is_held():
             rig.tick(wanted, reading=reading)
         return rig.controller.snapshot
 
-    assert go((0.02, 0.0, 0.0)).way == (0.0, 0.0, 0.0)
+    assert go((0.02, 0.0, 0.0)).displacement == (0.0, 0.0, 0.0)
     held = 1
-    assert go((0.03, 0.0, 0.0)).way[0] == pytest.approx(0.01, abs=1e-4)
+    assert go((0.03, 0.0, 0.0)).displacement[0] == pytest.approx(0.01, abs=1e-4)
     held = 0
     snapshot = go((-0.05, 0.0, 0.0))
-    assert not snapshot.is_engaged and snapshot.way[0] == pytest.approx(0.01, abs=1e-4)
+    assert not snapshot.is_engaged and snapshot.displacement[0] == pytest.approx(0.01, abs=1e-4)
     held = 1
-    assert go((-0.04, 0.0, 0.0)).way[0] == pytest.approx(0.02, abs=1e-4)
+    assert go((-0.04, 0.0, 0.0)).displacement[0] == pytest.approx(0.02, abs=1e-4)
 
 
 def test_coupling_pulls_towards_a_tool_that_stays_behind():
@@ -126,7 +126,7 @@ def test_axes_are_turned_there_and_back():
     rig = Rig(yaw_deg=90.0, passivity=False, max_target_speed=10.0)
     for _ in range(300):
         rig.tick((0.02, 0.0, 0.0), (0.0, 1.0, 0.0))
-    assert rig.controller.snapshot.way == pytest.approx((0.0, rig.hand.position[0], 0.0), abs=1e-6)
+    assert rig.controller.snapshot.displacement == pytest.approx((0.0, rig.hand.position[0], 0.0), abs=1e-6)
     assert rig.controller.force == pytest.approx((1.0, 0.0, 0.0), abs=1e-3)
 
 
@@ -136,7 +136,7 @@ def test_controller_continues_from_the_displacement_of_its_predecessor():
     controller = HapticController(config, DEVICE, 1.0 / DT_S, way)
     for tick in range(100):
         controller.tick(tick * DT_S, HapticReading((0.01, 0.0, 0.0)))
-    assert controller.snapshot.way == pytest.approx(way)
+    assert controller.snapshot.displacement == pytest.approx(way)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ SILENCE_S = 0.02
 
 def way(report: LoopReport) -> float:
     """Returns how far the target has gone [m], along x."""
-    return report.snapshot.way[0] if report.snapshot else math.nan
+    return report.snapshot.displacement[0] if report.snapshot else math.nan
 
 
 def test_force_ends_within_20_ms_after_the_node_stops_responding(tmp_path):
@@ -72,7 +72,7 @@ def test_killed_loop_is_reported_and_restarts_without_a_jump(tmp_path):
         wait_until(lambda: way(reports[-1]) < 1e-3, "a reset reaches it")
         snapshots = [each.snapshot for each in reports if each.snapshot]
         for one, other in zip(snapshots, snapshots[1:]):
-            assert math.dist(one.way, other.way) <= 0.2 * (other.time_s - one.time_s) + 1e-9
+            assert math.dist(one.displacement, other.displacement) <= 0.2 * (other.time_s - one.time_s) + 1e-9
         client.stop()
         assert not client.report.is_connected and client.report.trouble == "stopped"
     finally:

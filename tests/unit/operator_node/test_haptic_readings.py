@@ -56,7 +56,7 @@ def test_faults_of_devices_are_named(fault, seed):
             return change(true) if tick > begin else true
 
         force = rig.tick(wanted, (0.0, 0.0, 1.0), reading)
-        assert math.isfinite(sum(force) + sum(rig.controller.snapshot.way))
+        assert math.isfinite(sum(force) + sum(rig.controller.snapshot.displacement))
         if tick == begin:
             assert rig.controller.faults == {}, "nothing is the matter yet"
     assert max(rig.controller.faults, key=rig.controller.faults.get) == fault, rig.controller.faults
@@ -77,7 +77,7 @@ def test_a_device_that_stays_elsewhere_is_engaged_there_anew():
     for _ in range(200):
         rig.tick(reading=lambda r: r._replace(position=(0.09, 0.0, 0.0)))
     assert 0 < rig.controller.faults["jump"] < 60
-    assert rig.controller.snapshot.way == (0.0, 0.0, 0.0)
+    assert rig.controller.snapshot.displacement == (0.0, 0.0, 0.0)
 
 
 FULL = json.dumps(HaplyEmulator(lambda time_s: (0.0, 0.0, 0.0))._message(full=True))

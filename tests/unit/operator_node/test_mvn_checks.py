@@ -57,7 +57,7 @@ FAULTS = {
     "left for right": (both(lambda p, q: (p[SWAPPED], q[SWAPPED])), "left and right are swapped"),
     "turned": (after(lambda p, q, first: (p, one(3, (0, 1, 0, 0), q))), "T8 is"),
     "stuck segment": (after(lambda p, q, first: (p, one(HAND, first[1][HAND], q))), "RightHand has not turned at all"),
-    "stuck stream": (after(lambda p, q, first: first), "the same frame has come again"),
+    "stuck stream": (after(lambda p, q, first: first), "the same frame is repeated"),
     "hand jumps": (at_half(lambda p, q: (one(HAND, p[HAND] + (0, 0, 1), p), q)), "RightHand moved by 1.0"),
     "all jumps": (at_half(lambda p, q: (p + (2, 0, 0), q)), "the whole person moved by 2.0"),
     "hand flips": (

@@ -176,7 +176,7 @@ class TestCalibration:
             Calibration().fit(truth(300))
 
     def test_calibration_without_a_person_is_refused(self, mvn):
-        with pytest.raises(InterfaceError, match="nobody is there"):
+        with pytest.raises(InterfaceError, match="no person is present"):
             mvn.receiver.calibrate()
 
     def test_by_the_device(self, mvn, sender, crooked):

@@ -29,7 +29,7 @@ FOOT_LENGTH, FOOT_BREADTH = 0.152, 0.055
 HEEL, BALL = 0.038, 0.073
 """Distances of heel and ball of the foot behind and before the ankle; a quarter and a half of the foot."""
 HIP_HALF_WIDTH = 0.049
-"""Half the distance of the hip joints: 0.72 of that of the iliac spines (Bell), which is some 0.24 m at 1.75 m."""
+"""Half the distance of the hip joints: 0.72 of that of the iliac spines (Bell), which is about 0.24 m at 1.75 m."""
 
 _LOWER, _MIDDLE, _UPPER, _HEAD = 145.7, 215.5, 242.1, 242.9
 """Hip to navel, to lower end of the breastbone, to seventh cervical vertebra, to crown [mm] (de Leva)."""
@@ -145,8 +145,8 @@ def measured_offsets(frame: SegmentFrame) -> Array:
     """Returns these origins as measured by a suit (23 x 3) [m], in any pose of the person."""
     offsets = np.zeros((len(SEGMENTS), 3))
     parents, children = BONES.T
-    ways = frame.positions[children] - frame.positions[parents]
-    offsets[children] = Rotation.from_quat(frame.quats_xyzw[parents]).inv().apply(ways)
+    vectors = frame.positions[children] - frame.positions[parents]
+    offsets[children] = Rotation.from_quat(frame.quats_xyzw[parents]).inv().apply(vectors)
     return offsets
 
 

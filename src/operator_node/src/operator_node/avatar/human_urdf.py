@@ -24,7 +24,7 @@ HELPER_MASS_KG, HELPER_INERTIA = 0.01, 1e-4
 MAX_SPEED = 20.0
 """Largest speed of each hinge [rad/s]."""
 _SKIN, _CLOTHES, _SHOES = "0.87 0.72 0.60 1", "0.25 0.37 0.55 1", "0.20 0.20 0.22 1"
-_SKINNY = ("Neck", "Head", "Hand")
+_BARE = ("Neck", "Head", "Hand")
 _TIPS = {
     "Shoulder": "UpperArm",
     "UpperArm": "ForeArm",
@@ -105,7 +105,7 @@ def _link(name: str, offsets: Array, height_m: float, mass_kg: float, helpers: i
     volume = mass / table.DENSITY[name]
     limb = name.removeprefix("Right").removeprefix("Left")
     own_mass = mass - helpers * HELPER_MASS_KG
-    colour = _SHOES if limb in ("Foot", "Toe") else _SKIN if limb in _SKINNY else _CLOTHES
+    colour = _SHOES if limb in ("Foot", "Toe") else _SKIN if limb in _BARE else _CLOTHES
     yield f'  <link name="{name}">'
     if limb == "Head":
         radius = (volume * 0.75 / math.pi) ** (1.0 / 3.0)
@@ -114,11 +114,11 @@ def _link(name: str, offsets: Array, height_m: float, mass_kg: float, helpers: i
         yield from _inertial(own_mass, centre, 0.4 * own_mass * radius**2 * np.eye(3))
         yield from _shapes(colour, [_sphere(radius, centre)])
     elif limb in _TIPS or limb == "Hand":
-        way = _way(name, limb, offsets, height_m)
-        length = float(np.linalg.norm(way))
+        tip = _tip_of(name, limb, offsets, height_m)
+        length = float(np.linalg.norm(tip))
         radius = math.sqrt(volume / (math.pi * length))
-        yield from _inertial(own_mass, *_limb_inertia(limb, own_mass, way, radius))
-        yield from _shapes(colour, [_cylinder(radius, way), _sphere(radius, np.zeros(3)), _sphere(radius, way)])
+        yield from _inertial(own_mass, *_limb_inertia(limb, own_mass, tip, radius))
+        yield from _shapes(colour, [_cylinder(radius, tip), _sphere(radius, np.zeros(3)), _sphere(radius, tip)])
     else:
         centre, size = _box_of(name, limb, offsets, height_m, volume)
         x, y, z = size**2
@@ -127,7 +127,7 @@ def _link(name: str, offsets: Array, height_m: float, mass_kg: float, helpers: i
     yield "  </link>"
 
 
-def _way(name: str, limb: str, offsets: Array, height_m: float) -> Array:
+def _tip_of(name: str, limb: str, offsets: Array, height_m: float) -> Array:
     """Returns the vector from a limb's origin to its tip [m]; a hand continues the direction of its forearm."""
     if limb == "Hand":
         forearm = offsets[SEGMENTS.index(name)]
@@ -135,16 +135,16 @@ def _way(name: str, limb: str, offsets: Array, height_m: float) -> Array:
     return np.asarray(offsets[SEGMENTS.index(name.removesuffix(limb) + _TIPS[limb])])
 
 
-def _limb_inertia(limb: str, mass: float, way: Array, radius: float) -> tuple[Array, Array]:
+def _limb_inertia(limb: str, mass: float, tip: Array, radius: float) -> tuple[Array, Array]:
     """Returns centre of mass and inertia about it; a limb that is not in the table is a cylinder."""
-    length = float(np.linalg.norm(way))
-    along = np.outer(way, way) / length**2
+    length = float(np.linalg.norm(tip))
+    along = np.outer(tip, tip) / length**2
     if limb in table.GYRATION:
         centre, k_across, k_along = table.GYRATION[limb]
         across_2, along_2 = (k_across * length) ** 2, (k_along * length) ** 2
     else:
         centre, across_2, along_2 = 0.5, radius**2 / 4.0 + length**2 / 12.0, radius**2 / 2.0
-    return centre * way, mass * (along_2 * along + across_2 * (np.eye(3) - along))
+    return centre * tip, mass * (along_2 * along + across_2 * (np.eye(3) - along))
 
 
 def _box_of(name: str, limb: str, offsets: Array, height_m: float, volume: float) -> tuple[Array, Array]:
@@ -184,11 +184,11 @@ def _sphere(radius: float, centre: Array) -> str:
     return f'<origin xyz="{_text(centre)}"/><geometry><sphere radius="{_number(radius)}"/></geometry>'
 
 
-def _cylinder(radius: float, way: Array) -> str:
+def _cylinder(radius: float, tip: Array) -> str:
     """Returns a cylinder from the origin along a vector."""
-    length = float(np.linalg.norm(way))
-    tilt, turn = math.acos(max(-1.0, min(1.0, way[2] / length))), math.atan2(way[1], way[0])
-    origin = f'<origin xyz="{_text(way / 2.0)}" rpy="0 {_number(tilt)} {_number(turn)}"/>'
+    length = float(np.linalg.norm(tip))
+    tilt, turn = math.acos(max(-1.0, min(1.0, tip[2] / length))), math.atan2(tip[1], tip[0])
+    origin = f'<origin xyz="{_text(tip / 2.0)}" rpy="0 {_number(tilt)} {_number(turn)}"/>'
     return f'{origin}<geometry><cylinder radius="{_number(radius)}" length="{_number(length)}"/></geometry>'
 
 

@@ -186,9 +186,9 @@ class Engagement:
         if self._last is None:
             self._last = target
         last, dt = self._last, min(dt, MAX_STEP_S)
-        hinge_step, way = self._joint_speed * dt, target.position - last.position
-        distance = float(np.linalg.norm(way))
-        position = last.position + way * min(1.0, self._speed * dt / max(distance, 1e-12))
+        hinge_step, displacement = self._joint_speed * dt, target.position - last.position
+        distance = float(np.linalg.norm(displacement))
+        position = last.position + displacement * min(1.0, self._speed * dt / max(distance, 1e-12))
         hinges = last.hinges + np.clip(target.hinges - last.hinges, -hinge_step, hinge_step)
         quat = _turned(last.quat_xyzw, target.quat_xyzw, self._angular_speed * dt)
         self._last = AvatarPose(position, quat, hinges)
@@ -198,8 +198,8 @@ class Engagement:
 def _turned(start: Array, end: Array, most_rad: float) -> Array:
     """Returns a quaternion on the shortest path between two, limited to an angle from the first [rad]."""
     first = Rotation.from_quat(start)
-    way = (first.inv() * Rotation.from_quat(end)).as_rotvec()
-    angle = float(np.linalg.norm(way))
+    rotvec = (first.inv() * Rotation.from_quat(end)).as_rotvec()
+    angle = float(np.linalg.norm(rotvec))
     if angle <= most_rad:
         return end
-    return np.asarray((first * Rotation.from_rotvec(way * (most_rad / angle))).as_quat())
+    return np.asarray((first * Rotation.from_rotvec(rotvec * (most_rad / angle))).as_quat())

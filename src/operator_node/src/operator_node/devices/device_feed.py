@@ -139,7 +139,7 @@ class DeviceFeed:
         if reading is not None:
             self._process(reading)
         if self._last is not None and time.monotonic() >= self._repeat_at_s:
-            self._hand_on(self._last)
+            self._emit(self._last)
         if self.held and time.monotonic() >= self._held_warning_due_s:
             self._held_warning_due_s = math.inf
             logger.warning("%s: %s", self._name, held_text(self.held))
@@ -179,7 +179,7 @@ class DeviceFeed:
         self._free_buttons.clear()
         self.held, self._held_warning_due_s = (), time.monotonic() + HELD_S
         self._last = self._buttons = None
-        self._hand_on(self._resting())
+        self._emit(self._resting())
 
     def _lose(self, reason: str) -> None:
         """Closes a device that has gone and publishes a last reading at rest."""
@@ -193,7 +193,7 @@ class DeviceFeed:
     def _leave(self) -> None:
         resting = self._resting()
         self._guarded(self._device.close, "close")
-        self._hand_on(resting)
+        self._emit(resting)
         self._last, self.held = None, ()
 
     def _resting(self) -> Reading:
@@ -228,13 +228,13 @@ class DeviceFeed:
 
     def _read(self, timeout_s: float) -> Reading | None:
         """Returns the next reading of the device, or None if there is none or it is no `Reading`."""
-        said = self._device.read(timeout_s)
-        if said is None:
+        value = self._device.read(timeout_s)
+        if value is None:
             return None
         try:
-            return Reading(*map(tuple, said))
+            return Reading(*map(tuple, value))
         except TypeError:
-            self._refuse("it returned something other than a reading", f"got {said!r:.100}")
+            self._refuse("it returned something other than a reading", f"got {value!r:.100}")
             return None
 
     def _process(self, reading: Reading) -> None:
@@ -247,7 +247,7 @@ class DeviceFeed:
             return
         reading = self._from_rest(reading)
         if self._last is None or reading.events or reading[:2] != self._last[:2]:
-            self._hand_on(reading)
+            self._emit(reading)
 
     def _from_rest(self, reading: Reading) -> Reading:
         """Returns a reading in which every axis and button that has not been at rest since opening is at rest."""
@@ -267,7 +267,7 @@ class DeviceFeed:
         )
         return reading._replace(axes=tuple(axes), buttons=tuple(buttons))
 
-    def _hand_on(self, reading: Reading) -> None:
+    def _emit(self, reading: Reading) -> None:
         self._last = reading._replace(events=(), refused=())
         rate = self._config.autorepeat_rate
         self._repeat_at_s = time.monotonic() + (1.0 / rate if rate else math.inf)

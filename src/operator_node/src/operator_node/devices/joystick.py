@@ -88,9 +88,9 @@ class Joystick(Device):
             ) from None
         given = self._config.triggers
         self._triggers = triggers_of(index) if given is None else frozenset(given)
-        self._look_at_buttons()
+        self._read_buttons()
         self._events.clear()
-        self._name_all()
+        self._update_names()
         self._is_new = True
 
     def read(self, timeout_s: float) -> Reading | None:
@@ -101,7 +101,7 @@ class Joystick(Device):
         if not self._is_new:
             return None
         self._is_new = False
-        self._name_all()
+        self._update_names()
         return Reading(tuple(self._positions()), tuple(self._pressed))
 
     def close(self) -> None:
@@ -160,10 +160,10 @@ class Joystick(Device):
             there = [joysticks.Joystick(index).get_instance_id() for index in range(joysticks.get_count())]
             if self._joystick.get_instance_id() not in there:
                 raise DeviceError("joystick", UNPLUGGED) from None
-            self._look_at_buttons()
+            self._read_buttons()
             self._is_new = True
 
-    def _look_at_buttons(self) -> None:
+    def _read_buttons(self) -> None:
         joystick = self._joystick
         self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
 
@@ -195,7 +195,7 @@ class Joystick(Device):
             right, up = self._joystick.get_hat(index)
             yield from (float(-right), float(up))
 
-    def _name_all(self) -> None:
+    def _update_names(self) -> None:
         sticks, hats = self._joystick.get_numaxes(), self._joystick.get_numhats()
         self.axes = [*map(str, range(sticks)), *(f"hat {hat} {axis}" for hat in range(hats) for axis in "xy")]
         self.buttons = [*map(str, range(len(self._pressed)))]

@@ -78,9 +78,8 @@ class KeyTerminal:
         due_s = min(self._until_s.values(), default=float("inf"))
         timeout_s = max(0.0, min(timeout_s, due_s - time.monotonic()))
         is_typed = select.select([self._file], [], [], timeout_s)[0]
-        now_s = (
-            time.monotonic()
-        )  # one time for both: a key typed now is held for at least one call, however long this takes
+        # One time for both loops: a key typed now is held for at least one call, however long this takes
+        now_s = time.monotonic()
         if is_typed:
             try:
                 typed = os.read(self._file, MAX_BYTES)

@@ -90,17 +90,17 @@ def code_of(name: str, number: int) -> int:
     return code if code in CODES and number < 256 else 0
 
 
-class Rising(NamedTuple):
-    """A key that goes up, unless X reports that it goes down at the same time.
+class PendingRelease(NamedTuple):
+    """The release of a key, which X may revoke by a press at the same time.
 
     Attributes:
-        place: Its place on the keyboard.
+        keycode: Its position on the keyboard, as X numbers it.
         time: Time of the event, by X.
         locks: Bits of the locks that were on.
         due_s: Time from which it counts as released, by `time.monotonic`.
     """
 
-    place: int
+    keycode: int
     time: int
     locks: int
     due_s: float
@@ -120,8 +120,8 @@ class KeyWindow:
     def __init__(self, keys: HeldKeys, explanation: Sequence[str]) -> None:
         self._keys, self._explanation = keys, explanation
         self._codes: dict[int, int] = {}
-        """Code of each held key by its place on the keyboard, since its symbol depends on modifiers."""
-        self._rising: Rising | None = None
+        """Code of each held key by its X keycode, since its symbol depends on modifiers."""
+        self._pending: PendingRelease | None = None
         self._has_focus = False
         self._drawn: object = None
         self._window = window = DeviceWindow("keyboard", "keyboard", WIDTH_PX, HEIGHT_PX)
@@ -136,12 +136,12 @@ class KeyWindow:
     def wait(self, timeout_s: float) -> None:
         """Processes queued events, or waits for the next one; see `DeviceWindow.wait`."""
         now_s = time.monotonic()
-        due_s = self._rising.due_s if self._rising else math.inf
+        due_s = self._pending.due_s if self._pending else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
         if self._is_due():
             self._window.wait(0.0)  # a busy machine may be late, and the awaited event be queued already
             if self._is_due():
-                self._let_rise()
+                self._apply_release()
         if self._drawn != (tuple(self._keys.codes), self._has_focus):
             self._draw()
 
@@ -151,32 +151,32 @@ class KeyWindow:
 
     def _is_due(self) -> bool:
         """Returns whether a key that X reported as going up counts as released."""
-        return self._rising is not None and time.monotonic() >= self._rising.due_s
+        return self._pending is not None and time.monotonic() >= self._pending.due_s
 
     def _press(self, event: "Event[Misc]") -> None:
-        if self._rising and (event.keycode, event.time) == self._rising[:2]:
-            self._rising = None  # a repetition
+        if self._pending and (event.keycode, event.time) == self._pending[:2]:
+            self._pending = None  # a repetition
             return
-        self._let_rise()
+        self._apply_release()
         code = code_of(event.keysym, event.keysym_num)
         self._codes[event.keycode] = code
         self._keys.press(code, _locks(event))
 
     def _release(self, event: "Event[Misc]") -> None:
-        self._let_rise()
+        self._apply_release()
         if event.keycode in self._codes:
-            self._rising = Rising(event.keycode, event.time, _locks(event), time.monotonic() + REPEAT_GAP_S)
+            self._pending = PendingRelease(event.keycode, event.time, _locks(event), time.monotonic() + REPEAT_GAP_S)
 
-    def _let_rise(self) -> None:
-        if self._rising is not None:
-            self._keys.release(self._codes.pop(self._rising.place), self._rising.locks)
-        self._rising = None
+    def _apply_release(self) -> None:
+        if self._pending is not None:
+            self._keys.release(self._codes.pop(self._pending.keycode), self._pending.locks)
+        self._pending = None
 
     def _set_focus(self, has_focus: bool) -> None:
         self._has_focus = has_focus
         if not has_focus:
             self._codes.clear()
-            self._rising = None
+            self._pending = None
             self._keys.release_all()
 
     def _draw(self) -> None:

@@ -86,22 +86,22 @@ class MvnTopics(DeviceTopics):
                 self._found[event.subject] = time.monotonic(), event.message
                 self._warn(f"mvn, {event.subject}", event.message)
             elif isinstance(event, Silence):
-                self._fall_silent(event)
+                self._on_silence(event)
             elif isinstance(event, (JointAngles, CenterOfMass, PersonInfo)):
                 self._person(event.person).publish(event, stamp)
         flush_buffered_sockets()
 
     def _person(self, number: int) -> "_Person":
         if number not in self._people:
-            rospy.loginfo("mvn: person %d is there", number)
+            rospy.loginfo("mvn: person %d detected", number)
             self._people[number] = _Person(number, self._config, self._tf, self._first, self._markers)
         return self._people[number]
 
-    def _fall_silent(self, silence: Silence) -> None:
+    def _on_silence(self, silence: Silence) -> None:
         who = f"mvn, person {silence.person}"
         self._warn(who, f"no frame for {silence.seconds:g} s; TF and topics wait for the next one")
         if silence.person in self._people:
-            self._people[silence.person].vanish()
+            self._people[silence.person].remove_markers()
 
     def _diagnose(self) -> None:
         stamp, counts = present_stamp(), self._receiver.counts.copy()
@@ -201,6 +201,6 @@ class _Person:
             names = [f"{parent}_{child}_{axis}" for parent, child in bones for axis in "xyz"]
             self._joints.publish(JointState(header, names, message.angles_rad.ravel().tolist(), [], []))
 
-    def vanish(self) -> None:
+    def remove_markers(self) -> None:
         """Removes the person from RViz."""
-        self._markers.publish(self._drawing.gone())
+        self._markers.publish(self._drawing.removal())

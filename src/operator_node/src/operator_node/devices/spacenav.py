@@ -81,24 +81,24 @@ class Spacenav(Device):
         self._is_new = False
 
     def open(self) -> None:
-        self._forget()
+        self._reset()
         path = self.config.socket or socket_path()
         self._socket = connection = socket.socket(socket.AF_UNIX)
         connection.settimeout(ANSWER_TIMEOUT_S)
         try:
             connection.connect(path)
-            protocol = self._agree()
+            protocol = self._negotiate()
         except OSError as error:
             self.close()
             raise DeviceError("spacenav", f"no spacenavd at {path}: {error.strerror or error}") from None
         if protocol == 0:
             self._send(SENSITIVITY)
             return
-        buttons = self._ask(GET_BUTTONS)
+        buttons = self._request(GET_BUTTONS)
         if buttons is None:
             self.close()
             raise DeviceError("spacenav", "spacenavd has no device: is it plugged in?")
-        self._have_buttons(buttons)
+        self._extend_buttons(buttons)
 
     def read(self, timeout_s: float) -> Reading | None:
         if self._socket is None:
@@ -112,7 +112,7 @@ class Spacenav(Device):
             if packet[0] in (PRESS, RELEASE) or self._refused_in_a_row >= MAX_REFUSED:
                 break
         if time.monotonic() >= self._static_at_s:
-            self._come_to_rest()
+            self._zero_static_axes()
         if not self._is_new and not self._refused:
             return None
         reading = Reading(self._motion, tuple(self._pressed), refused=tuple(self._refused))
@@ -124,7 +124,7 @@ class Spacenav(Device):
             self._socket.close()
         self._socket = None
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._received.clear()
         self._motion = (0.0,) * 6
         self._pressed = [0] * len(self.buttons)
@@ -135,7 +135,7 @@ class Spacenav(Device):
 
     # --- The connection.
 
-    def _agree(self) -> int:
+    def _negotiate(self) -> int:
         """Requests protocol 1 and returns the one in use; daemons that only have 0 do not answer."""
         self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
@@ -149,7 +149,7 @@ class Spacenav(Device):
         del self._received[: WORD.size]
         return 1
 
-    def _ask(self, request: int) -> int | None:
+    def _request(self, request: int) -> int | None:
         """Returns the first number of the answer, or None if the request was rejected; earlier events are processed."""
         self._send(PACKET.pack(request, *[0] * 7))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
@@ -203,7 +203,7 @@ class Spacenav(Device):
             self._static_at_s = time.monotonic() + POLL_S * self.config.static_count_threshold
             self._is_new = True
         elif kind in (PRESS, RELEASE):
-            self._have_buttons(packet[1] + 1)
+            self._extend_buttons(packet[1] + 1)
             self._pressed[packet[1]] = int(kind == PRESS)
             self._is_new = True
         elif kind == DEVICE and packet[1] == 1:
@@ -219,14 +219,14 @@ class Spacenav(Device):
             return "a packet of an unknown type"
         return None
 
-    def _have_buttons(self, count: int) -> None:
+    def _extend_buttons(self, count: int) -> None:
         """Extends the buttons to a number; some devices reveal a button only by its first event."""
         missing = min(count, MAX_BUTTONS) - len(self._pressed)
         if missing > 0:
             self._pressed += [0] * missing
             self.buttons = [*map(str, range(len(self._pressed)))]
 
-    def _come_to_rest(self) -> None:
+    def _zero_static_axes(self) -> None:
         """Sets axes that have not moved for a time to 0."""
         config = self.config
         linear, angular = self._motion[:3], self._motion[3:]

@@ -31,7 +31,7 @@ class HaplyEmulator:
     message.
 
     Args:
-        wanted: Position to which the hand pulls the handle over time, in the device's axes: x right, y forward, z up
+        goal: Position to which the hand pulls the handle over time, in the device's axes: x right, y forward, z up
             [m].
         key: Key of a force's vector; other keys are ignored.
         port: 0 for any free one.
@@ -45,13 +45,13 @@ class HaplyEmulator:
 
     def __init__(
         self,
-        wanted: Callable[[float], Vector],
+        goal: Callable[[float], Vector],
         key: str = "vector",
         port: int = 0,
         mangle: Callable[[str], str | bytes] = lambda text: text,
     ) -> None:
         self.hand, self.force, self.port = Hand(), ZERO, port
-        self._wanted, self._key, self._mangle = wanted, key, mangle
+        self._goal, self._key, self._mangle = goal, key, mangle
         self._start_s = self._now_s = time.monotonic()
         self._felt_until_s = 0.0
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -115,7 +115,7 @@ class HaplyEmulator:
             step_s = min(STEP_S, now_s - self._now_s)
             force = self.force if self._now_s < self._felt_until_s else ZERO
             self._now_s += step_s
-            self.hand.step(self._wanted(self._now_s - self._start_s), force, step_s)
+            self.hand.step(self._goal(self._now_s - self._start_s), force, step_s)
 
     def _message(self, full: bool = False) -> dict[str, Any]:
         inverse3 = {
@@ -158,5 +158,5 @@ def main() -> None:
     parser.add_argument("--depth", type=float, default=0.04, help="depth of the press [m] (0.04)")
     arguments = parser.parse_args()
     press = PressMotion(arguments.depth)
-    emulator = HaplyEmulator(lambda time_s: press.wanted(time_s % press.duration_s), arguments.key, arguments.port)
+    emulator = HaplyEmulator(lambda time_s: press.goal(time_s % press.duration_s), arguments.key, arguments.port)
     asyncio.run(emulator.serve(lambda: print(f"ws://localhost:{emulator.port}", flush=True)))

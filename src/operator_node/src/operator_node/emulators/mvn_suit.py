@@ -25,7 +25,7 @@ NOISE_RAD = 2e-4
 """Standard deviation of the sensor noise of orientations [rad]."""
 INFO_PERIOD = 60
 """Period of types 12 and 13, in samples."""
-APART_M = 1.2
+SPACING_M = 1.2
 _CM = 100.0
 
 
@@ -253,7 +253,7 @@ def main() -> int:
 
 def _person(options: argparse.Namespace, number: int) -> WalkingPerson | ArmHeldOut:
     """Returns one of the people, who is next to the previous one and a little smaller."""
-    height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -APART_M * number)
+    height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -SPACING_M * number)
     if options.arm_held_out:
         return ArmHeldOut(height_m, options.seed, start, options.t_pose)
     return WalkingPerson(height_m, options.speed, t_pose_s=options.t_pose, start=start, reach=not options.no_reach)

@@ -74,7 +74,7 @@ class TouchEmulator:
             step_s = min(STEP_S, now_s - self._now_s)
             self._now_s += step_s
             time_s = (self._now_s - self._start_s) % self._press.duration_s
-            self._hand.step(self._press.wanted(time_s), self._force, step_s)
+            self._hand.step(self._press.goal(time_s), self._force, step_s)
         x, y, z = self._hand.position
         vx, vy, vz = self._hand.velocity
         header = Header(stamp=rospy.Time.now())

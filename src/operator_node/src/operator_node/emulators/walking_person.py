@@ -77,11 +77,11 @@ class WalkingPerson:
         ready = _smooth(walking_s / SETTLING_S)
         phase = 2.0 * np.pi * walking_s / STRIDE_S
         striding = ready if self._speed_m_s else 0.0
-        way_m = self._way_m(walking_s)
+        distance_m = self._distance_m(walking_s)
         crouch_m = _smooth(walking_s / CROUCHING_S) * self._crouch_m
-        pelvis = self._on_path(way_m) + (0.0, 0.0, self.t_pose[0][2] - crouch_m)
+        pelvis = self._on_path(distance_m) + (0.0, 0.0, self.t_pose[0][2] - crouch_m)
         pelvis[2] += striding * BOB * self._height_m * np.cos(2.0 * phase)
-        facing = Rotation.from_euler("z", way_m / self._radius_m)
+        facing = Rotation.from_euler("z", distance_m / self._radius_m)
         sway = striding * np.sin(phase)
         turns = {"Pelvis": facing * Rotation.from_euler("z", 0.06 * sway)}
         for name, share in (("L5", 0.2), ("L3", 0.4), ("T12", 0.6), ("T8", 0.8), ("Neck", 0.4), ("Head", 0.0)):
@@ -116,21 +116,21 @@ class WalkingPerson:
             return 0.0
         return float(np.sin(np.pi * since_s / REACHING_S) ** 2)
 
-    def _way_m(self, walking_s: float) -> float:
+    def _distance_m(self, walking_s: float) -> float:
         """Returns the walked distance [m]; the speed grows smoothly."""
         walking_s = max(walking_s - CROUCHING_S, 0.0)
         return float(self._speed_m_s * (walking_s - SETTLING_S * -np.expm1(-walking_s / SETTLING_S)))
 
-    def _on_path(self, way_m: float) -> Array:
-        angle, radius = way_m / self._radius_m, self._radius_m
+    def _on_path(self, distance_m: float) -> Array:
+        angle, radius = distance_m / self._radius_m, self._radius_m
         return self._start + radius * np.array((np.sin(angle), 1.0 - np.cos(angle), 0.0))
 
     def _footprint(self, number: float, sign: float, offset: float) -> tuple[Array, float]:
         """Returns position [m] and direction [rad] of a foot's stance in one stride."""
-        way_m = self._way_m((number + offset + STANCE / 2.0) * STRIDE_S)
-        angle = way_m / self._radius_m
+        distance_m = self._distance_m((number + offset + STANCE / 2.0) * STRIDE_S)
+        angle = distance_m / self._radius_m
         aside = -sign * self._height_m * T_POSE["RightUpperLeg"][1]
-        place = self._on_path(way_m) + aside * np.array((-np.sin(angle), np.cos(angle), 0.0))
+        place = self._on_path(distance_m) + aside * np.array((-np.sin(angle), np.cos(angle), 0.0))
         return place + (0.0, 0.0, self._height_m * T_POSE["RightFoot"][2]), angle
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:

@@ -64,7 +64,7 @@ class Snapshot(NamedTuple):
         reading: The sample.
         velocity: Velocity of the handle [m/s].
         deviation: Displacement of the handle since it was engaged [m]; 0 while it is not.
-        way: Displacement of the target since the start, in the axes of the tool [m].
+        displacement: Displacement of the target since the start, in the axes of the tool [m].
         force: Force that is sent to the device, in its axes [N].
         is_engaged: Whether handle and tool are coupled.
         time_s: Time of the sample, by the monotonic clock [s].
@@ -73,7 +73,7 @@ class Snapshot(NamedTuple):
     reading: HapticReading
     velocity: Vector
     deviation: Vector
-    way: Vector
+    displacement: Vector
     force: Vector
     is_engaged: bool
     time_s: float
@@ -90,7 +90,7 @@ class HapticController:
         config: The mapping and the forces.
         device: Properties of the device.
         sample_hz: Rate at which the device is read [Hz].
-        way: Displacement of the target from its start, in the axes of the tool [m].
+        displacement: Displacement of the target from its start, in the axes of the tool [m].
 
     Attributes:
         force: Force that is sent to the device now [N].
@@ -100,7 +100,9 @@ class HapticController:
         stiffness_bound: Stiffness up to which a wall is passive by itself [N/m].
     """
 
-    def __init__(self, config: ForceFeedbackConfig, device: HapticConfig, sample_hz: float, way: Vector = ZERO) -> None:
+    def __init__(
+        self, config: ForceFeedbackConfig, device: HapticConfig, sample_hz: float, displacement: Vector = ZERO
+    ) -> None:
         self._config, self._max_force_n = config, device.max_force_n
         self.coupling = VirtualCoupling(
             config.mode, config.stiffness, config.damping, config.force_scale, config.expiry_s
@@ -121,8 +123,8 @@ class HapticController:
         self._clutch = Clutch(config.clutch_button)
         self._target = TargetFollower(config.motion_scale, config.way_low, config.way_high, config.max_target_speed)
         self._yaw = math.radians(config.yaw_deg)
-        self._target.way = way
-        self._clutch.set_way(self._handle_way(way))
+        self._target.displacement = displacement
+        self._clutch.set_displacement(self._handle_displacement(displacement))
         self._period_s = 1.0 / sample_hz
         self.force: Vector = ZERO
         self.fault = ""
@@ -131,7 +133,7 @@ class HapticController:
         self._position: Vector | None = None
         self._velocity = ZERO
         self._seen_s = -math.inf
-        self._tool_way: Vector | None = None
+        self._tool_displacement: Vector | None = None
         self.awaits_reset = False
 
     def observe_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
@@ -139,11 +141,11 @@ class HapticController:
         if self._config.mode == "wrench":
             self.coupling.observe(turned_about_z(force, -self._yaw), now_s, delay_s)
 
-    def observe_tool(self, way: Vector, now_s: float, delay_s: float = 0.0) -> None:
+    def observe_tool(self, displacement: Vector, now_s: float, delay_s: float = 0.0) -> None:
         """Updates the displacement of the tool from its start, in its axes [m]."""
         if self._config.mode == "coupling":
-            self._tool_way = self._handle_way(way)
-            self.coupling.observe(self._tool_way, now_s, delay_s)
+            self._tool_displacement = self._handle_displacement(displacement)
+            self.coupling.observe(self._tool_displacement, now_s, delay_s)
 
     def reset(self) -> None:
         """Returns the target to its start; the handle continues from there."""
@@ -208,7 +210,7 @@ class HapticController:
         self._engage(position, reading.buttons, now_s)
         force = ZERO
         if self._clutch.engaged:
-            force = self.coupling.force(self._clutch.way, self._velocity, now_s)
+            force = self.coupling.force(self._clutch.displacement, self._velocity, now_s)
             axes = self._config.force_axes
             force = force[0] * axes[0], force[1] * axes[1], force[2] * axes[2]
             force = self._limiter.limited(self.passivity.damped(force, velocity), dt_s)
@@ -218,27 +220,27 @@ class HapticController:
             reading,
             self._velocity,
             self._clutch.deviation,
-            self._target.follow(turned_about_z(self._clutch.way, self._yaw), dt_s),
+            self._target.follow(turned_about_z(self._clutch.displacement, self._yaw), dt_s),
             self.force,
             self._clutch.engaged,
             now_s,
         )
 
-    def _handle_way(self, way: Vector) -> Vector:
+    def _handle_displacement(self, displacement: Vector) -> Vector:
         """Returns the displacement of the handle for one of the tool, 0 along axes that are held."""
-        x, y, z = (part / scale if scale else 0.0 for part, scale in zip(way, self._config.motion_scale))
+        x, y, z = (part / scale if scale else 0.0 for part, scale in zip(displacement, self._config.motion_scale))
         return turned_about_z((x, y, z), -self._yaw)
 
     def _engage(self, position: Vector, buttons: tuple[int, ...], now_s: float) -> None:
         if self.awaits_reset:
             self.awaits_reset = False
-            self._clutch.set_way(ZERO)
+            self._clutch.set_displacement(ZERO)
         if self.coupling.freshness(now_s) == 0.0 and self._config.mode == "coupling":
             self._clutch.release()  # otherwise the spring would be stretched when the tool is back
         if self._clutch.update(position, buttons):
             self.passivity.reset()
-            if self._tool_way is not None:
-                self._clutch.set_way(self._tool_way)
+            if self._tool_displacement is not None:
+                self._clutch.set_displacement(self._tool_displacement)
                 self._clutch.update(position, buttons)
 
     def _smoothed(self, velocity: Vector, dt_s: float) -> Vector:

@@ -9,7 +9,7 @@ Mode = Literal["wrench", "coupling"]
 
 
 class Clutch:
-    """Couples displacements: after engaging, the tool moves with the handle, from wherever both were.
+    """Couples displacements: after engaging, the tool moves with the handle, from the present positions of both.
 
     Args:
         button: Index of the button that has to be held; None couples all the time.
@@ -25,29 +25,29 @@ class Clutch:
         self._kept = self._reference = self.deviation = ZERO
 
     @property
-    def way(self) -> Vector:
+    def displacement(self) -> Vector:
         """Displacement of the tool since the start, in metres of the handle."""
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
         """Updates the position of the handle [m]; returns whether it was engaged just now."""
-        wanted = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
-        if wanted and not self.engaged:
+        is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
+        if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
             return True
-        if not wanted:
+        if not is_held:
             self.release()
         elif self.engaged:
             self.deviation = minus(position, self._reference)
         return False
 
     def release(self) -> None:
-        """Disengages: the tool stays where it is. While the button is held, the next update engages again."""
-        self._kept, self.deviation, self.engaged = self.way, ZERO, False
+        """Disengages: the tool keeps its position. While the button is held, the next update engages again."""
+        self._kept, self.deviation, self.engaged = self.displacement, ZERO, False
 
-    def set_way(self, way: Vector) -> None:
+    def set_displacement(self, displacement: Vector) -> None:
         """Sets the displacement of the tool [m] and disengages; the next motion of the handle continues from it."""
-        self._kept, self.engaged, self.deviation = way, False, ZERO
+        self._kept, self.engaged, self.deviation = displacement, False, ZERO
 
 
 class TargetFollower:
@@ -62,20 +62,21 @@ class TargetFollower:
 
     def __init__(self, scale: Vector, low: Vector, high: Vector, max_speed: float) -> None:
         self._scale, self._low, self._high, self._max_speed = scale, low, high, max_speed
-        self.way: Vector = ZERO
+        self.displacement: Vector = ZERO
 
-    def follow(self, way: Vector, dt_s: float) -> Vector:
+    def follow(self, displacement: Vector, dt_s: float) -> Vector:
         """Returns the displacement of the tool from the start [m], `dt_s` after the last call."""
-        wanted = self.limited((way[0] * self._scale[0], way[1] * self._scale[1], way[2] * self._scale[2]))
-        left = minus(wanted, self.way)
-        far, most = norm(left), self._max_speed * dt_s
-        self.way = wanted if far <= most else plus(self.way, scaled(most / far, left))
-        return self.way
+        x, y, z = (value * scale for value, scale in zip(displacement, self._scale))
+        goal = self.limited((x, y, z))
+        step = minus(goal, self.displacement)
+        length, most = norm(step), self._max_speed * dt_s
+        self.displacement = goal if length <= most else plus(self.displacement, scaled(most / length, step))
+        return self.displacement
 
-    def limited(self, way: Vector) -> Vector:
+    def limited(self, displacement: Vector) -> Vector:
         """Returns a displacement clipped to the box."""
         (ax, ay, az), (bx, by, bz) = self._low, self._high
-        return min(max(way[0], ax), bx), min(max(way[1], ay), by), min(max(way[2], az), bz)
+        return min(max(displacement[0], ax), bx), min(max(displacement[1], ay), by), min(max(displacement[2], az), bz)
 
 
 def stiffest_n_per_m(device_damping: float, coupling_damping: float, period_s: float) -> float:

@@ -10,11 +10,11 @@ from .device import HapticDevice, HapticReading
 
 STEP_S = 0.001
 MAX_STEP_S = 0.05
-"""Longest time that is simulated at once [s]; the rest is dropped, and the handle stands still meanwhile."""
+"""Longest time that is simulated at once [s]; the rest is dropped, and the handle does not move in it."""
 
 
 class Hand:
-    """A handle with a mass that a hand pulls to a wanted position, while the device pushes.
+    """A handle with a mass: a hand pulls it to a goal, and the device applies a force.
 
     Args:
         mass: Mass of handle and hand [kg].
@@ -38,16 +38,16 @@ class Hand:
         """Largest acceleration from the hand alone [m/s^2]; that from the device's force adds to it."""
         return self._max_force_n / self._mass
 
-    def step(self, wanted: Vector, force: Vector, dt_s: float) -> None:
+    def step(self, goal: Vector, force: Vector, dt_s: float) -> None:
         """Integrates one step (semi-implicit Euler).
 
         Args:
-            wanted: Position to which the hand pulls the handle [m].
+            goal: Position to which the hand pulls the handle [m].
             force: Force of the device [N].
             dt_s: Length of the step [s].
         """
         pull = shortened_to(
-            minus(scaled(self._stiffness, minus(wanted, self.position)), scaled(self._damping, self.velocity)),
+            minus(scaled(self._stiffness, minus(goal, self.position)), scaled(self._damping, self.velocity)),
             self._max_force_n,
         )
         k = dt_s / self._mass
@@ -58,13 +58,13 @@ class Hand:
 
 
 class PressMotion(NamedTuple):
-    """A hand that moves down along z, stays there for a while and comes back, smoothly and from rest to rest.
+    """A hand that moves down along z, waits and moves back, smoothly and from rest to rest.
 
     Attributes:
         depth_m: Depth of the motion [m].
-        wait_s: Time that it stays above at first, and again at the end [s].
+        wait_s: Time at the top before the motion, and again after it [s].
         move_s: Duration of each motion [s].
-        hold_s: Time that it stays below [s].
+        hold_s: Time at the bottom [s].
     """
 
     depth_m: float
@@ -77,7 +77,7 @@ class PressMotion(NamedTuple):
         """Duration of the whole motion [s]."""
         return 2.0 * (self.wait_s + self.move_s) + self.hold_s
 
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         """Returns the position to which the hand pulls the handle, some time after its start [m]."""
         ahead_s = min(time_s - self.wait_s, self.duration_s - self.wait_s - time_s)
         s = min(max(ahead_s / self.move_s, 0.0), 1.0)
@@ -85,13 +85,13 @@ class PressMotion(NamedTuple):
 
 
 class EmulatedDevice(HapticDevice):
-    """A handle that a hand pulls to a wanted position and the force pushes; its time is the monotonic clock."""
+    """A handle that a hand pulls to a goal and a force displaces; its time is the monotonic clock."""
 
     hand: Hand
     buttons: tuple[int, ...] = ()
 
     @abstractmethod
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         """Returns the position to which the hand pulls the handle, some time after `open` [m]."""
 
     def open(self) -> None:
@@ -118,7 +118,7 @@ class EmulatedDevice(HapticDevice):
         while (left_s := now_s - self._now_s) > 1e-9:
             step_s = left_s if left_s < 1.5 * STEP_S else STEP_S
             self._now_s += step_s
-            self.hand.step(self.wanted(self._now_s - self._start_s), self.force, step_s)
+            self.hand.step(self.goal(self._now_s - self._start_s), self.force, step_s)
         return HapticReading(self.hand.position, self.hand.velocity, buttons=self.buttons)
 
     def send(self, force: Vector, expires_s: float) -> None:

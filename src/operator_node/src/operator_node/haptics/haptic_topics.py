@@ -75,9 +75,8 @@ class HandlePublisher:
         self._twist.publish(twist)
         axes = [min(max(each / self._workspace_m, -1.0), 1.0) for each in snapshot.deviation]
         self._joy.publish(Joy(header, axes, reading.buttons))
-        if (
-            header.stamp != self._stamp
-        ):  # otherwise ROS time is paused, and TF ignores a second transform with the same stamp
+        # While ROS time is paused, TF ignores further transforms with the same stamp
+        if header.stamp != self._stamp:
             self._stamp = header.stamp
             self._broadcast(header, snapshot, start)
 
@@ -90,7 +89,7 @@ class HandlePublisher:
             position, quat = start
             stamped = Header(stamp=header.stamp, frame_id=config.parent_frame_id)
             target = TransformStamped(header=stamped, child_frame_id=config.target_frame_id)
-            target.transform = transform_message(geometry.plus(position, snapshot.way), quat)
+            target.transform = transform_message(geometry.plus(position, snapshot.displacement), quat)
             transforms.append(target)
         self._tf.sendTransform(transforms)
 
@@ -126,7 +125,7 @@ class HapticStatePublisher:
                 device=config.device,
                 connected=report.is_connected,
                 engaged=report.is_connected and snapshot is not None and snapshot.is_engaged,
-                message=report.trouble or report.fault or ("" if is_felt else "nothing from the tool"),
+                message=report.trouble or report.fault or ("" if is_felt else "no samples of the tool"),
                 stiffness=config.stiffness if config.mode == "coupling" else 0.0,
                 damping=config.damping,
                 stiffness_bound=self._stiffness_bound,

@@ -56,15 +56,15 @@ class Setup(NamedTuple):
         device: Class of the device.
         options: Options of the device.
         config: The mapping, the forces, and the rate of reports.
-        orders: The present command.
-        way: Displacement of the target from its start [m]; not 0 if an earlier process has moved it.
+        command: The present command.
+        displacement: Displacement of the target from its start [m]; not 0 if an earlier process has moved it.
     """
 
     device: type[HapticDevice]
     options: HapticConfig
     config: HapticNodeConfig
-    orders: LoopCommand = LoopCommand()
-    way: Vector = ZERO
+    command: LoopCommand = LoopCommand()
+    displacement: Vector = ZERO
 
 
 class LoopReport(NamedTuple):

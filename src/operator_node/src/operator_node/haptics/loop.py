@@ -49,7 +49,7 @@ class HapticLoop:
         controller: Computes forces from readings.
         config: Expiry of forces when the loop falls silent, and the rate of reports.
         link: Connection to the node.
-        orders: Initial command of the node.
+        command: Initial command of the node.
     """
 
     def __init__(
@@ -58,9 +58,9 @@ class HapticLoop:
         controller: HapticController,
         config: HapticNodeConfig,
         link: Link,
-        orders: LoopCommand = LoopCommand(),  # noqa: B008 (a tuple)
+        command: LoopCommand = LoopCommand(),  # noqa: B008 (a tuple)
     ) -> None:
-        self._device, self._controller, self._link, self._orders = device, controller, link, orders
+        self._device, self._controller, self._link, self._command = device, controller, link, command
         self._expiry_s, self._report_s = config.expiry_s, 1.0 / config.hz
         self._report = LoopReport()
         self._heard_s = self._reported_s = self._retry_at_s = time.monotonic()
@@ -68,20 +68,20 @@ class HapticLoop:
 
     def run(self) -> None:
         """Keeps the device open while the node requests it, until the node has gone."""
-        _prefer_this_process()
+        _use_real_time_scheduling()
         try:
             self._run()
         finally:
-            _prefer_no_longer()
+            _use_ordinary_scheduling()
 
     def _run(self) -> None:
         while not self._link.is_closed:
             self._listen()
-            if self._orders.switched != self._report.obeyed:
+            if self._command.switched != self._report.obeyed:
                 self._retry_at_s = 0.0
-                self._send_report(obeyed=self._orders.switched)
+                self._send_report(obeyed=self._command.switched)
             self._send_report_when_due()
-            if self._orders.is_on and not self._report.has_ended and time.monotonic() >= self._retry_at_s:
+            if self._command.is_on and not self._report.has_ended and time.monotonic() >= self._retry_at_s:
                 self._use_device()
                 self._retry_at_s = time.monotonic() + RETRY_S
             else:
@@ -112,7 +112,7 @@ class HapticLoop:
         """Ticks until the device goes, or the node requests otherwise."""
         device, controller, period_s = self._device, self._controller, 1.0 / HZ
         due_s = time.monotonic()
-        while self._orders.switched == self._report.obeyed and not self._link.is_closed:
+        while self._command.switched == self._report.obeyed and not self._link.is_closed:
             now_s = time.monotonic()
             self._listen()
             try:
@@ -137,16 +137,16 @@ class HapticLoop:
 
     def _listen(self) -> None:
         """Applies the newest command of the node."""
-        orders, before, controller = self._link.newest(), self._orders, self._controller
-        if orders is None:
+        command, before, controller = self._link.newest(), self._command, self._controller
+        if command is None:
             return
-        self._orders, self._heard_s = orders, time.monotonic()
-        if orders.resets != before.resets:
+        self._command, self._heard_s = command, time.monotonic()
+        if command.resets != before.resets:
             controller.reset()
-        if orders.wrench is not None and orders.wrench != before.wrench:
-            controller.observe_wrench(*orders.wrench)
-        if orders.tool is not None and orders.tool != before.tool:
-            controller.observe_tool(*orders.tool)
+        if command.wrench is not None and command.wrench != before.wrench:
+            controller.observe_wrench(*command.wrench)
+        if command.tool is not None and command.tool != before.tool:
+            controller.observe_tool(*command.tool)
 
     def _send_report_when_due(self) -> None:
         if time.monotonic() - self._reported_s >= self._report_s:
@@ -160,7 +160,7 @@ class HapticLoop:
             faults["force not finite"] = controller.not_finite
         self._reported_s = max(self._reported_s + self._report_s, now_s - self._report_s)
         self._report = self._report._replace(
-            resets=self._report.resets if controller.awaits_reset else self._orders.resets,
+            resets=self._report.resets if controller.awaits_reset else self._command.resets,
             samples=self._samples,
             lateness_s=self._lateness_s,
             force=controller.force,
@@ -177,7 +177,7 @@ class HapticLoop:
             self._lateness_s = 0.0
 
 
-def _prefer_this_process() -> None:
+def _use_real_time_scheduling() -> None:
     """Requests real-time scheduling; without the permission, scheduling stays as it is."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
@@ -185,7 +185,7 @@ def _prefer_this_process() -> None:
         return
 
 
-def _prefer_no_longer() -> None:
+def _use_ordinary_scheduling() -> None:
     """Restores ordinary scheduling for all threads of this process.
 
     While ROS shuts down, a thread of rospy spins until the process has ended; with real-time priority it would starve
@@ -208,10 +208,10 @@ def main() -> None:
         return
     sys.setswitchinterval(SWITCH_S)
     device = setup.device(setup.options)
-    controller = HapticController(setup.config, setup.options, HZ, setup.way)
+    controller = HapticController(setup.config, setup.options, HZ, setup.displacement)
     gc.collect()
     gc.freeze()  # existing objects stay, so that later collections take next to no time
-    HapticLoop(device, controller, setup.config, link, setup.orders).run()
+    HapticLoop(device, controller, setup.config, link, setup.command).run()
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ class LoopClient:
         self._device.silence()
         self.report, self.failure = LoopReport(), ""
         self.ended = threading.Event()
-        self._orders, self._lock = setup.orders, threading.Lock()
+        self._command, self._lock = setup.command, threading.Lock()
         self._resets = 0
         """Number of requested resets that the loop has done."""
         self._news = threading.Condition()
@@ -77,30 +77,30 @@ class LoopClient:
     def start(self) -> None:
         """Opens the device, and again whenever it has gone."""
         with self._lock:
-            self._send(self._orders._replace(is_on=True, switched=self._orders.switched + 1))
+            self._send(self._command._replace(is_on=True, switched=self._command.switched + 1))
 
     def stop(self) -> None:
         """Sends zero force and closes the device; returns when both are done."""
         with self._lock:
-            self._send(self._orders._replace(is_on=False, switched=self._orders.switched + 1))
-            wanted = self._orders.switched
+            self._send(self._command._replace(is_on=False, switched=self._command.switched + 1))
+            wanted = self._command.switched
         with self._news:
             self._news.wait_for(lambda: self.report.obeyed >= wanted or self.failure, MAX_CLOSE_S)
 
     def reset(self) -> None:
         """Returns the target to its start."""
         with self._lock:
-            self._send(self._orders._replace(resets=self._orders.resets + 1))
+            self._send(self._command._replace(resets=self._command.resets + 1))
 
     def observe_wrench(self, force: Vector, delay_s: float) -> None:
         """Sends the force on the tool, in its axes [N], finite."""
         with self._lock:
-            self._send(self._orders._replace(wrench=LoopInput(force, time.monotonic(), delay_s)))
+            self._send(self._command._replace(wrench=LoopInput(force, time.monotonic(), delay_s)))
 
-    def observe_tool(self, way: Vector, delay_s: float) -> None:
+    def observe_tool(self, displacement: Vector, delay_s: float) -> None:
         """Sends the displacement of the tool from its start, in its axes [m]."""
         with self._lock:
-            self._send(self._orders._replace(tool=LoopInput(way, time.monotonic(), delay_s)))
+            self._send(self._command._replace(tool=LoopInput(displacement, time.monotonic(), delay_s)))
 
     def close(self) -> None:
         """Ends the process, after zero force."""
@@ -114,9 +114,9 @@ class LoopClient:
             self._process.kill()
             self._process.wait()
 
-    def _send(self, orders: LoopCommand) -> None:
-        self._orders, self._sent_s = orders, time.monotonic()
-        self._link.send(orders)
+    def _send(self, command: LoopCommand) -> None:
+        self._command, self._sent_s = command, time.monotonic()
+        self._link.send(command)
 
     def _start(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -131,8 +131,8 @@ class LoopClient:
             )
         self._started_s = time.monotonic()
         self._link = Link(ours)
-        self._link.send(self._setup._replace(orders=self._orders._replace(resets=self._resets)))
-        self._send(self._orders)
+        self._link.send(self._setup._replace(command=self._command._replace(resets=self._resets)))
+        self._send(self._command)
 
     def _run(self) -> None:
         """Forwards reports, and restarts the process after its end, until the client is closed."""
@@ -141,10 +141,10 @@ class LoopClient:
             self._link.wait(SEND_PERIOD_S)
             if time.monotonic() - self._sent_s > SEND_PERIOD_S:
                 with self._lock:
-                    self._send(self._orders)
+                    self._send(self._command)
             for report in self._link.receive():
                 self._resets = report.resets
-                self._hand_on(report)
+                self._deliver(report)
             if not self._link.is_closed:
                 continue
             if self._is_closing:
@@ -156,17 +156,17 @@ class LoopClient:
             failures = 0 if time.monotonic() - self._started_s > STABLE_AFTER_S else failures + 1
             if failures >= MAX_FAILURES:
                 self.failure = f"{trouble}, {failures} times in a row"
-                self._hand_on(LoopReport(trouble=self.failure, has_ended=True))
+                self._deliver(LoopReport(trouble=self.failure, has_ended=True))
                 return
             if self.report.snapshot is not None:
-                self._setup = self._setup._replace(way=self.report.snapshot.way)
-            self._hand_on(LoopReport(trouble=f"{trouble}, and is started again"))
+                self._setup = self._setup._replace(displacement=self.report.snapshot.displacement)
+            self._deliver(LoopReport(trouble=f"{trouble}, and is started again"))
             with self._lock:
                 if self._is_closing:
                     return
                 self._start()
 
-    def _hand_on(self, report: LoopReport) -> None:
+    def _deliver(self, report: LoopReport) -> None:
         self.report = report
         try:
             self._on_report(report)

@@ -21,7 +21,7 @@ WINDOW_S = 0.1
 """Time span over which displacement and velocity are compared [s]."""
 GAP_S = 0.01
 """Gap between readings beyond which the comparison restarts [s]."""
-MIN_WAY_M = 0.005
+MIN_DISPLACEMENT_M = 0.005
 """Displacement in that time span below which they are not compared [m]."""
 
 
@@ -40,7 +40,7 @@ class ReadingCheck:
         self._last: HapticReading | None = None
         self._last_s = 0.0
         self._elsewhere: list[HapticReading] = []
-        self._window_s = self._way_m = 0.0
+        self._window_s = 0.0
         self._moved = self._claimed = ZERO
         self._suspect: ReadingError | None = None
         self.has_moved = False
@@ -64,7 +64,7 @@ class ReadingCheck:
             self.has_moved = True
             self._begin_window()
         else:
-            self._check_way(last, reading, dt_s)
+            self._check_step(last, reading, dt_s)
             self._compare(minus(reading.position, last.position), reading.velocity, dt_s)
         self._last, self._last_s = reading, now_s
         self._elsewhere.clear()
@@ -90,11 +90,11 @@ class ReadingCheck:
         x, y, z, w = quat
         return reading._replace(quat_xyzw=(x / length, y / length, z / length, w / length))
 
-    def _check_way(self, last: HapticReading, reading: HapticReading, dt_s: float) -> None:
-        way_m = norm(minus(reading.position, last.position))
+    def _check_step(self, last: HapticReading, reading: HapticReading, dt_s: float) -> None:
+        step_m = norm(minus(reading.position, last.position))
         turn = angle_between(last.quat_xyzw, reading.quat_xyzw)
-        if way_m > SLACK_M + self._config.max_speed * dt_s:
-            error = ReadingError("jump", f"{way_m * 1e3:.0f} mm from the last one, {dt_s * 1e3:.0f} ms later")
+        if step_m > SLACK_M + self._config.max_speed * dt_s:
+            error = ReadingError("jump", f"{step_m * 1e3:.0f} mm from the last one, {dt_s * 1e3:.0f} ms later")
         elif turn > TURN_SLACK + MAX_TURN * dt_s:
             x, y, z, w = reading.quat_xyzw
             swapped = min(angle_between(last.quat_xyzw, (w, x, y, z)), angle_between(last.quat_xyzw, (y, z, w, x)))
@@ -120,7 +120,7 @@ class ReadingCheck:
         self._window_s = 0.0
         self._moved = self._claimed = ZERO
 
-    def _compare(self, way: Vector, velocity: Vector | None, dt_s: float) -> None:
+    def _compare(self, displacement: Vector, velocity: Vector | None, dt_s: float) -> None:
         """Compares the displacement over a window with the velocity that the device measured."""
         if velocity is None or self.has_moved:
             return
@@ -128,22 +128,22 @@ class ReadingCheck:
             self._begin_window()
             return
         self._window_s += dt_s
-        self._moved, self._claimed = plus(self._moved, way), plus(self._claimed, scaled(dt_s, velocity))
+        self._moved, self._claimed = plus(self._moved, displacement), plus(self._claimed, scaled(dt_s, velocity))
         if self._window_s < WINDOW_S:
             return
         moved, claimed = self._moved, self._claimed
         self._begin_window()
         moved_m, claimed_m = norm(moved), norm(claimed)
-        if max(moved_m, claimed_m) < MIN_WAY_M:
+        if max(moved_m, claimed_m) < MIN_DISPLACEMENT_M:
             return  # too little to decide, so the last result still holds
         self._suspect = None
         if norm(minus(moved, claimed)) < 0.5 * max(moved_m, claimed_m):
             return
         text = f"moved {_in_mm(moved)}, but by its velocity {_in_mm(claimed)}"
-        self._suspect = ReadingError(_likely(moved, claimed), text)
+        self._suspect = ReadingError(_likely_fault(moved, claimed), text)
 
 
-def _likely(moved: Vector, claimed: Vector) -> str:
+def _likely_fault(moved: Vector, claimed: Vector) -> str:
     """Returns the fault that best explains the difference of displacement and velocity."""
     moved_m, claimed_m = norm(moved), norm(claimed)
     if moved_m < 1e-9:
@@ -158,5 +158,5 @@ def _likely(moved: Vector, claimed: Vector) -> str:
     return "velocity"
 
 
-def _in_mm(way: Vector) -> str:
-    return "({:.0f}, {:.0f}, {:.0f}) mm".format(*scaled(1e3, way))
+def _in_mm(displacement: Vector) -> str:
+    return "({:.0f}, {:.0f}, {:.0f}) mm".format(*scaled(1e3, displacement))

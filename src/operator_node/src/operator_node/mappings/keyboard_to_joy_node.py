@@ -38,8 +38,7 @@ class KeyboardToJoyParameters(ConfigModel):
     key_timeout_s: SecondsOrOff = Field(
         0.0,
         description="Time for which a key counts as held after it went down, for keyboards that repeat keys but may "
-        "miss "
-        "a release; 0 means until it is released.",
+        "miss a release; 0 means until it is released.",
     )
 
 

@@ -141,7 +141,7 @@ class FrameChecks:
         self._changed_s[changed] = now_s
         stuck = now_s - self._changed_s > STUCK_S
         if stuck.all():
-            findings.append(Finding("stuck", f"the same frame has come again for {STUCK_S:g} s; is MVN paused?"))
+            findings.append(Finding("stuck", f"the same frame is repeated for {STUCK_S:g} s; is MVN paused?"))
         elif stuck.any():
             names = ", ".join(SEGMENTS[index] for index in np.flatnonzero(stuck)[:4])
             findings.append(Finding("stuck", f"{names} has not turned at all for {STUCK_S:g} s, others have"))

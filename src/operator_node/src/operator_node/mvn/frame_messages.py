@@ -133,8 +133,8 @@ class PersonMarkers:
     def message(self, frame: SegmentFrame) -> MarkerArray:
         """Returns the markers of the bones of a frame; bones are rigid, so that markers are sent rarely."""
         parents, children = BONES.T
-        ways = frame.positions[children] - frame.positions[parents]
-        ends = rotate(inverse(frame.quats_xyzw[parents]), ways)
+        vectors = frame.positions[children] - frame.positions[parents]
+        ends = rotate(inverse(frame.quats_xyzw[parents]), vectors)
         for marker in self._markers.values():
             marker.points = []
         for parent, end in zip(parents, ends):
@@ -143,7 +143,7 @@ class PersonMarkers:
             self._markers[name].points = _line(np.array(tip))
         return MarkerArray([each for name, each in self._markers.items() if each.points or name == "Head"])
 
-    def gone(self) -> MarkerArray:
+    def removal(self) -> MarkerArray:
         """Returns a message that removes the person."""
         return MarkerArray(
             [

@@ -192,7 +192,7 @@ class Receiver:
         """
         newest = self._newest.copy()
         if not newest:
-            raise InterfaceError("nobody is there: no frame has come lately")
+            raise InterfaceError("no person is present: no recent frame")
         return "; ".join(self.calibration.fit(frame) for _, frame in newest.values())
 
     def start_recording(self, path: Path) -> None:

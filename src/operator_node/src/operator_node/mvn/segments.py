@@ -53,8 +53,8 @@ parent.
 class SegmentFrame(NamedTuple):
     """All segments of one person at one moment.
 
-    The origin of a segment is the centre of the joint towards the pelvis. In the T-pose all are turned alike:
-    x forward, y left, z up.
+    The origin of a segment is the centre of the joint towards the pelvis. In the T-pose all have the same
+    orientation: x forward, y left, z up.
 
     Attributes:
         person: Number of the person, from 0.

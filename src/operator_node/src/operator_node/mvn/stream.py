@@ -48,7 +48,7 @@ class _Group:
 
 
 class StreamDecoder:
-    """Assembles messages from datagrams, in whatever order they arrive; its memory is bounded for any input.
+    """Assembles messages from datagrams, in any order of arrival; its memory is bounded for any input.
 
     A message is returned once all of its datagrams have arrived, and dropped when one of a newer sample arrives first.
 
@@ -60,9 +60,10 @@ class StreamDecoder:
 
     Attributes:
         counts: `received` is the number of datagrams; each of them is `used`, `late`, `duplicate`, `incomplete` (its
-            message was dropped), `ignored` (type 01 beside type 02) or `refused: REASON`, or waits for the rest of its
-            message. In addition, `frames` is the number of `SegmentFrame`s returned, and `skipped` the number of
-            samples missing between those: they were lost or late, or MVN streams at a lower rate than it measures.
+            message was dropped), `ignored` (type 01 when type 02 is sent, too) or `refused: REASON`, or waits for the
+            rest of its message. In addition, `frames` is the number of `SegmentFrame`s returned, and `skipped` the
+            number of samples missing between those: they were lost or late, or MVN streams at a lower rate than it
+            measures.
         refused: Reason of each refused datagram, of `packets.REASONS`, limited to the newest; may be emptied.
         refusals: Details of the newest refusal for each reason.
         remarks: Oddities, by subject; may be emptied.

@@ -34,17 +34,17 @@ def command_of(device_id: str, force: Vector, key: str) -> str:
     return json.dumps({"inverse3": [{"device_id": device_id, "commands": commands}]})
 
 
-def device_in(frame: str | bytes, wanted: str) -> str:
+def device_in(frame: str | bytes, device_id: str) -> str:
     """Returns the id of an Inverse3 in the first message.
 
     Raises:
-        ReadingError: If there is none, or not the wanted one.
+        ReadingError: If there is none, or not the given one.
     """
     known = [str(each.get("device_id", "")) for each in _entries(_message(frame), "inverse3")]
-    if not known or (wanted and wanted not in known):
+    if not known or (device_id and device_id not in known):
         names = f"it has {', '.join(known)}" if known else "it has none"
-        raise ReadingError("no device", f"expected an Inverse3{wanted and f' {wanted}'}, {names}")
-    return wanted or known[0]
+        raise ReadingError("no device", f"expected an Inverse3{device_id and f' {device_id}'}, {names}")
+    return device_id or known[0]
 
 
 def state_in(frame: str | bytes, device_id: str) -> HaplyState:

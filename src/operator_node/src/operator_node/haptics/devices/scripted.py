@@ -44,9 +44,9 @@ class ScriptedDevice(EmulatedDevice):
         self._hand.position = self._hand.velocity = (0.0, 0.0, 0.0)
         return self._hand
 
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         """Returns the position to which the hand pulls the handle."""
-        return self._press.wanted(time_s)
+        return self._press.goal(time_s)
 
     def read(self) -> HapticReading | None:
         """Returns the state of the handle.

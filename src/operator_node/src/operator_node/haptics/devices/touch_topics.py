@@ -20,7 +20,7 @@ from robot_model.geometry import ZERO, Vector, minus, scaled
 
 PATIENCE_S = 1.0
 """Time without a state after which the driver counts as gone [s]."""
-GOODBYES, GOODBYE_S = 30, 0.01
+FINAL_ZEROS, FINAL_PERIOD_S = 30, 0.01
 """Number and period of zero forces at the end [s]: the driver holds the last force forever, and rospy's own thread
 needs the time to send.
 """
@@ -161,9 +161,9 @@ class TouchDevice(HapticDevice):
         return rospy.Publisher(f"{self.config.name}/{topic}", kind, queue_size=1, tcp_nodelay=True)
 
     def _send_zeros(self) -> None:
-        for _ in range(GOODBYES):
+        for _ in range(FINAL_ZEROS):
             self._publish(ZERO)
-            time.sleep(GOODBYE_S)
+            time.sleep(FINAL_PERIOD_S)
 
     def _leave(self) -> None:
         """Ensures zero force before ROS shuts the node down."""

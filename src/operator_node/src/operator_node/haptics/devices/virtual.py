@@ -72,7 +72,7 @@ class VirtualDevice(EmulatedDevice):
         self._socket, self._mouse, self._received = ours, ZERO, b""
         super().open()
 
-    def wanted(self, time_s: float) -> Vector:
+    def goal(self, time_s: float) -> Vector:
         """Returns the position of the mouse."""
         return self._mouse
 
