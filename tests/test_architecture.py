@@ -64,7 +64,16 @@ def _imports(path: Path) -> set[str]:
     return set(imported_names(path, module))
 
 
-BY_FEATURE = {"operator_node", "robot_model", "rpbi_data", "rpbi_utils", "safe_robot"}
+BY_FEATURE = {
+    "ik_ros",
+    "motion_primitives",
+    "operator_node",
+    "robot_model",
+    "rpbi_data",
+    "rpbi_mpc",
+    "rpbi_utils",
+    "safe_robot",
+}
 """Packages whose folders are features, each with its modules that need ROS, see test_layout.py."""
 COMPATIBILITY = SRC / "compatibility"
 
@@ -183,7 +192,7 @@ FAMILIES = {
         "rpbi.control.controllers.controller:Controller",
         "controllers.md",
     ),
-    "task": ("ik_ros.tasks:TASKS", "ik_ros.formulation.task:Task", "ik_tasks.md"),
+    "task": ("ik_ros.tasks:TASKS", "ik_ros.tasks.task:Task", "ik_tasks.md"),
     "device": ("operator_node.devices:DEVICES", "operator_node.device:Device", "devices.md"),
     "haptic device": (
         "operator_node.haptics.devices:HAPTIC_DEVICES",

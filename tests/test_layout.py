@@ -136,7 +136,16 @@ DOCUMENTED = {
 """Import paths that pages of this release or the first one name; they lead to modules that need ROS."""
 
 
-BY_FEATURE = {"operator_node", "robot_model", "rpbi_data", "rpbi_utils", "safe_robot"}
+BY_FEATURE = {
+    "ik_ros",
+    "motion_primitives",
+    "operator_node",
+    "robot_model",
+    "rpbi_data",
+    "rpbi_mpc",
+    "rpbi_utils",
+    "safe_robot",
+}
 """Packages whose folders are features, each with all of it. Others have what needs ROS below a `ros` folder."""
 EDGE = re.compile(r".*(_node|_topics|_services|_action|_messages)|.*\.(ros|console)\.\w+")
 """Modules that may need ROS: by their names, in a flat `ros` folder, and commands."""

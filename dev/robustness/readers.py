@@ -14,7 +14,7 @@ from worlds import ball, write_world
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.errors import InterfaceError
-from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.tasks.robot import PinocchioRobot
 from operator_node.avatar.human_urdf import urdf_offsets
 from robot_model.chain import Chain
 from robot_model.model import RobotModel

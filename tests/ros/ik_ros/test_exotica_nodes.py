@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool
 
 from custom_ros_tools.errors import ConfigError
 from ik_ros.msg import EXOTicaProblem, EXOTicaSyncTf, IKSolution
-from ik_ros.ros.exotica_setup import synced_frames
+from ik_ros.ros.exotica import synced_frames
 from ik_ros.srv import EXOTica, EXOTicaInfo, JointNames, JointNamesRequest
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "support/programs"

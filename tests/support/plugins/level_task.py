@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.schema import Text
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.tasks.robot import PinocchioRobot
+from ik_ros.tasks.task import Linearization, Task, TaskConfig
 
 
 class LevelConfig(TaskConfig):

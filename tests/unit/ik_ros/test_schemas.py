@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft7Validator
 
-from ik_ros.schemas import schema_files, schemas
+from ik_ros.node_configs import schema_files, schemas
 from ik_ros.solvers import SOLVERS
 
 ROOT = Path(__file__).resolve().parents[3]

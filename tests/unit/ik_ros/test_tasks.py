@@ -11,12 +11,12 @@ import pinocchio as pin
 import pytest
 from tree_robot import TREE
 
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Task
 from ik_ros.problem import IKProblem
 from ik_ros.shape import ShapeConfig
 from ik_ros.tasks import TASKS
 from ik_ros.tasks.com_in_support import ComInSupport
+from ik_ros.tasks.robot import PinocchioRobot
+from ik_ros.tasks.task import Task
 
 SHAPES = [
     {"name": "hand", "link": "left_hand", "sphere": 0.05},

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pybullet
 import pytest
 
-from ik_ros.formulation.clearance import clearance
 from ik_ros.shape import RoundedCore, ShapeConfig
+from ik_ros.tasks.clearance import clearance
 
 SHAPES = {"sphere": {"sphere": 0.1}, "capsule": {"capsule": [0.1, 0.6]}, "box": {"box": [0.3, 0.5, 0.7]}}
 

@@ -299,7 +299,7 @@ def test_targets_need_a_task_that_they_are_for(urdf):
         ("{costs: [{name: a, type: closeness}], shapes: [{name: s}]}", r"shapes\[0\]: expected one of sphere, box"),
         ("costs: [{name: a, type: distance, pairs: [[b, c]]}]", r"costs\[0\].pairs\[0\]: unknown shape 'b'"),
         ("costs: [{name: a, type: 'nobody.knows:It'}]", r"costs\[0\].type: no module 'nobody'"),
-        ("costs: [{name: a, type: 'math:pi'}]", "expected a subclass of ik_ros.formulation.task:Task, got 'math:pi'"),
+        ("costs: [{name: a, type: 'math:pi'}]", "expected a subclass of ik_ros.tasks.task:Task, got 'math:pi'"),
         ("costs: [{name: a, type: frame_position, frame: body, axes: [rx]}]", r"costs\[0\].axes: expected some of"),
         ("costs: [{name: a, type: joint_limits, limits: {left_1: [2.0, 3.0]}}]", r"limits.left_1: leaves 'left_1' no"),
     ],

@@ -17,12 +17,11 @@ from scipy.spatial.transform import Rotation
 from tree_robot import TREE
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
+from ik_ros.chain.symbolic import link_frames, rotation_vector
+from ik_ros.chain.trajectory_program import Program, Spline
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
-from ik_ros.trajectory.program import Program
-from ik_ros.trajectory.spline import Spline
-from ik_ros.trajectory.symbolic import link_frames, rotation_vector
 from robot_model.geometry import Pose
 from rpbi.kinematics import Kinematics
 

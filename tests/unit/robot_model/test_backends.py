@@ -113,7 +113,7 @@ class TestKdl(BackendConformance):
 
 class OfPinocchio(Backend):
     def __init__(self, path: str) -> None:
-        from ik_ros.formulation.robot import PinocchioRobot
+        from ik_ros.tasks.robot import PinocchioRobot
 
         self.robot = PinocchioRobot(path)
         self.joint_names, self.limits = self.robot.joint_names, self.robot.limits
@@ -147,7 +147,7 @@ class OfCasadi(OfChains):
     def _frame(self, link: str):
         import casadi
 
-        from ik_ros.trajectory.symbolic import link_frames
+        from ik_ros.chain.symbolic import link_frames
 
         chain = self.chain(link)
         q = casadi.SX.sym("q", len(chain.joint_names))

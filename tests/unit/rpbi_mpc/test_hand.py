@@ -8,8 +8,8 @@ import yaml
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
 from robot_model.asset_files import find_file
-from rpbi_mpc.hand import PlanarHand, PlanarHandConfig
 from rpbi_mpc.node_configs import PushingNodeConfig
+from rpbi_mpc.pushing.hand import PlanarHand, PlanarHandConfig
 
 EXAMPLE = "{rpbi_examples}/configs/pushing_mpc/mpc.yaml"
 

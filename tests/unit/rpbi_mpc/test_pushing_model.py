@@ -8,6 +8,7 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError
 from rpbi_mpc.pushing.planar.model import (
+    SliderConfig,
     advanced,
     complementarity,
     load_for,
@@ -19,7 +20,6 @@ from rpbi_mpc.pushing.planar.model import (
 )
 from rpbi_mpc.pushing.planar.motion import PlanarScene, gap_and_contact, moved
 from rpbi_mpc.pushing.planar.paths import PathConfig, PushPath
-from rpbi_mpc.pushing.planar.slider import SliderConfig
 
 SLIDER = SliderConfig(length=0.1, width=0.08, friction=0.3, support="uniform")
 

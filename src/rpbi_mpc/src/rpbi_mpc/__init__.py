@@ -2,8 +2,8 @@
 
 from .controller import ControlPlan as ControlPlan
 from .controller import MpcController as MpcController
+from .controller import Plant as Plant
+from .controller import Sensed as Sensed
 from .loop import LockStep as LockStep
 from .loop import LoopConfig as LoopConfig
-from .plant import Plant as Plant
-from .plant import Sensed as Sensed
 from .records import write_records as write_records

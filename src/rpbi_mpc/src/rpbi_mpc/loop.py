@@ -14,8 +14,7 @@ from pydantic import Field, model_validator
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, NonNegative, Unit
 
-from .controller import ControlPlan, MpcController
-from .plant import Plant, Sensed
+from .controller import ControlPlan, MpcController, Plant, Sensed
 
 
 class LoopConfig(ConfigModel):

@@ -19,8 +19,8 @@ from custom_ros_tools.schema import (
     optional,
 )
 from custom_ros_tools.schema.json_schema import Schema, json_schema, resolved, schema_texts
+from rpbi_mpc.pushing.hand import PlanarHandConfig
 
-from .hand import PlanarHandConfig
 from .loop import LoopConfig
 from .pushing.config import PushingConfig
 from .pushing.sampling_planner import PushSamplingConfig

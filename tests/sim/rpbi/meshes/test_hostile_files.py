@@ -17,7 +17,7 @@ from ros_system import support_on_path
 from worlds import ball, write_world
 
 from custom_ros_tools.errors import ConfigError
-from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.tasks.robot import PinocchioRobot
 from robot_model.model import RobotModel
 from robot_model.urdf.document import UrdfDocument
 from rpbi.bodies.urdf_object import UrdfObject

@@ -1,3 +1,3 @@
 """Learning and planning by the release's services, under the release's names."""
 
-from motion_primitives.ros.dmp_processor import DMPProcessor as DMPProcessor
+from motion_primitives.ros.dmp_services import DMPProcessor as DMPProcessor

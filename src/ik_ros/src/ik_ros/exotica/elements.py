@@ -1,20 +1,59 @@
-"""The elements of an EXOTica problem as models: their fields, types and defaults."""
+"""The elements of an EXOTica problem as models: their fields, types and defaults, and notations of rotations."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, TypeVar
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
+from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, InnerProblemsError, Text
 from robot_model.asset_files import ExistingFile
-from robot_model.geometry import Pose, normalized
+from robot_model.geometry import Pose, Quaternion, normalized
 
 from .records import XmlRecord
-from .rotations import rotation_of
+
+
+def _checked_quaternion(numbers: Sequence[float]) -> Rotation:
+    if math.hypot(*numbers) < 1e-6:
+        raise ValueError("expected a quaternion x, y, z, w that is not zero")
+    return Rotation.from_quat(numbers)
+
+
+def _checked_matrix(numbers: Sequence[float]) -> Rotation:
+    matrix = np.array(numbers).reshape(3, 3)
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-3) or np.linalg.det(matrix) < 0.0:
+        raise ValueError("expected the nine numbers of a rotation matrix, row by row")
+    return Rotation.from_matrix(matrix)
+
+
+NOTATIONS: Mapping[str, tuple[int, Callable[[Sequence[float]], Rotation]]] = {
+    "RPY": (3, lambda numbers: Rotation.from_euler("xyz", numbers)),
+    "ZYX": (3, lambda numbers: Rotation.from_euler("ZYX", numbers)),
+    "ZYZ": (3, lambda numbers: Rotation.from_euler("ZYZ", numbers)),
+    "AngleAxis": (3, Rotation.from_rotvec),
+    "Quaternion": (4, _checked_quaternion),
+    "Matrix": (9, _checked_matrix),
+}
+"""Count of numbers of each notation, and their rotation."""
+
+
+def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
+    """Returns the quaternion x, y, z, w of a rotation in one of the `NOTATIONS`.
+
+    Raises:
+        ValueError: If the numbers are no rotation, or are too many or too few.
+    """
+    count, make = NOTATIONS[notation]
+    if len(numbers) != count:
+        raise ValueError(f"expected {count} numbers for a rotation as {notation}, got {len(numbers)}")
+    x, y, z, w = make(numbers).as_quat().tolist()
+    return x, y, z, w
+
 
 Element = TypeVar("Element", bound="ElementConfig")
 MAX_NUMBERS = 10_000

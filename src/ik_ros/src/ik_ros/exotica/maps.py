@@ -13,8 +13,7 @@ from custom_ros_tools.schema import KeyedError, Text
 from ik_ros.problem import AttachedFrame, JointPositions
 from robot_model.geometry import Pose
 
-from .elements import ElementConfig, Flag, MapFrame, Number, Numbers, list_of
-from .rotations import NOTATIONS, rotation_of
+from .elements import NOTATIONS, ElementConfig, Flag, MapFrame, Number, Numbers, list_of, rotation_of
 from .scene import ExoticaScene, OnLink, errors_of
 
 Notation = Literal["RPY", "ZYX", "ZYZ", "AngleAxis", "Quaternion", "Matrix"]

@@ -1,17 +1,26 @@
-"""Problems and the service of EXOTica, compatible with clients of the authors' release."""
+"""EXOTica's problems and service, compatible with clients of the release, and `ik_setup_node.py exotica`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import rospy
+from std_msgs.msg import Float64MultiArray, Header
 
+from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from ik_ros.msg import EXOTicaProblem, EXOTicaSyncTf
+from ik_ros.node_configs import ExoticaSetupParameters
 from ik_ros.problem import AttachedFrame, IKProblem
 from ik_ros.srv import EXOTicaInfo, EXOTicaInfoResponse
 from robot_model.geometry import Pose
 
-from .messages import positions_in
+from .messages import positions_in, positions_message
+from .setup_topics import ProblemInputs, publish_problems
+from .solver_name import topics_of
+from .tf import FreshTf
 
 if TYPE_CHECKING:
     from ik_ros.solvers.exotica import ExoticaSolver
@@ -60,3 +69,89 @@ def serve_info(solver: ExoticaSolver) -> None:
         controlled_joint_names=solver.joint_names,
     )
     rospy.Service(INFO, EXOTicaInfo, lambda _: response)
+
+
+class SyncedFrame(NamedTuple):
+    """A frame of the scene that follows TF.
+
+    Attributes:
+        tf_parent: TF frame that its pose is in.
+        tf_child: TF frame that it follows.
+        exo_parent: Frame of the scene that it is attached to; empty for the root.
+        exo_child: The frame.
+    """
+
+    tf_parent: str
+    tf_child: str
+    exo_parent: str
+    exo_child: str
+
+
+def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
+    """Returns the frames described by lines of four names; `''` is the empty name.
+
+    Raises:
+        ConfigError: If a line has more or fewer names.
+    """
+    frames = []
+    for line in lines:
+        words = ["" if word in ("''", '""') else word for word in line.replace(",", " ").split()]
+        if len(words) != len(SyncedFrame._fields):
+            message = f"expected four names ({' '.join(SyncedFrame._fields)}), got {line!r}"
+            raise ConfigError([Problem(rospy.get_name(), "sync_tf_to_exotica_object", message)])
+        frames.append(SyncedFrame(*words))
+    return frames
+
+
+class ExoticaSetup:
+    """Publishes problems for the solver `exotica` as in the authors' release: goals of task maps, and frames.
+
+    It waits for the solver's node before it begins, to learn its task maps.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+        rospy.ROSInterruptException: If ROS shuts down while it waits.
+    """
+
+    def __init__(self) -> None:
+        config = private_parameters(ExoticaSetupParameters)
+        synced = synced_frames(config.sync_tf_to_exotica_object)
+        self._frames = [(one, FreshTf(one.tf_parent, one.tf_child, config.tf_timeout_s)) for one in synced]
+        info = _info()
+        self._goals = {name: [0.0] * size for name, size in zip(info.task_map_names, info.task_map_nrho)}
+        rospy.set_param("ik_ros/interface", "exotica")
+        topics = topics_of("setup", "exotica")
+        self._inputs = ProblemInputs(topics, config.max_num_prev_solutions, {})
+        self._inputs.subscribe()
+        for name in self._goals:
+            self._inputs.listen(f"task_map_goal/{name}", Float64MultiArray, partial(self._on_goal, name))
+        publish_problems(topics, EXOTicaProblem, config.hz, config.start_on_init, self._problem)
+
+    def _on_goal(self, name: str, message: Float64MultiArray) -> None:
+        if len(message.data) != len(self._goals[name]):
+            raise ValueError(f"expected {len(self._goals[name])} values, got {len(message.data)}")
+        IKProblem(goals={name: message.data})  # the constructor checks them
+        self._goals[name] = list(message.data)
+
+    def _problem(self) -> EXOTicaProblem:
+        sync_tf = []
+        for synced, tf in self._frames:
+            pose = tf.pose()
+            sync_tf.append(EXOTicaSyncTf(*synced, [*pose.position, *pose.quat_xyzw]))
+        with self._inputs.lock:
+            return EXOTicaProblem(
+                header=Header(stamp=rospy.Time.now()),
+                task_map_names=list(self._goals),
+                task_map_goals=[Float64MultiArray(data=values) for values in self._goals.values()],
+                start_state=positions_message(self._inputs.start or {}),
+                previous_solutions=[positions_message(one) for one in self._inputs.previous],
+                sync_tf=sync_tf,
+            )
+
+
+def _info() -> EXOTicaInfoResponse:
+    """Waits for the solver's node and returns its task maps."""
+    service = rospy.ServiceProxy(INFO, EXOTicaInfo)
+    rospy.loginfo("waiting for %s", service.resolved_name)
+    service.wait_for_service()
+    return service()

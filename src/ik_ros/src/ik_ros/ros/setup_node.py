@@ -20,10 +20,9 @@ from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
-from .exotica_setup import ExoticaSetup
+from .exotica import ExoticaSetup
 from .messages import problem_message
-from .problem_inputs import START_TOPICS, ProblemInputs
-from .problem_publisher import publish_problems
+from .setup_topics import START_TOPICS, ProblemInputs, publish_problems
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import FreshTf
 

@@ -14,7 +14,7 @@ from ik_ros.exotica.problem_file import BoundedEndPoseProblem, read_problem
 from ik_ros.exotica.scene import ExoticaScene, errors_of
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver
-from ik_ros.task_solver.formulation import Formulation
+from ik_ros.tasks.formulation import Formulation
 from robot_model.asset_files import ExistingFile
 from robot_model.geometry import Pose
 from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M

@@ -18,10 +18,10 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ik_ros.formulation.frame_task import FrameTask
-from ik_ros.formulation.robot import from_base, to_se3
-from ik_ros.task_solver.formulation import Formulation, TaskSet
-from ik_ros.task_solver.gauss_newton import Candidate, GaussNewton, Iterate
+from ik_ros.tasks.formulation import Formulation, TaskSet
+from ik_ros.tasks.frame_task import FrameTask
+from ik_ros.tasks.gauss_newton import Candidate, GaussNewton, Iterate
+from ik_ros.tasks.robot import from_base, to_se3
 
 AIM = 0.1
 """Share of the tolerances that the search aims at, so that solutions are safely within them."""

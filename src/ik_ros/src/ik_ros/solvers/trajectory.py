@@ -29,9 +29,8 @@ try:
 except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
-from ik_ros.trajectory.program import Program
-from ik_ros.trajectory.spline import Spline
-from ik_ros.trajectory.symbolic import link_frames, sphere_distances
+from ik_ros.chain.symbolic import link_frames, sphere_distances
+from ik_ros.chain.trajectory_program import Program, Spline
 
 MAX_INTERVALS = 128
 """Largest number of intervals of a spline; waypoints closer together than two intervals can hardly all be passed."""

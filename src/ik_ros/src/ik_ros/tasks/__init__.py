@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from custom_ros_tools.plugins.table import PluginTable
 
 if TYPE_CHECKING:
-    from ik_ros.formulation.task import Task
+    from .task import Task
 
 TASKS: PluginTable[Task] = PluginTable(
     "task",
-    "ik_ros.formulation.task:Task",
+    "ik_ros.tasks.task:Task",
     {
         "frame_pose": "ik_ros.tasks.frame_pose:FramePose",
         "frame_position": "ik_ros.tasks.frame_position:FramePosition",

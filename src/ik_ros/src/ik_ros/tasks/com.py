@@ -6,9 +6,10 @@ from typing import Literal
 import numpy as np
 
 from custom_ros_tools.schema import ListOf, Position
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig
 from ik_ros.problem import IKProblem
+
+from .robot import PinocchioRobot
+from .task import Linearization, Task, TaskConfig
 
 
 class ComConfig(TaskConfig):

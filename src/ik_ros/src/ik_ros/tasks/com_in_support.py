@@ -6,8 +6,9 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
+
+from .robot import PinocchioRobot
+from .task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class ComInSupportConfig(TaskConfig):

@@ -6,9 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
-from ik_ros.formulation.clearance import RobotShape, clearance
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
+
+from .clearance import RobotShape, clearance
+from .robot import PinocchioRobot
+from .task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAR_M = 0.3
 """Pairs are considered up to this much beyond the required distance [m]."""

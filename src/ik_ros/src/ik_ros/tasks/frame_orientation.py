@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from ik_ros.formulation.frame_task import FrameTask
 from robot_model.geometry import Pose
+
+from .frame_task import FrameTask
 
 
 class FrameOrientation(FrameTask):

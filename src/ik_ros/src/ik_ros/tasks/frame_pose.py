@@ -1,6 +1,6 @@
 """The pose of a link."""
 
-from ik_ros.formulation.frame_task import FrameTask
+from .frame_task import FrameTask
 
 
 class FramePose(FrameTask):

@@ -3,9 +3,10 @@
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
-from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import TaskConfig, keyed_errors
+
+from .joint_task import JointTask
+from .robot import PinocchioRobot
+from .task import TaskConfig, keyed_errors
 
 
 class JointLimitsConfig(TaskConfig):

@@ -7,10 +7,11 @@ import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
 from ik_ros.problem import IKProblem
 from robot_model.reach import Residual
+
+from .robot import PinocchioRobot
+from .task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAREST_M = 1e-6
 """Distance below which there is no direction [m]."""

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import TaskConfig
 from ik_ros.problem import IKProblem
+
+from .joint_task import JointTask
+from .robot import PinocchioRobot
+from .task import TaskConfig
 
 
 class PostureConfig(TaskConfig):

@@ -7,12 +7,12 @@ from typing import Annotated
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres, Seconds, Unit
+from rpbi_mpc.pushing.planar.model import SliderConfig
 
 from .outcome import ToleranceConfig
 from .planar.estimate import EstimatorConfig
 from .planar.motion import ApproachConfig
 from .planar.paths import PathConfig
-from .planar.slider import SliderConfig
 from .program import ProgramConfig
 
 

@@ -10,8 +10,7 @@ from collections import deque
 
 import numpy as np
 
-from rpbi_mpc.controller import ControlPlan, MpcController
-from rpbi_mpc.plant import Sensed
+from rpbi_mpc.controller import ControlPlan, MpcController, Sensed
 
 from .config import PushingConfig
 from .outcome import PushOutcome, PushRecord

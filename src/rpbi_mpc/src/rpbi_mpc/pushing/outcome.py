@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Positive, PositiveMetres, Unit
-
-from .planar.slider import SliderConfig
+from rpbi_mpc.pushing.planar.model import SliderConfig
 
 
 class ToleranceConfig(ConfigModel):

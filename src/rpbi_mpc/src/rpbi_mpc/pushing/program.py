@@ -10,9 +10,9 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, Seconds, Unit
+from rpbi_mpc.pushing.planar.model import SliderConfig
 
 from .planar.model import advanced, complementarity, pusher_velocity
-from .planar.slider import SliderConfig
 
 try:
     import casadi

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rpbi_mpc.loop import Cycle
+from rpbi_mpc.pushing.planar.model import SliderConfig
 from rpbi_mpc.records import summary_of, table_of
 
 from .controller import PushingController
 from .planar.motion import rotation
-from .planar.slider import SliderConfig
 
 if TYPE_CHECKING:
     import pandas

@@ -12,7 +12,7 @@ from custom_ros_tools.transforms import yaw_of
 from rpbi.samples import ViconSample
 from rpbi.world import World
 from rpbi.world.forks.prediction import PlannedInput, Prediction
-from rpbi_mpc.plant import Plant, Sensed
+from rpbi_mpc.controller import Plant, Sensed
 from rpbi_mpc.sampling.world import RolloutTicks
 
 from .planar.motion import rotation

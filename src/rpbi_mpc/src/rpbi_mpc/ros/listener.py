@@ -15,8 +15,8 @@ from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.transforms import yaw_of
-from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
+from rpbi_mpc.pushing.hand import PlanarHand
 
 SLACK_S = 1e-4
 """Difference below which stamps count as equal [s]: less than a tick, more than rounding."""

@@ -11,10 +11,9 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi_mpc.controller import MpcController
+from rpbi_mpc.controller import MpcController, Plant
 from rpbi_mpc.loop import Cycle, LockStep, LoopConfig, Status
 from rpbi_mpc.msg import MpcStatus
-from rpbi_mpc.plant import Plant
 from rpbi_mpc.records import write_records
 
 IDLE_S = 0.04

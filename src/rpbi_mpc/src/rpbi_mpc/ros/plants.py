@@ -14,9 +14,9 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.transforms import yaw_of
 from ros_pybullet_interface.msg import PredictedBody
 from rpbi.world.forks.prediction import PlannedInput
-from rpbi_mpc.hand import PlanarHand
+from rpbi_mpc.controller import Plant, Sensed
 from rpbi_mpc.node_configs import PlantConfig
-from rpbi_mpc.plant import Plant, Sensed
+from rpbi_mpc.pushing.hand import PlanarHand
 from rpbi_mpc.sampling.world import RolloutTicks
 
 from .listener import SceneListener, TickSceneListener

@@ -8,8 +8,8 @@ from sensor_msgs.msg import JointState
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from rpbi_mpc.controller import Plant, Sensed
 from rpbi_mpc.node_configs import SamplingNodeConfig
-from rpbi_mpc.plant import Plant, Sensed
 from rpbi_mpc.sampling import InputConfig, SamplingController
 from rpbi_mpc.sampling.world import planned, whole_ticks
 

@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Seconds, Text
-from rpbi_mpc.controller import ControlPlan, MpcController
-from rpbi_mpc.plant import Sensed
+from rpbi_mpc.controller import ControlPlan, MpcController, Sensed
 
 from .samplers import SAMPLERS
 

@@ -13,7 +13,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf
 from rpbi.world import World
 from rpbi.world.forks.prediction import PlannedInput
-from rpbi_mpc.plant import Plant, Sensed
+from rpbi_mpc.controller import Plant, Sensed
 
 
 class InputConfig(ConfigModel):

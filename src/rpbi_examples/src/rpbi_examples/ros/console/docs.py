@@ -6,7 +6,7 @@ from pathlib import Path
 from custom_ros_tools.console.modules import workspace
 
 WRITERS = (
-    "ik_ros.schemas:schema_files",
+    "ik_ros.node_configs:schema_files",
     "motion_primitives.node_configs:schema_files",
     "rpbi_mpc.node_configs:schema_files",
     "rpbi_utils.schemas:schema_files",

@@ -7,7 +7,7 @@ import numpy as np
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.transforms import Array
 from motion_primitives import MotionPlan
-from motion_primitives.ros.dmp_processor import DMPProcessor
+from motion_primitives.ros.dmp_services import DMPProcessor
 from motion_primitives.space import Space
 from rpbi_examples.lfd.skill import ALPHA_PER_S, BASES_PER_S, MIN_BASES, NAMES
 

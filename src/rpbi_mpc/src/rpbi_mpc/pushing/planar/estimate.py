@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel
-from rpbi_mpc.plant import Sensed
+from rpbi_mpc.controller import Sensed
 
+from .model import SliderConfig
 from .motion import PlanarScene, moved, rotation
-from .slider import SliderConfig
 
 KEPT_S = 2.0
 """Time for which commands are kept [s]; an older measurement is treated as new."""

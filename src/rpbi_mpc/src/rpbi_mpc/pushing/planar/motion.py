@@ -12,8 +12,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Positive, PositiveMetres, Unit
 
-from .model import response
-from .slider import SliderConfig
+from .model import SliderConfig, response
 
 CONTACT_GAP = 1e-6
 """Distance below which pusher and slider touch [m]."""

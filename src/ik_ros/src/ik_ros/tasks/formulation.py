@@ -9,13 +9,14 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, Count, KeyedError, ListOf, Position, Quat, Switch, Text
-from ik_ros.formulation.frame_task import FrameTask
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Task, TaskConfig, keyed_errors
 from ik_ros.shape import ShapeConfig
-from ik_ros.tasks import TASKS
 from robot_model.asset_files import ExistingFile
 from robot_model.geometry import Pose
+
+from . import TASKS
+from .frame_task import FrameTask
+from .robot import PinocchioRobot
+from .task import Task, TaskConfig, keyed_errors
 
 WORLD = "world"
 """Default frame of poses for a floating base."""

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import daqp
 import numpy as np
 
-from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import PinocchioRobot
-from ik_ros.formulation.task import Linearization
 from robot_model.reach import Residual
 
 from .formulation import Part
+from .joint_task import JointTask
+from .robot import PinocchioRobot
+from .task import Linearization
 
 
 class Candidate(NamedTuple):

@@ -1,1 +1,0 @@
-"""Parts of the solver `tasks`: robot, tasks, Gauss-Newton steps."""

@@ -1,1 +1,0 @@
-"""Problems of tasks and costs, and their solution by Gauss and Newton."""
