@@ -36,6 +36,7 @@ TABLES = (
     "rpbi_utils.console",
     "rpbi_data.console",
     "rpbi_examples.ros.console",
+    "custom_ros_tools.console",
     "rpbi_data.datasets.formats",
 )
 """Packages whose classes or commands have a file each, whoever imports them."""

@@ -180,7 +180,7 @@ import operator_node, rpbi, rpbi_utils
 root = pathlib.Path.cwd()
 for package in (operator_node, rpbi, rpbi_utils):
     assert pathlib.Path(package.__file__).is_relative_to(root), package.__file__
-from custom_ros_tools.console.page import console_files
+from custom_ros_tools.console.docs import console_files
 from operator_node.devices import DEVICES
 from rpbi.world.schemas import file_schemas, schemas
 from rpbi.reference.config_page import config_page

@@ -1,5 +1,5 @@
 """Runs the benchmarks, as `./rpbi bench` does."""
 
-from custom_ros_tools.ros.console import run_console
+from custom_ros_tools.console.modules import run_console
 
-run_console("rpbi_examples.ros.console.bench")
+run_console("custom_ros_tools.console.bench")

@@ -10,7 +10,7 @@ from typing import Any
 from PyQt5.QtCore import QEvent, QObject, QPoint, QTimer
 from PyQt5.QtWidgets import QApplication, QPushButton, QSlider, QStyle, QStyleOptionSlider, QWidget
 
-from custom_ros_tools.ros.node import run
+from custom_ros_tools.program import run
 from rpbi_utils.controls.ros import node
 
 BUTTONS = ("start", "stop", "send")

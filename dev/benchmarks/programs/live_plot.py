@@ -8,7 +8,7 @@ import time
 
 from PyQt5.QtCore import QTimer
 
-from custom_ros_tools.ros.node import run
+from custom_ros_tools.program import run
 from rpbi_utils.live_plot import live_plot_node as node
 
 WARM_UP_S = 3.0

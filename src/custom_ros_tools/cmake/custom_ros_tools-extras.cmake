@@ -2,11 +2,11 @@
 #
 # Makes a package's programs in the devel and the install space: rosrun and roslaunch find them by their names. Each
 # calls a function, given as `module:function`, by `run` (nodes) or `run_command` (commands) of
-# custom_ros_tools.ros.node, or the command of a module by `run_console` of custom_ros_tools.ros.console.
+# custom_ros_tools.program, or the command of a module by `run_console` of custom_ros_tools.console.modules.
 function(rpbi_programs)
-  set(calls_NODES node run)
-  set(calls_COMMANDS node run_command)
-  set(calls_CONSOLE console run_console)
+  set(calls_NODES program run)
+  set(calls_COMMANDS program run_command)
+  set(calls_CONSOLE console.modules run_console)
   cmake_parse_arguments(PARSE_ARGV 0 table "" "" "NODES;COMMANDS;CONSOLE")
   foreach(kind NODES COMMANDS CONSOLE)
     list(GET calls_${kind} 0 module)
@@ -20,7 +20,7 @@ function(rpbi_programs)
 "#!/usr/bin/python3
 # Made by CMake from CMakeLists.txt of ${PROJECT_NAME}.
 
-from custom_ros_tools.ros.${module} import ${call}
+from custom_ros_tools.${module} import ${call}
 
 if __name__ == \"__main__\":
     ${call}(\"${target}\")

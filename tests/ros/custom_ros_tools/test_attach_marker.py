@@ -11,7 +11,7 @@ from ros_system import stop_group, wait_until
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
-from custom_ros_tools.marker_config import MARKER_ACTIONS, MARKER_TYPES
+from custom_ros_tools.node_configs import MARKER_ACTIONS, MARKER_TYPES
 
 CUP: dict[str, Any] = {
     "node": {"topic_name": "cup/marker", "broadcast_offset": True, "child_frame_id": "cup"},

@@ -58,7 +58,7 @@ def test_only_nodes_of_roslaunch_watch_their_parent(tmp_path, argument, ends):
     program = (
         "import signal, threading\n"
         "signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})\n"
-        "from custom_ros_tools.ros.lifecycle.roslaunch_watch import end_with_roslaunch\n"
+        "from custom_ros_tools.program import end_with_roslaunch\n"
         "end_with_roslaunch()\n"
         "print(threading.active_count(), flush=True)\n"
         "signal.sigtimedwait({signal.SIGINT}, 60.0 if threading.active_count() > 1 else 0.0)\n"

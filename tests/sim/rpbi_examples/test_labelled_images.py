@@ -20,10 +20,10 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from rpbi.render.camera import Intrinsics
 from rpbi.world import World
+from rpbi_data.console.label_images import label_images
 from rpbi_data.labels.arrangement import CLEAR_M, Arrangement
 from rpbi_data.labels.bop import BopFolder
 from rpbi_data.labels.dataset import write_labelled_images
-from rpbi_examples.ros.console.label_images import label_images
 
 CLUTTER = "{rpbi_examples}/configs/clutter/config.yaml"
 IMAGES = 2

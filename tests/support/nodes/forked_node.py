@@ -39,7 +39,7 @@ PACKAGES = {
     "safe_robot",
     "teleop",
 }
-"""ROS packages whose programs may be forked: Python scripts that run a function by `custom_ros_tools.ros.node`."""
+"""ROS packages whose programs may be forked: Python scripts that run a function by `custom_ros_tools.program`."""
 PRELOADED = (
     "custom_ros_tools/attach_marker",
     "custom_ros_tools/remap_joint_state_to_joint_state",

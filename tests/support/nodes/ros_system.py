@@ -25,7 +25,7 @@ import yaml
 from forked_node import PACKAGES, ForkedNode
 
 from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from ros_pybullet_interface.srv import ListObjects
 
 MODULES = os.environ.get("PYTHONPATH")

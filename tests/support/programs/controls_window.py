@@ -93,7 +93,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    from custom_ros_tools.ros.node import run
+    from custom_ros_tools.program import run
 
     run(f"{Path(__file__).stem}:main")
     sys.exit()

@@ -11,7 +11,7 @@ from ros_system import is_running, wait_until
 
 PARENT = """
 import signal, subprocess, threading, time
-from custom_ros_tools.processes.child import start_child
+from custom_ros_tools.child_process import start_child
 
 children = []
 def start():

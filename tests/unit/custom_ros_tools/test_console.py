@@ -122,7 +122,7 @@ def test_texts_are_safe_for_a_terminal(capsys):
 PROGRAM = """
 import sys
 from custom_ros_tools.console.command import Command
-from custom_ros_tools.ros.node import run_command
+from custom_ros_tools.program import run_command
 
 def episodes():
     sys.stdin.read()
@@ -148,7 +148,7 @@ def test_a_command_whose_output_is_closed_ends_quietly(lines):
 
 IMPORTS = """
 import os, signal
-from custom_ros_tools.ros.node import late_imports, run_command
+from custom_ros_tools.program import late_imports, run_command
 
 def library():
     try:  # as trimesh does

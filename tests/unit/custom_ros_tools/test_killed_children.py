@@ -6,7 +6,7 @@ import select
 import subprocess
 import sys
 
-from custom_ros_tools.processes.child import kill_with_children
+from custom_ros_tools.child_process import kill_with_children
 
 PARENT = """
 import signal, subprocess, sys

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.marker_config import MarkerConfig
-from custom_ros_tools.node_configs import FloatArrayConfig, RateParameters, RemapConfig, StartParameters
+from custom_ros_tools.node_configs import FloatArrayConfig, MarkerConfig, RateParameters, RemapConfig, StartParameters
 from custom_ros_tools.schema import ConfigModel
 
 MARKER = {"node": {"topic_name": "marker"}, "type": "cube", "scale": [1, 2, 3]}

@@ -13,9 +13,9 @@ import pytest
 from ros_system import wait_until
 from rospy.impl.tcpros_base import TCPROSServer, TCPServer
 
-from custom_ros_tools.ros import server_socket
+from custom_ros_tools import sockets as server_socket
 from custom_ros_tools.ros.rospy_internals import keep_accepting
-from custom_ros_tools.ros.server_socket import PEEKED, ServerSocket
+from custom_ros_tools.sockets import PEEKED, ServerSocket
 
 SOON_S = 60.0
 

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-START = """from custom_ros_tools.processes.temporary import temporary_folder
+START = """from custom_ros_tools.files import temporary_folder
 folder = temporary_folder('trial'); print(folder.name, flush=True)"""
 
 

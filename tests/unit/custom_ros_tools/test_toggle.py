@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.services import Toggle
 
 
 def test_each_switch_acts_once() -> None:

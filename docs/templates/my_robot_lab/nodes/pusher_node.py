@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Pushes parcels off the belt."""
 
-from custom_ros_tools.ros.node import run
+from custom_ros_tools.program import run
 
 run("my_robot_lab.ros.pusher:main")

@@ -1,4 +1,4 @@
-"""Services: a toggle, and proxies that wait for their service."""
+"""Services that switch a function on and off, and proxies that wait for their service."""
 
 from custom_ros_tools.ros.services import ToggleService, get_srv_handler, get_srv_handlers
 

@@ -33,6 +33,9 @@ from .problem_stream import JointRateLimiterConfig
 from .solvers import SOLVERS
 from .tasks import TASKS
 
+_OWN_TYPE = "own_type"
+LISTS_OF_TASKS = ("constraints", "costs")
+
 
 class RobotIKConfig(ConfigModel):
     """Options of the robot's own inverse kinematics; the keys are those of its message."""
@@ -111,10 +114,6 @@ class TfToFloatArrayConfig(TargetParameters):
         "pos+quat",
         description="x, y, z [m]; and then a quaternion x, y, z, w, or roll, pitch, yaw [rad], or nothing.",
     )
-
-
-_OWN_TYPE = "own_type"
-LISTS_OF_TASKS = ("constraints", "costs")
 
 
 def schemas() -> dict[str, Schema]:

@@ -16,9 +16,8 @@ from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.ros.services import Toggle, ToggleService
 from custom_ros_tools.ros.transform_messages import TransformTopic, position_in, quat_in, transform_message
-from custom_ros_tools.toggle import Toggle
 from custom_ros_tools.transforms import rpy_of
 
 from .input_topics import SecondsOrOff, WatchedInput

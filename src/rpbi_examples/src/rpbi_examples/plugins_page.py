@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from ik_ros.solvers import SOLVERS
 from ik_ros.tasks import TASKS
 from motion_primitives.primitives import PRIMITIVES

@@ -31,7 +31,7 @@ from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
 from custom_ros_tools.ros.lifecycle.run_node import MAX_FILES
-from custom_ros_tools.ros.tf_listener import END_OF_TIME_S
+from custom_ros_tools.ros.tf_interface import END_OF_TIME_S
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
 

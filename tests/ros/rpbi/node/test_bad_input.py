@@ -18,7 +18,7 @@ from std_msgs.msg import Int64
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
-from custom_ros_tools.ros.tf_listener import END_OF_TIME_S, fault_in
+from custom_ros_tools.ros.tf_interface import END_OF_TIME_S, fault_in
 from ros_pybullet_interface.msg import PybulletObject
 
 TOPIC = "/rpbi/iiwa/joint_states/target"

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from tries import tries
 from worlds import iiwa, write_world
 
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from custom_ros_tools.sockets import flush_buffered_sockets
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.world import World

@@ -10,6 +10,7 @@ import pybullet
 import pytest
 from worlds import iiwa, write_world
 
+from custom_ros_tools.console.docs import files
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
@@ -18,7 +19,6 @@ from rpbi.ros.interface_table import FOLLOWS, endpoints
 from rpbi.ros.reference.reference_world import FOLLOWED, reference_world
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World
-from rpbi_examples.ros.console.docs import files
 
 ROOT = Path(__file__).resolve().parents[4]
 PAGES = ("config_reference.md", "topics_and_services.md")

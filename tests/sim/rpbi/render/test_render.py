@@ -17,7 +17,7 @@ import pytest
 import worlds
 from rendering import ALL, CAMERA, INTRINSICS, Rendering, back_project, project, rotation_matrix
 
-from custom_ros_tools.processes.child import is_stopped
+from custom_ros_tools.child_process import is_stopped
 from rpbi.geometry import Pose
 from rpbi.render.camera import DepthNoise, Intrinsics
 from rpbi.render.frame import Camera

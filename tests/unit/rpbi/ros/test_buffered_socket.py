@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from custom_ros_tools.ros.buffered_socket import MAX_TOGETHER, BufferedSocket, flush_buffered_sockets
+from custom_ros_tools.sockets import MAX_TOGETHER, BufferedSocket, flush_buffered_sockets
 
 
 @pytest.fixture

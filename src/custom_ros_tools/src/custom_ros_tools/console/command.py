@@ -10,9 +10,9 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.foreign import printable_lines
+from custom_ros_tools.program import is_output_closed
 
 from .argument import Argument, UsageError
-from .output import is_output_closed
 
 PROGRAM = "./rpbi"
 NAME_WIDTH = 16

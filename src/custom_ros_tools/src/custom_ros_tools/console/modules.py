@@ -1,9 +1,13 @@
-"""The modules of commands: `console/NAME.py` or `ros/console/NAME.py` of a package has the function NAME."""
+"""Commands of the packages: `console/NAME.py` or `ros/console/NAME.py` of a package has the function NAME."""
 
 import importlib
 import pkgutil
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
+
+from custom_ros_tools.program import run_command
 
 from .command import Command
 
@@ -19,12 +23,7 @@ def workspace() -> Path:
 def module_names(root: Path) -> list[str]:
     """Returns the full names of the modules of a workspace that may have commands."""
     files = {file for folder in FOLDERS for file in root.glob(f"src/*/src/*/{folder}/*.py")}
-    own = Path(__file__).parent  # the console itself
-    names = [
-        ".".join(file.relative_to(root).with_suffix("").parts[3:])
-        for file in files
-        if file.stem != "__init__" and file.parent.parts[-2:] != own.parts[-2:]
-    ]
+    names = (".".join(file.relative_to(root).with_suffix("").parts[3:]) for file in files if file.stem != "__init__")
     return sorted(names)
 
 
@@ -44,3 +43,34 @@ def commands(root: Path) -> list[Command]:
     """Returns all commands of a workspace, by name."""
     found = filter(None, map(command_of, module_names(root)))
     return sorted(found, key=lambda each: each.name)
+
+
+def run_console(module: str, words: Sequence[str] | None = None) -> None:
+    """Runs the command of a module and exits.
+
+    Args:
+        module: Full name of the module, whose last part is the name of the command.
+        words: Arguments of the command, by default those of the process.
+    """
+    given = sys.argv[1:] if words is None else words
+    run_command(f"{module}:{module.rpartition('.')[2]}", lambda function: Command(function).run(given))
+
+
+def run_console_of(*packages: str) -> None:
+    """Runs the command of some packages that the first argument of the process names, and exits."""
+    _run_one_of(module for package in packages for module in modules_of(package))
+
+
+def run_console_of_workspace() -> None:
+    """Runs the command of the workspace that the first argument of the process names, and exits."""
+    _run_one_of(module_names(workspace()))
+
+
+def _run_one_of(modules: Iterable[str]) -> None:
+    by_name = {module.rpartition(".")[2]: module for module in modules}
+    name, *words = sys.argv[1:] or ["--help"]
+    if name in by_name:
+        run_console(by_name[name], words)
+    for each in filter(None, map(command_of, by_name.values())):
+        print(f"{each.name:<8} {each.summary}")
+    sys.exit(0 if name in ("-h", "--help") else f"There is no command '{name}'.")

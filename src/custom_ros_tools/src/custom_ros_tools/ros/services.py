@@ -1,5 +1,6 @@
-"""Services: a toggle, and proxies that wait for their service."""
+"""Services: a function that is switched on and off, and proxies that wait for their service."""
 
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -10,6 +11,35 @@ from custom_ros_tools.errors import InterfaceError
 
 PATIENCE_S = 5.0
 """Time of waiting after which it is reported [s]."""
+Handler = Callable[[], tuple[bool, str]]
+
+
+class Toggle:
+    """Stores whether a function is on; refuses to switch it to its present state.
+
+    `start` switches it on and `stop` off; `name` is its name in messages.
+    """
+
+    def __init__(self, name: str, start: Callable[[], None], stop: Callable[[], None]) -> None:
+        self._name, self._start, self._stop = name, start, stop
+        self._is_on = False
+        self._lock = threading.Lock()
+
+    def on(self) -> tuple[bool, str]:
+        """Switches it on; returns whether that changed anything, and a message."""
+        return self._switch(True, self._start, "on")
+
+    def off(self) -> tuple[bool, str]:
+        """Switches it off; returns whether that changed anything, and a message."""
+        return self._switch(False, self._stop, "off")
+
+    def _switch(self, to: bool, act: Callable[[], None], word: str) -> tuple[bool, str]:
+        with self._lock:
+            if self._is_on == to:
+                return False, f"{self._name} is already {word}"
+            act()
+            self._is_on = to
+        return True, f"{self._name} is {word}"
 
 
 def get_srv_handler(
@@ -49,9 +79,6 @@ def call_service(name: str, srv_type: type, *arguments: object) -> Any:
     if not answer.success:
         raise InterfaceError(f"{name}: {answer.message}")
     return answer
-
-
-Handler = Callable[[], tuple[bool, str]]
 
 
 class ToggleService(rospy.Service):

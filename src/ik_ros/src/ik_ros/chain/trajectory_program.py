@@ -14,6 +14,24 @@ from robot_model.limits import Limits
 from .symbolic import link_frames, rotation_vector, sphere_distances
 
 DEGREE = 3
+SAMPLES = 2
+"""Number of points in each interval of the spline at which distances to obstacles are constrained."""
+SAFETY_M = 5e-3
+"""Additional clearance at these points [m], since spheres may come nearer between them."""
+ITERATIONS = 100
+OPTIONS: Any = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": ITERATIONS,
+        "tol": 1e-5,
+        "constr_viol_tol": 1e-6,
+        "expect_infeasible_problem": "yes",
+        "bound_relax_factor": 0.0,
+    },
+}
 
 
 class Spline:
@@ -63,26 +81,6 @@ class Spline:
         for i in range(self.intervals):
             weights[i : i + 2, i : i + 2] += pair
         return np.asarray(self.to_acceleration.T @ weights @ self.to_acceleration)
-
-
-SAMPLES = 2
-"""Number of points in each interval of the spline at which distances to obstacles are constrained."""
-SAFETY_M = 5e-3
-"""Additional clearance at these points [m], since spheres may come nearer between them."""
-ITERATIONS = 100
-OPTIONS: Any = {
-    "print_time": False,
-    "error_on_fail": False,
-    "ipopt": {
-        "print_level": 0,
-        "sb": "yes",
-        "max_iter": ITERATIONS,
-        "tol": 1e-5,
-        "constr_viol_tol": 1e-6,
-        "expect_infeasible_problem": "yes",
-        "bound_relax_factor": 0.0,
-    },
-}
 
 
 class Program:

@@ -17,6 +17,9 @@ from robot_model.geometry import Pose, Quaternion, normalized
 
 from .records import XmlRecord
 
+Element = TypeVar("Element", bound="ElementConfig")
+MAX_NUMBERS = 10_000
+
 
 def _checked_quaternion(numbers: Sequence[float]) -> Rotation:
     if math.hypot(*numbers) < 1e-6:
@@ -53,10 +56,6 @@ def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
         raise ValueError(f"expected {count} numbers for a rotation as {notation}, got {len(numbers)}")
     x, y, z, w = make(numbers).as_quat().tolist()
     return x, y, z, w
-
-
-Element = TypeVar("Element", bound="ElementConfig")
-MAX_NUMBERS = 10_000
 
 
 def _numbers(value: Any) -> Any:

@@ -15,8 +15,7 @@ from std_msgs.msg import Header
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.services import Toggle, ToggleService
 from ik_ros.problem import JointPositions
 
 from .messages import positions_in
@@ -25,6 +24,9 @@ QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
 """Names of solvers in the authors' release."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
+LOOK_HZ = 1.0
+SILENT_AFTER_S = 5.0
+"""Longest time without a solution while problems are published [s]; beyond it, the solver is reported."""
 
 
 class ProblemInputs:
@@ -72,11 +74,6 @@ class ProblemInputs:
 
     def _on_previous(self, topic: str, message: JointState) -> None:
         self.previous.append(positions_in(topic, message))
-
-
-LOOK_HZ = 1.0
-SILENT_AFTER_S = 5.0
-"""Longest time without a solution while problems are published [s]; beyond it, the solver is reported."""
 
 
 def publish_problems(

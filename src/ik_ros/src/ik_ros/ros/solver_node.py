@@ -15,8 +15,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.services import Toggle, ToggleService
 from ik_ros.msg import EXOTicaProblem, TracIKProblem
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage

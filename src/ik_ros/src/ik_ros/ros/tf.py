@@ -7,7 +7,7 @@ import rospy
 import tf2_ros
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from ik_ros.problem import IKProblem, Waypoint
 from robot_model.geometry import Pose
 

@@ -1,6 +1,6 @@
 """The solvers; a new one is a class in a file of its own and a line here."""
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from ik_ros.solver import Solver
 
 SOLVERS: PluginTable[Solver] = PluginTable(

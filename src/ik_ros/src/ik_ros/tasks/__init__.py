@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 
 if TYPE_CHECKING:
     from .task import Task

@@ -1,6 +1,6 @@
 """The primitives; a new one is a class in its own file and a line here."""
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from motion_primitives.primitive import Primitive
 
 PRIMITIVES: PluginTable[Primitive] = PluginTable(

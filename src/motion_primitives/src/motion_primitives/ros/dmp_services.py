@@ -25,6 +25,9 @@ from custom_ros_tools.transforms import Array
 from motion_primitives.errors import DemonstrationError
 from motion_primitives.release_dmp import ReleaseDMP, learn, plan
 
+Gains = float | Sequence[float]
+"""A gain for each dimension, or one for all."""
+
 
 class DMPServer:
     """Learns primitives of one dimension each, and plans with the active ones.
@@ -85,10 +88,6 @@ class DMPServer:
 def main() -> None:
     """Runs the node."""
     run_node("dmp_server", DMPServer)
-
-
-Gains = float | Sequence[float]
-"""A gain for each dimension, or one for all."""
 
 
 class DMPProcessor:

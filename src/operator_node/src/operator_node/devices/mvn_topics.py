@@ -16,11 +16,11 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallRate, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.schema import ConfigModel, FrameId, Text
+from custom_ros_tools.sockets import flush_buffered_sockets
 from operator_node.device import Reading
 from operator_node.input_topics import has_begun
 from operator_node.input_topics import stamp as present_stamp

@@ -11,8 +11,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.services import Toggle, ToggleService
 
 from .config import HapticNodeConfig
 from .coupling import stiffest_n_per_m

@@ -20,7 +20,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from custom_ros_tools.ros.transform_messages import position_in, quat_in, transform_message
 from operator_node.msg import HapticState
 from robot_model import geometry

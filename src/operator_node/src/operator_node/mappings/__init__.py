@@ -1,6 +1,6 @@
 """The mappings; a new one is a class in its own file and a line here."""
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 
 from .mapping import Mapping
 

@@ -14,14 +14,13 @@ from std_msgs.msg import Float64MultiArray
 
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.plugins import cause_of
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import leave_ros_on_signals
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.rospy_internals import DirectSending
-from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.ros.services import Toggle, ToggleService
 from custom_ros_tools.schema import HzOrOff
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.sockets import flush_buffered_sockets
 from operator_node.input_topics import QUEUE_SIZE, InputParameters, WatchedInput
 
 NAME = "operator_node"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, shortened
-from custom_ros_tools.processes.temporary import temporary_folder
+from custom_ros_tools.files import temporary_folder
 from robot_model.asset_files import resolve_package
 
 PACKAGE = "package://"

@@ -1,6 +1,6 @@
 """The types of bodies; to add one, write a class in its own file and a line here."""
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 
 from .body import Body
 from .body_config import BodyConfig

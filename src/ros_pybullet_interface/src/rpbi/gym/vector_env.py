@@ -19,8 +19,8 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, iterate
 
+from custom_ros_tools.child_process import start_child
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.processes.child import start_child
 
 from .checks import check_action
 from .env import WorldEnv, require_arguments

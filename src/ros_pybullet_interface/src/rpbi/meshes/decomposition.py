@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pybullet
 
-from custom_ros_tools.processes.temporary import temporary_folder
+from custom_ros_tools.files import temporary_folder
 from robot_model.mesh_cache import content_hash, kept
 
 from .trial import limit_resources

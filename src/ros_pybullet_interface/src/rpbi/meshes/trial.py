@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.processes.child import start_child
+from custom_ros_tools.child_process import start_child
 from robot_model.mesh_cache import cache_folder, content_hash
 
 TRIAL = 3

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from custom_ros_tools.processes.child import is_stopped
+from custom_ros_tools.child_process import is_stopped
 from rpbi.samples import SceneSample
 from rpbi.world.load_log import LoadLogReader, LogEntry
 

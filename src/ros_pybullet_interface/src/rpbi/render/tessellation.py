@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
-from custom_ros_tools.processes.temporary import temporary_folder
+from custom_ros_tools.files import temporary_folder
 from rpbi.config.pybullet_models import CreateVisualShape
 
 from . import surfaces

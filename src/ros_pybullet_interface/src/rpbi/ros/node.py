@@ -13,9 +13,9 @@ import rospy
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
 from custom_ros_tools.plugins import trust_only
-from custom_ros_tools.ros.buffered_socket import send_at_once
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.sockets import send_at_once
 from robot_model.asset_files import ROBOT_DESCRIPTION
 from robot_model.urdf.files import write_description
 from rpbi.engine.priority import RealTimePriority

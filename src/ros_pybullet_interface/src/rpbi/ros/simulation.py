@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from custom_ros_tools.sockets import flush_buffered_sockets
 from rpbi.config.world import checked_real_time_factor
 from rpbi.engine.pacer import Pacer
 from rpbi.engine.priority import RealTimePriority

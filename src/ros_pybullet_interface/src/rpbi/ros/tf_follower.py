@@ -13,7 +13,7 @@ import tf2_ros
 from custom_ros_tools.errors import InterfaceError, PluginError
 from custom_ros_tools.plugins import cause_of, full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.plugins import is_foreign

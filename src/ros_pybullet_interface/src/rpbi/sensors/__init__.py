@@ -1,6 +1,6 @@
 """The types of sensors; to add one, write a class in its own file and a line here."""
 
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from rpbi.config.sensors import SensorConfig
 
 from .sensor import BodySensor, Sensor

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
-from custom_ros_tools.plugins.table import config_of
+from custom_ros_tools.plugin_table import config_of
 from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies import BODY_TYPES, Body, BodyConfig
 

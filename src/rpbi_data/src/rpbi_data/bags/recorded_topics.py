@@ -18,7 +18,7 @@ from typing import Any
 import rosgraph
 from rosgraph.names import get_ros_namespace, resolve_name
 
-from custom_ros_tools.processes.child import start_child
+from custom_ros_tools.child_process import start_child
 
 from .connected_topics import count_received, count_sent, find_unconnected
 from .errors import RecordingError

@@ -10,7 +10,7 @@ from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.plugins import trust_only
-from custom_ros_tools.ros.node import late_imports
+from custom_ros_tools.program import late_imports
 from rpbi.replay.parallel import TooSlowError, in_limited_fork
 from rpbi_data.episodes.errors import EpisodeError
 from rpbi_data.episodes.folder import EpisodeFolder

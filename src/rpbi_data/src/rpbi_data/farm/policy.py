@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from custom_ros_tools.plugin_table import PluginTable
 from custom_ros_tools.plugins import own_folders
-from custom_ros_tools.plugins.table import PluginTable
 from rpbi.world import World
 
 own_folders.append(str(Path(__file__).parent))

@@ -14,8 +14,8 @@ from multiprocessing.connection import Pipe, wait
 from pathlib import Path
 from typing import Any
 
+from custom_ros_tools.child_process import start_child
 from custom_ros_tools.foreign import path_below
-from custom_ros_tools.processes.child import start_child
 from rpbi_data.episodes.errors import EpisodeError
 from rpbi_data.episodes.folder import EpisodeFolder
 

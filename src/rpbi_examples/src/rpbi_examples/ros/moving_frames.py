@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.ros.services import Toggle, ToggleService
 from custom_ros_tools.ros.tf_interface import NO_ROTATION, TfInterface
-from custom_ros_tools.toggle import Toggle
 from rpbi_examples.motions import FigureEight, camera_pose
 
 HZ = 50.0

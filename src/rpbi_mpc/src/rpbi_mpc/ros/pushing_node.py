@@ -34,6 +34,7 @@ SPACING = 0.005
 SHOWN_EVERY = 4
 """Number of predicted poses from one outline to the next."""
 PLAN, REFERENCE, SEEN = ColorRGBA(0.1, 0.55, 0.9, 0.9), ColorRGBA(0.2, 0.7, 0.3, 0.9), ColorRGBA(0.93, 0.53, 0.14, 0.9)
+NODE = "pushing_mpc"
 
 
 class PushingDisplay:
@@ -90,9 +91,6 @@ class PushingDisplay:
         places = pose[:2] + corners @ rotation(pose[2]).T
         marker.points = [Point(float(x), float(y), self._height) for x, y in places]
         return marker
-
-
-NODE = "pushing_mpc"
 
 
 class PushingNode(LoopNode):

@@ -1,6 +1,6 @@
 """Commands of the console for a running simulator."""
 
-from custom_ros_tools.ros.console import run_console_of
+from custom_ros_tools.console.modules import run_console_of
 
 
 def main() -> None:

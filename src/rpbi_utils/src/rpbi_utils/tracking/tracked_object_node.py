@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from robot_model.geometry import Pose
 from rpbi.engine.inputs import check_pose

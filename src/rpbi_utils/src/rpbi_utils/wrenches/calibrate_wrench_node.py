@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from robot_model.geometry import Pose, Vector
 
 from .calibration import (

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from robot_model.model import RobotModel
 from safe_robot.check import Check
 from safe_robot.limits import MotionLimits

@@ -11,11 +11,11 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.rospy_internals import DirectSending
+from custom_ros_tools.sockets import flush_buffered_sockets
 from safe_robot.check import Violation
 from safe_robot.checks.staleness import too_old
 from safe_robot.guard import Decision

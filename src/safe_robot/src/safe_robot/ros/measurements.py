@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.tf_interface import TfListener
 from robot_model.collision.shapes import Obstacle, ObstacleKind
 from robot_model.geometry import Pose
 from safe_robot.check import CheckContext

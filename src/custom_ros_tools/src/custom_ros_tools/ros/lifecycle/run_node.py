@@ -2,7 +2,7 @@
 
 rospy would shut down inside the signal handler, at any point of the program. If the interrupted code holds a lock that
 the shutdown needs, or if a thread opens or closes a topic meanwhile, the process hangs forever. SIGINT therefore stays
-blocked (see `custom_ros_tools.ros.node`), and a thread waits for it. Child processes inherit the block; this process
+blocked (see `custom_ros_tools.program`), and a thread waits for it. Child processes inherit the block; this process
 ends them.
 """
 
@@ -62,7 +62,7 @@ def run_node(
 ) -> None:
     """Runs a node until it is interrupted; a wrong configuration ends it with 1.
 
-    The program must be one that `custom_ros_tools.ros.node.run` runs.
+    The program must be one that `custom_ros_tools.program.run` runs.
 
     Args:
         name: Default name of the node.

@@ -10,7 +10,7 @@ from weakref import WeakMethod
 
 import rospy
 
-from custom_ros_tools.ros.server_socket import ServerSocket
+from custom_ros_tools.sockets import ServerSocket
 
 from .expecting import expecting
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from custom_ros_tools.ros.buffered_socket import BufferedSocket, flush_buffered_sockets
+from custom_ros_tools.sockets import BufferedSocket, flush_buffered_sockets
 
 from .expecting import expecting
 

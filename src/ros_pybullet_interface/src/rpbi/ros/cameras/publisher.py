@@ -12,7 +12,7 @@ import rospy
 from rosnode import cleanup_master_blacklist
 
 from custom_ros_tools.errors import PhysicsError
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from custom_ros_tools.sockets import flush_buffered_sockets
 from rpbi.engine.priority import run_normally
 from rpbi.render.client import RenderClient
 from rpbi.render.frame import Camera

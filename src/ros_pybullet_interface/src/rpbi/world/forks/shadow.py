@@ -15,8 +15,8 @@ from multiprocessing.reduction import send_handle
 from pathlib import Path
 from typing import Any
 
+from custom_ros_tools.child_process import start_child
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.processes.child import start_child
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.state import WorldState
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.plugin_table import PluginTable
 from rpbi_data.datasets.format import DatasetError, DatasetFormat
 
 FORMATS: PluginTable[DatasetFormat] = PluginTable(

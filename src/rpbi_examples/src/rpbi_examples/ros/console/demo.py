@@ -22,9 +22,9 @@ import rosgraph
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
 
+from custom_ros_tools.child_process import kill_with_children
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.processes.child import kill_with_children
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from robot_model.geometry import Pose

@@ -26,6 +26,10 @@ from custom_ros_tools.schema import ConfigModel, PositiveMetres
 
 QUADRATURE = 64
 """Points along each side of the rectangle for the integral of the pressure; the relative error is 1e-4."""
+STATE = ("x", "y", "yaw", "contact")
+INPUT = ("normal", "tangential", "left", "right")
+Vector = Any
+"""A sequence, an array or a CasADi vector of numbers or symbols."""
 
 
 class SliderConfig(ConfigModel):
@@ -73,13 +77,6 @@ class SliderConfig(ConfigModel):
             return math.hypot(self.length, self.width) / 2
         middles = (np.arange(QUADRATURE) + 0.5) / QUADRATURE - 0.5
         return float(np.hypot(*np.meshgrid(self.length * middles, self.width * middles)).mean())
-
-
-STATE = ("x", "y", "yaw", "contact")
-INPUT = ("normal", "tangential", "left", "right")
-
-Vector = Any
-"""A sequence, an array or a CasADi vector of numbers or symbols."""
 
 
 def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from custom_ros_tools.console.argument import Argument, UsageError
-from custom_ros_tools.console.modules import workspace
+from .argument import Argument, UsageError
+from .modules import workspace
 
 
 def bench(

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import pytest
 
-from custom_ros_tools.console.argument import Argument
-from custom_ros_tools.console.modules import workspace
+from .argument import Argument
+from .modules import workspace
 
 PARALLEL = ("-n", "auto", "--max-worker-restart=0")
 

@@ -3,7 +3,7 @@
 import sys
 from typing import Annotated
 
-from custom_ros_tools.console.argument import Argument
+from .argument import Argument
 
 
 def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> None:

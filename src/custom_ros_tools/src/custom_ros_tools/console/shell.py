@@ -4,8 +4,8 @@ import os
 import signal
 from typing import Annotated
 
-from custom_ros_tools.console.argument import Argument
-from custom_ros_tools.console.modules import workspace
+from .argument import Argument
+from .modules import workspace
 
 
 def shell(*words: Annotated[str, Argument("[-c COMMAND]", is_raw=True)]) -> None:

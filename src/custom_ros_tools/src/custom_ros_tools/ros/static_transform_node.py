@@ -10,8 +10,9 @@ from custom_ros_tools.node_configs import RateParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from custom_ros_tools.ros.transform_messages import TransformTopic, position_in, quat_in, transform_message
 from custom_ros_tools.transforms import StaticTransform
+
+from .transform_messages import TransformTopic, position_in, quat_in, transform_message
 
 NAME = "resettable_static_transform_publisher"
 

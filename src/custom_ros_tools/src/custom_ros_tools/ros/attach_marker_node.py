@@ -6,11 +6,12 @@ import rospy
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from custom_ros_tools.marker_config import SHAPES, MarkerConfig
+from custom_ros_tools.node_configs import SHAPES, MarkerConfig
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from custom_ros_tools.ros.transform_messages import TransformTopic, as_pose, transform_message
+
+from .transform_messages import TransformTopic, as_pose, transform_message
 
 log = logging.getLogger(__name__)
 

@@ -10,12 +10,12 @@ from std_msgs.msg import Float64MultiArray
 from custom_ros_tools.errors import InterfaceError, collecting_problems
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.node_configs import FloatArrayConfig, RemapConfig, StartParameters
-from custom_ros_tools.ros.joint_states import joint_state, values_in
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+
+from .joint_states import joint_state, values_in
+from .services import Toggle, ToggleService
 
 Config = TypeVar("Config", bound=RemapConfig)
 

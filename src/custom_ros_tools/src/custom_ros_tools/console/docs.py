@@ -1,10 +1,11 @@
-"""The page of the commands, and the file with which bash completes their arguments."""
+"""The command `docs`; the page of the commands, and the file with which bash completes their arguments."""
 
+import pkgutil
 from collections.abc import Iterable
 from pathlib import Path
 
 from .command import PROGRAM, Command
-from .modules import commands
+from .modules import commands, workspace
 
 FIRST = (
     *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity"),
@@ -38,6 +39,19 @@ $ {PROGRAM} lau<Tab> bas<Tab>_ku<Tab> real<Tab>0.5
 $ {PROGRAM} launch basic_example_kuka_lwr real_time_factor:=0.5
 ```
 """
+WRITERS = (
+    "ik_ros.node_configs:schema_files",
+    "motion_primitives.node_configs:schema_files",
+    "rpbi_mpc.node_configs:schema_files",
+    "rpbi_utils.schemas:schema_files",
+    "safe_robot.schemas:schema_files",
+    "rpbi.gym.schemas:schema_files",
+    "rpbi.reference.config_page:config_files",
+    "rpbi.ros.interface_page:interface_files",
+    "custom_ros_tools.console.docs:console_files",
+    "rpbi_examples.plugins_page:plugin_files",
+)
+"""Functions that return the text of each file, given the workspace."""
 
 
 def page(listed: Iterable[Command]) -> str:
@@ -51,3 +65,18 @@ def console_files(root: Path) -> dict[Path, str]:
     listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
     lines = [line for each in listed for line in each.completions()]
     return {root / "docs/commands.md": page(listed), root / "dev/tools/completion.txt": "\n".join(lines) + "\n"}
+
+
+def files(root: Path) -> dict[Path, str]:
+    """Returns the text of each file of a workspace that is generated from the code."""
+    return {path: text for writer in WRITERS for path, text in pkgutil.resolve_name(writer)(root).items()}
+
+
+def docs() -> None:
+    """Generates the schemas for editors and the reference pages from the code."""
+    root = workspace()
+    for path, text in files(root).items():
+        path.parent.mkdir(exist_ok=True)
+        is_new = not path.exists() or path.read_text(encoding="utf-8") != text
+        path.write_text(text, encoding="utf-8")
+        print(f"{'written' if is_new else 'as it was'}: {path.relative_to(root)}")

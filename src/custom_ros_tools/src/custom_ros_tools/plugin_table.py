@@ -12,12 +12,12 @@ from typing import Any, TypeVar, cast
 
 from pydantic import ValidationInfo
 
-from custom_ros_tools.errors import ConfigError, MissingDependency, Problem, UnknownNameError
-from custom_ros_tools.schema import ConfigModel, InnerProblemsError, KeyedError
 from custom_ros_tools.schema.json_schema import Schema, json_schemas
 from custom_ros_tools.schema.type_names import shown
 
-from . import find_class, full_name
+from .errors import ConfigError, MissingDependency, Problem, UnknownNameError
+from .plugins import find_class, full_name
+from .schema import ConfigModel, InnerProblemsError, KeyedError
 
 Plugin = TypeVar("Plugin")
 _Model = TypeVar("_Model", bound=ConfigModel)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import hint, shortened
 
-own_folders = [str(Path(__file__).parents[1])]
+own_folders = [str(Path(__file__).parent)]
 """Folders of the packages that look up and call plug-ins; `cause_of` reports the line outside of these folders."""
 _used: set[str] = set()
 """Top-level packages of the classes that `find_class` has found."""
