@@ -70,6 +70,7 @@ BY_FEATURE = {
     "operator_node",
     "robot_model",
     "rpbi_data",
+    "rpbi_examples",
     "rpbi_mpc",
     "rpbi_utils",
     "safe_robot",

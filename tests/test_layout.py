@@ -35,7 +35,7 @@ TABLES = (
     "motion_primitives.primitives",
     "rpbi_utils.console",
     "rpbi_data.console",
-    "rpbi_examples.ros.console",
+    "rpbi_examples.console",
     "custom_ros_tools.console",
     "rpbi_data.datasets.formats",
 )
@@ -143,6 +143,7 @@ BY_FEATURE = {
     "operator_node",
     "robot_model",
     "rpbi_data",
+    "rpbi_examples",
     "rpbi_mpc",
     "rpbi_utils",
     "safe_robot",

@@ -99,8 +99,8 @@ def test_the_camera_sees_something(demo):
 @pytest.fixture
 def command(monkeypatch):
     """The command in this process, which keeps its own handlers of signals."""
-    monkeypatch.setattr("rpbi_examples.ros.console.demo.ENDINGS", ())
-    return command_of("rpbi_examples.ros.console.demo")
+    monkeypatch.setattr("rpbi_examples.console.demo.ENDINGS", ())
+    return command_of("rpbi_examples.console.demo")
 
 
 def test_bad_arguments_are_named(command, capsys):

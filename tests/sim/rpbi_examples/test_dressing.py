@@ -16,12 +16,10 @@ from operator_node.avatar.segment_forces import SegmentForce, forces_by_segment
 from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
 from operator_node.mvn.segments import SEGMENTS
 from rpbi.world import World
-from rpbi_examples.dressing.controller import MAX_LEAD_M, Dressing
-from rpbi_examples.dressing.force import ARM_SEGMENTS, ArmForce, forces_on_arm
-from rpbi_examples.dressing.hand import RADIUS_M, ROBOT_BASE
-from rpbi_examples.dressing.outcome import AROUND, RINGS, outcome, rings_of
+from rpbi_examples.dressing.cuff_path import CUFF, ArmPosition, is_held_out
+from rpbi_examples.dressing.hand import MAX_LEAD_M, RADIUS_M, ROBOT_BASE, Dressing
+from rpbi_examples.dressing.outcome import ARM_SEGMENTS, AROUND, RINGS, ArmForce, forces_on_arm, outcome, rings_of
 from rpbi_examples.dressing.trial import FORCE_LIMIT_N, MAX_DURATION_S, WORLD, Trial, run_trial
-from rpbi_examples.dressing.way import CUFF, ArmPosition, is_held_out
 
 SHOULDER, ELBOW, WRIST = np.array((0.0, -0.23, 1.43)), np.array((0.32, -0.28, 1.43)), np.array((0.57, -0.27, 1.43))
 ARM = ArmPosition(SHOULDER, ELBOW, WRIST)

@@ -39,7 +39,7 @@ def main() -> None:
     if sys.argv[0] == "roslaunch":
         roslaunch.main()
     else:
-        from rpbi_examples.ros.console.launch import launch  # few tests need it
+        from rpbi_examples.console.launch import launch  # few tests need it
 
         sys.exit(launch(*sys.argv[2:]))
 

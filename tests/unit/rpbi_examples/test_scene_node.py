@@ -7,9 +7,9 @@ import rospy
 from writing_scene import Writing
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi_examples.ros.scenes import node
-from rpbi_examples.ros.scenes.stage import SimulatorStage
+from rpbi_examples.scenes import scene_node as node
 from rpbi_examples.scenes.scene import Stage
+from rpbi_examples.scenes.scene_node import SimulatorStage
 
 
 class FaultyStage(Stage):

@@ -6,8 +6,8 @@ import pytest
 
 from robot_model.geometry import Pose
 from rpbi_examples.scenes import factory
-from rpbi_examples.scenes.cell.line import PARTS, grasp_yaw, is_in_box, on_belt
-from rpbi_examples.scenes.cell.two_arms import DOWN, TwoArms
+from rpbi_examples.scenes.parts.belt import PARTS, grasp_yaw, is_in_box, on_belt
+from rpbi_examples.scenes.parts.two_arms import DOWN, TwoArms
 from rpbi_examples.scenes.scene import InputValue, Seen, run_scene
 from rpbi_examples.scenes.task import EnvStage, make_env
 

@@ -21,11 +21,11 @@ from custom_ros_tools.console.argument import UsageError
 from custom_ros_tools.errors import InterfaceError, PhysicsError, UnknownNameError
 from robot_model.geometry import Pose
 from rpbi.gym.env import WorldEnv
-from rpbi_examples.ros.console import score as command
-from rpbi_examples.scenes import score
+from rpbi_examples.console import score as command
+from rpbi_examples.scenes import evaluation as score
+from rpbi_examples.scenes.evaluation import SeedResult, summary, write_failures
 from rpbi_examples.scenes.parts.arm import between, smooth
 from rpbi_examples.scenes.scene import SceneResult
-from rpbi_examples.scenes.score import SeedResult, summary, write_failures
 from rpbi_examples.scenes.task import do, make_env, run_episode
 
 CONSOLE = Path(__file__).resolve().parents[4] / "devel/lib/custom_ros_tools/console"

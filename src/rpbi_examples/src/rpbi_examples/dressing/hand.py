@@ -1,4 +1,4 @@
-"""The robot's hand that holds the cuff: its target, its pose and its joint positions."""
+"""The robot's hand that holds the cuff, and the controller that draws the sleeve over the arm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ik_ros.problem import IKProblem
 from ik_ros.solvers.pybullet_solver import PybulletConfig, PybulletSolver
 from robot_model.geometry import Pose
 
-from .way import Array
+from .cuff_path import AHEAD_AT_START, ArmPosition, Array, CuffPath
 
 RADIUS_M = 0.085
 """Radius of the cuff."""
@@ -22,6 +22,14 @@ ROBOT_BASE = Pose((0.4, -0.85, 0.7))
 """Base of the robot in the world, as in `panda.yaml`."""
 MAX_TURN_RAD = 0.3
 """Largest rotation of a joint to the next target; beyond it, the joints keep their positions."""
+TARGET_HZ = 50
+"""Targets a second."""
+SETTLING_S = 0.5
+"""Time for which the cuff is held at the end of its path [s]."""
+MAX_LEAD_M = 0.02
+"""Largest distance of the cuff's target from the cuff [m]; the target waits until the cuff is within it."""
+MAX_TURN_RATE = 1.5
+"""Largest angular speed of the cuff [rad/s]."""
 
 
 class HandTarget(NamedTuple):
@@ -84,3 +92,58 @@ class HandSolver:
         turns = (abs(there - here) for there, here in zip(solution.positions, positions))
         is_near = solution.success and max(turns) <= MAX_TURN_RAD
         return dict(zip(self.joint_names, solution.positions)) if is_near else None
+
+
+class Dressing:
+    """Moves the cuff along a person's arm and follows the arm's motion.
+
+    The cuff slows down as a force on the arm approaches its limit, and moves back above it. It waits for a hand that
+    does not follow, so that the hand does not move far at once afterwards.
+
+    Args:
+        speed: Speed of the cuff without contact [m/s].
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._left_m: float | None = None
+        self._rested_s = 0.0
+        self._ahead = np.array(AHEAD_AT_START)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the motion of the cuff has begun."""
+        return self._left_m is not None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the cuff's path has ended and the cuff has had time to arrive."""
+        return self._rested_s >= SETTLING_S
+
+    def target(self, arm: ArmPosition, cuff: Array, force_share: float, dt: float) -> HandTarget:
+        """Returns the target of the robot's hand.
+
+        Args:
+            arm: Where the person's arm is.
+            cuff: Where the middle of the cuff is (3) [m].
+            force_share: Force on the arm as a share of its limit.
+            dt: Time since the last target [s].
+        """
+        path = CuffPath(arm)
+        if self._left_m is None:
+            self._left_m = path.length
+        speed = self._speed * max(-1.0, 1.0 - force_share)
+        if np.linalg.norm(path.place(path.length - self._left_m) - cuff) > MAX_LEAD_M:
+            speed = min(speed, 0.0)
+        self._left_m = min(max(self._left_m - speed * dt, 0.0), path.length)
+        self._rested_s = 0.0 if self._left_m else self._rested_s + dt
+        done = path.length - self._left_m
+        self._ahead = _towards(self._ahead, path.ahead(done), MAX_TURN_RATE * dt)
+        self._ahead /= np.linalg.norm(self._ahead)
+        return holding(_towards(cuff, path.place(done), MAX_LEAD_M), self._ahead)
+
+
+def _towards(start: Array, end: Array, largest: float) -> Array:
+    """Returns the end if it is within the distance, otherwise a point on the line to it."""
+    step = end - start
+    return start + step * min(1.0, largest / max(float(np.linalg.norm(step)), 1e-12))

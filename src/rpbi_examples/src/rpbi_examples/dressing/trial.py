@@ -18,11 +18,9 @@ from robot_model.geometry import Pose, Vector
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
 
-from .controller import TARGET_HZ, Dressing
-from .force import ARM_SEGMENTS, ArmForce
-from .hand import HandSolver
-from .outcome import Outcome, outcome, rings_of
-from .way import ArmPosition
+from .cuff_path import ArmPosition
+from .hand import TARGET_HZ, Dressing, HandSolver
+from .outcome import ARM_SEGMENTS, ArmForce, Outcome, outcome, rings_of
 
 WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
 AVATAR_HEIGHT_M = 1.75

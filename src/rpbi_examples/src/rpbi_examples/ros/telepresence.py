@@ -25,11 +25,9 @@ from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.schema import ConfigModel, Positive
 from operator_node.msg import SegmentForces
 from ros_pybullet_interface.msg import SimulationState
-from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
-from rpbi_examples.dressing.force import ArmForce, forces_on_arm
-from rpbi_examples.dressing.hand import HandSolver
-from rpbi_examples.dressing.outcome import Outcome, outcome, rings_of
-from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
+from rpbi_examples.dressing.cuff_path import ArmPosition, Array, is_held_out
+from rpbi_examples.dressing.hand import TARGET_HZ, Dressing, HandSolver
+from rpbi_examples.dressing.outcome import ArmForce, Outcome, forces_on_arm, outcome, rings_of
 
 from .joint_targets import wait_until_ready
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from custom_ros_tools.transforms import yaw_of
 from robot_model.geometry import Pose
+from rpbi_examples.scenes.parts.belt import BELT_X_M, BELT_Z_M, PARTS, RIM_Z_M, Belt, Kind, grasp_yaw, missing, on_belt
+from rpbi_examples.scenes.parts.two_arms import Gripper, TwoArms, Zone
 
-from .cell.line import BELT_X_M, BELT_Z_M, PARTS, RIM_Z_M, Belt, Kind, grasp_yaw, missing, on_belt
-from .cell.two_arms import Gripper, TwoArms, Zone
 from .scene import Scene, Watched
 
 URDF, CHEST = "{rpbi_examples}/robots/nextage_gripper.urdf", Pose((0.0, 0.0, 0.85))

@@ -1,1 +1,1 @@
-"""Parts of scenes that others can use: arms, paths, people, grasps."""
+"""Parts of scenes that other scenes can use: arms, paths, people, grasps, a belt."""

@@ -9,7 +9,8 @@ from custom_ros_tools.transforms import Array
 from motion_primitives import MotionPlan
 from motion_primitives.ros.dmp_services import DMPProcessor
 from motion_primitives.space import Space
-from rpbi_examples.lfd.skill import ALPHA_PER_S, BASES_PER_S, MIN_BASES, NAMES
+
+from .skill import ALPHA_PER_S, BASES_PER_S, MIN_BASES, NAMES
 
 SAMPLE_S, STEPS = 0.02, 4
 """Time between two points of a plan [s], and steps of integration between them."""

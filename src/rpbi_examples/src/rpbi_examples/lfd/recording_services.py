@@ -13,11 +13,11 @@ from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.transforms import yaw_of
 from rpbi_data import EpisodeFolder, bag_to_dataframes, transforms_between
 from rpbi_data.episodes.folder import BAG
-from rpbi_examples.lfd.report import BoxError, Run, write_tables
-from rpbi_examples.lfd.skill import PushPlan
 
-from .arm import ORIGIN, TIP
-from .box import FRAME, NAME
+from .arm_topics import ORIGIN, TIP
+from .box_services import FRAME, NAME
+from .report import BoxError, Run, write_tables
+from .skill import PushPlan
 
 CONTACTS, SIGNAL = f"/rpbi/{NAME}/contacts", "/operator_node/signal"
 ROBOT = "kuka_lwr"

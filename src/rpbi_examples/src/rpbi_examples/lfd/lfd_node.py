@@ -25,17 +25,17 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from custom_ros_tools.transforms import Array
-from rpbi_examples.lfd.person import HALF_SIDE_M, TIP_RADIUS_M
-from rpbi_examples.lfd.report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_summary
-from rpbi_examples.lfd.skill import Learn, PushSkill, learn_dmp
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.ros.human_interaction import interrupt_roslaunch
 from rpbi_examples.ros.joint_targets import wait_until_ready
 
-from .arm import ORIGIN, TARGET, TIP, Arm, planar
-from .box import GOAL, PushedBox
+from .arm_topics import ORIGIN, TARGET, TIP, Arm, planar
+from .box_services import GOAL, PushedBox
 from .dmp_services import ServerMotion
-from .recording import begin_episode, discard_episode, finish_episode
+from .person import HALF_SIDE_M, TIP_RADIUS_M
+from .recording_services import begin_episode, discard_episode, finish_episode
+from .report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_summary
+from .skill import Learn, PushSkill, learn_dmp
 
 LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
 """Classes that learn and plan, by value of the launch file's argument `dmp`."""

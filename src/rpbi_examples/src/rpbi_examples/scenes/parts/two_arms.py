@@ -10,9 +10,10 @@ import numpy as np
 from custom_ros_tools.config import replace_package
 from robot_model.geometry import Pose, Vector, angle_between, minus, norm, quaternion_product
 from robot_model.model import RobotModel
-from rpbi_examples.scenes.parts.arm import LedArm, about_z, between, smooth
 from rpbi_examples.scenes.scene import Scene
 from safe_robot.checks.proximity_check import link_distances
+
+from .arm import LedArm, about_z, between, smooth
 
 FAR_M = 0.5
 """Distances beyond this are not computed [m]."""

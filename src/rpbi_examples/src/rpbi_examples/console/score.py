@@ -52,7 +52,7 @@ def score(
     numbers = _numbers(seeds)
     if jobs is not None and jobs < 1:
         raise UsageError(f"--jobs: expected at least 1, got {jobs}")
-    from rpbi_examples.scenes.score import run_seeds, summary, write_failures, write_json  # needs Gymnasium
+    from rpbi_examples.scenes.evaluation import run_seeds, summary, write_failures, write_json  # needs Gymnasium
 
     SCENES.find(scene)  # imported here for an error that names a missing extra
     results, code = [], 0

@@ -13,10 +13,10 @@ from std_msgs.msg import Header, String
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
-from rpbi_examples.lfd.person import Direction, Person
 
-from .arm import ORIGIN, TIP, planar
-from .box import FRAME, GOAL
+from .arm_topics import ORIGIN, TIP, planar
+from .box_services import FRAME, GOAL
+from .person import Direction, Person
 
 LOOK_HZ = 50.0
 NEXT_KEY = {

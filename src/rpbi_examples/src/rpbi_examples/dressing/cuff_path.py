@@ -34,7 +34,7 @@ class ArmPosition(NamedTuple):
     wrist: Array
 
 
-class Way:
+class CuffPath:
     """Path of the cuff: from its start to before the hand, over the hand, along the forearm and past the elbow.
 
     Args:

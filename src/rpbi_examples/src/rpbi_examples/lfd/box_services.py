@@ -14,9 +14,9 @@ from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.tf_interface import TfInterface
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
-from rpbi_examples.lfd.report import BoxError
 
-from .arm import ORIGIN, planar
+from .arm_topics import ORIGIN, planar
+from .report import BoxError
 
 FILE, NAME = "{rpbi_examples}/configs/lfd/box.yaml", "pushing_box"
 FRAME, GOAL = f"rpbi/{NAME}", "rpbi/visual_goal"

@@ -1,35 +1,45 @@
-"""A scene's access to the simulator: it observes by topics, and acts by services."""
+"""`scene_node.py`: runs a scene in the simulator, with one seed after the other, by topics and services."""
 
 from __future__ import annotations
 
 import json
 import time
 from collections.abc import Mapping
+from itertools import count
 from typing import Any
 
+import numpy as np
 import rospy
 from apriltag_ros.msg import AprilTagDetectionArray
 from cob_srvs.srv import SetString
 from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Point, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
+from pydantic import Field
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
+from custom_ros_tools import schema
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import get_srv_handler
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
+from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Text
 from robot_model.geometry import Pose, Vector, plus, scaled
 from ros_pybullet_interface.msg import Contacts, PlannedInput
 from ros_pybullet_interface.srv import ApplyWrench, ChangeDynamics, GetStateHash, StepWithInputs, SwitchControllers
 from rpbi.ros.services.prediction import POSE_NAMES
 from rpbi.ros.tick_listener import TickListener
-from rpbi_examples.scenes.scene import (
+
+from . import SCENES
+from .scene import (
     Change,
     GainChange,
     InputValue,
     Scene,
+    SceneResult,
     Seen,
     SeenWrench,
     Shove,
@@ -39,6 +49,8 @@ from rpbi_examples.scenes.scene import (
     Touch,
     Watched,
     WorldChange,
+    broken_off,
+    run_scene,
     tag_in_world,
 )
 
@@ -47,6 +59,7 @@ PATIENCE_S = 20.0
 WORLD = "rpbi/world"
 LATE_S = 0.1
 """Longest delay that is caught up with [s]."""
+NODE = "scene"
 
 
 class SimulatorStage(Stage):
@@ -197,3 +210,49 @@ def _touch(point: Any) -> Touch:
     second = scaled(point.friction_force_2, _vector(point.friction_direction_2))
     force = plus(scaled(point.normal_force, normal), plus(first, second))
     return Touch(point.other_body, point.other_link, place, normal, point.normal_force, force)
+
+
+class SceneNodeConfig(ConfigModel):
+    """Parameters of the node."""
+
+    scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
+    seed: Count = Field(1, description="Seed of the first episode; each further one adds 1.")
+    episodes: Count = Field(0, description="Number of episodes; 0: until it is stopped.")
+    noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
+    real_time_factor: NonNegative = Field(1.0, description="Simulated seconds a second; 0: as fast as possible.")
+
+
+def _run() -> None:
+    config = private_parameters(SceneNodeConfig)
+    kind = SCENES.find(config.scene)
+    stage = SimulatorStage(kind.watch, kind.cycle_ticks, config.real_time_factor)
+    succeeded = 0
+    for number, seed in enumerate(count(config.seed), 1):
+        scene = kind(np.random.default_rng(seed))
+        scene.is_noisy = config.noise
+        rospy.loginfo("seed %d", seed)
+        stage.begin(scene)
+        try:
+            result = run_scene(scene, stage)
+        except InterfaceError as error:  # the reset for the next episode may remove the cause
+            result = broken_off(scene, error)
+        succeeded += result.success
+        _report(seed, result, stage)
+        if number == config.episodes:
+            rospy.loginfo("%d of %d episodes succeeded", succeeded, number)
+            rospy.signal_shutdown("all episodes are done")
+            break
+
+
+def _report(seed: int, result: SceneResult, stage: SimulatorStage) -> None:
+    """Logs in one line how an episode ended."""
+    verdict = "succeeded" if result.success else f"failed: {result.reason}" if result.reason else "failed"
+    parts = [f"{name}: {value:.4g}" for name, value in result.figures.items()]
+    parts += [f"real-time factor: {stage.reached_factor():.3f}", f"state: {stage.state_hash()}"]
+    say = rospy.loginfo if result.success else rospy.logwarn
+    say("seed %d %s, after %.2f s; %s", seed, verdict, result.time_s, ", ".join(parts))
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NODE, _run, loggers=("rpbi_examples",))

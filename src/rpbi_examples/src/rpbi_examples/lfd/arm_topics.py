@@ -21,8 +21,9 @@ from custom_ros_tools.transforms import Array, pose_of, yaw_of
 from ik_ros.msg import IKProblem
 from ik_ros.srv import SolveIK, SolveIKResponse
 from ros_pybullet_interface.srv import ResetJointState
-from rpbi_examples.lfd.skill import PushPlan
 from rpbi_examples.motions import PlanarPose
+
+from .skill import PushPlan
 
 ORIGIN, TARGET, TARGET_TIP, TIP = (
     "rpbi/teleop_origin",

@@ -1,1 +1,0 @@
-"""Nodes of `lfd.launch`: learning from demonstration, and the scripted person."""

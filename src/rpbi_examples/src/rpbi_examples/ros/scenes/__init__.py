@@ -1,1 +1,0 @@
-"""Scenes in the simulator of a ROS master."""
