@@ -1,4 +1,4 @@
-"""Cost of the contacts of many boxes, beside a bare step of the same world; both in one process, alternating."""
+"""Cost of the contacts of many boxes, compared with a bare step of the same world; both alternate in one process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The controls window beside a world at 1 kHz: time from clicks and drags to their effect, and lost joint states."""
+"""The controls window with a world at 1 kHz: time from clicks and drags to their effect, and lost joint states."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ LEFT_OUT = {
 """Launch files that are not measured, and why."""
 EXAMPLES = tuple(path.stem for path in sorted(LAUNCH.glob("*.launch")) if path.stem not in LEFT_OUT)
 BY_THEMSELVES = {"human_interaction": ["device:=scripted"], "lfd": ["operator:=scripted"]}
-"""Arguments with which examples need nobody."""
+"""Arguments with which examples run without a user."""
 WITH_FILES = {"human_interaction": "output", "lfd": "out", "pushing_mpc": "out"}
 """Argument of those that write files, for a folder."""
 SECONDS, QUICK_SECONDS = 3.0, 1.0
@@ -49,7 +49,7 @@ UNCOUNTED_TYPES = ("CameraInfo", "CompressedImage", "PointCloud2", "MarkerArray"
 
 
 def run(quick: bool) -> list[Result]:
-    """Runs each example by itself, and a scene for an episode."""
+    """Runs each example alone, and a scene for one episode."""
     return [each for name in EXAMPLES for each in _example(name, QUICK_SECONDS if quick else SECONDS)]
 
 

@@ -1,4 +1,4 @@
-"""Steps of environments per second, beside PyBullet and the renderer alone; and the effect of resets and workers.
+"""Steps of environments per second, compared with PyBullet and the renderer alone; effects of resets and workers.
 
 Times of one process are those of its processor, since others may have it meanwhile. Two workers need two processors to
 themselves.

@@ -74,7 +74,7 @@ MEAN_MS = {("LWR", "kdl"): 0.5, ("LWR", "trac_ik"): 0.5, ("LWR", "tasks"): 1.5, 
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures all solvers with all arms; the floor is one bare call of KDL, which may fail and leave limits.
+    """Measures all solvers with all arms; the floor is one bare call of KDL, which may fail and exceed limits.
 
     Args:
         quick: Whether to use only a tenth of the poses.

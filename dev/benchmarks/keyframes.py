@@ -72,7 +72,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def _sessions(name: str, make: Any, build: Any, inputs: Inputs, seeds: int) -> list[Result]:
-    """Compares worlds that go on after a keyframe with the running one: by hashes, some by all samples too."""
+    """Compares worlds that continue from a keyframe with the running one: by hashes, some also by all samples."""
     same = dict.fromkeys(("from_state", "fork", "prediction", "restore"), 0)
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:

@@ -22,7 +22,7 @@ TURNS = 2
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures p50 and p99, alone, beside busy loops and beside the camera."""
+    """Measures p50 and p99: alone, with busy loops, and with the camera."""
     trials = 50 if quick else 300
     turns = [(_echo_ms(trials, busy), _arm_ms(trials, busy)) for _ in range(TURNS) for busy in (0, BUSY)]
     floor, alone = (np.concatenate(each) for each in zip(*turns[::2]))

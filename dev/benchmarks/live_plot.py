@@ -1,4 +1,4 @@
-"""The window of live_plot beside a world at 1 kHz, whose every joint state it draws."""
+"""The window of live_plot, which draws each joint state of a world at 1 kHz."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FIELDS = tuple(f"{JOINT_STATES}/position[{index}]" for index in range(1, 4))
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures redraws, and the rate of the simulation as another subscriber sees it; the floor is without window."""
+    """Measures redraws, and the rate of the simulation seen by another subscriber; the floor is without the window."""
     seconds = 8.0 if quick else 30.0
     with Session() as ros:
         ros.simulator(arm_world(ros.folder, HZ))

@@ -1,8 +1,8 @@
 """Force feedback in virtual time: checks that a handle never gives out more energy than was put in, for any simulator.
 
 The controller is the one of the haptic node, tick by tick. A hand on a handle wanders into a wall that a simulator has,
-at a rate of its own, behind a delay and a loss in each direction. Beside it, energy is counted anew from what the hand
-felt and where it was.
+at a rate of its own, behind a delay and a loss in each direction. Energy is also counted independently, from the hand's
+forces and positions.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SET_UPS = "PASSIVITY_SET_UPS"
 """Environment variable: how many random set-ups to try in place of 1,000."""
 TICKS = 10_000
 LONG, LONG_TICKS = 5, 1_000_000
-"""Seed of the long one, which is far from passive by itself: a stiff wall behind 19 ms, and its ticks."""
+"""Seed and ticks of the long trial, which is far from passive on its own: a stiff wall behind a delay of 19 ms."""
 DT_S = 0.001
 MAX_FORCE_N = 10.0
 MAX_ACCELERATION = 200.0
@@ -73,7 +73,7 @@ class Outcome(NamedTuple):
         acceleration: The largest [m/s^2].
         largest_n: The largest force [N].
         interventions: At how many ticks the controller did something.
-        leak_j: The energy that it may have given out beyond what was put in [J].
+        leak_j: The energy that it may have returned beyond the energy that was put in [J].
     """
 
     least_j: float

@@ -1,4 +1,4 @@
-"""Whether an arm that presses on a box by itself feels what stiffness and depth predict, seed by seed."""
+"""Whether the force of an arm that presses on a box is the one that stiffness and depth predict, for each seed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEADING = ROW.format(
 
 
 def run(quick: bool) -> list[Result]:
-    """Launches `human_interaction.launch` with a scripted hand, once for each seed, and reads what it says."""
+    """Launches `human_interaction.launch` with a scripted hand, once for each seed, and reads its output."""
     seeds = QUICK_SEEDS if quick else SEEDS
     errors: list[float] = []
     print(HEADING, file=sys.stderr)
@@ -53,7 +53,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def press(ros: Session, seed: int, folder: Path) -> str:
-    """Runs one press to its end and returns what it printed."""
+    """Runs one press to its end and returns its output."""
     arguments = ["device:=scripted", f"seed:={seed}", "headless:=true", f"output:={folder}"]
     process = ros.start(["roslaunch", "rpbi_examples", "human_interaction.launch", *arguments])
     process.wait(LONGEST_S)

@@ -1,4 +1,4 @@
-"""Random worlds that go back to their start without loading anything, beside loading all again."""
+"""Random worlds that are reset without loading files, compared with loading all files again."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _build(folder: Path, draw: random.Random) -> World:
 
 
 def _live(world: World, seed: float, ticks: int) -> list[Any]:
-    """Moves arm and bodies in all ways that the start can be reached from again; returns hashes on the way."""
+    """Moves arm and bodies in all ways from which the start can be restored; returns hashes in between."""
     draw = random.Random(seed)
     hashes = []
     names = [name for name in world.bodies if name.startswith("thing")]

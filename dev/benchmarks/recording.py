@@ -1,4 +1,4 @@
-"""Messages that recordings lose: of ten minutes with a camera, and when the recorder stands still or is killed."""
+"""Messages that recordings lose: in ten minutes with a camera, and when the recorder is stopped or killed."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _lost(folder: Path, name: str, seconds: float, stopped_s: float) -> list[Res
     numbers: dict[str, list[int]] = collections.defaultdict(list)
     with rosbag.Bag(str(path)) as bag:
         for topic, message, _ in bag.read_messages(raw=True):
-            numbers[topic].append(int.from_bytes(message[1][:4], "little"))  # header.seq counts what is published
+            numbers[topic].append(int.from_bytes(message[1][:4], "little"))  # header.seq counts the published messages
     lost = sum(numbers[topic][-1] - numbers[topic][0] + 1 - len(numbers[topic]) for topic in COUNTED)
     lost += sum(max(count - len(numbers[topic]), 0) for topic, count in sent.items())
     figure = f"{name}: lost of {sum(map(len, numbers.values()))}"

@@ -1,4 +1,4 @@
-"""How long `rpbi/reset` takes for the KUKA scene, beside loading it, and what the hash of a state costs."""
+"""How long `rpbi/reset` takes for the KUKA scene, compared with loading it, and the cost of the hash of a state."""
 
 from __future__ import annotations
 

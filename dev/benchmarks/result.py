@@ -12,9 +12,9 @@ class Target:
     """What a figure has to reach.
 
     Attributes:
-        limit: The limit, in the figure's unit or in floors.
+        limit: The limit, in the figure's unit or in multiples of its floor.
         at_least: Whether more is better.
-        of_floor: Whether the limit counts in floors.
+        of_floor: Whether the limit is a multiple of the floor.
     """
 
     limit: float
@@ -34,7 +34,8 @@ class Result:
         figure: What was measured.
         value: Its value.
         unit: Unit of value and floor.
-        floor: The same of the least that could do the job, measured in the same run; None if there is none.
+        floor: The lower bound: the same quantity for the simplest program that does the job, measured in the same run;
+            None if there is none.
         target: What to reach; None if the figure only informs.
     """
 

@@ -60,7 +60,7 @@ def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None
     Returns:
         The exit code: 1 if one could not run.
     """
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what was started ends too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that started processes end, too
     facts = machine()
     results: list[Result] = []
     failed = []
@@ -83,7 +83,7 @@ def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None
 
 
 def machine() -> dict[str, Any]:
-    """Returns what the figures depend on."""
+    """Returns the properties of the machine that figures depend on."""
     return {
         "cores": os.cpu_count(),
         "processor": _processor(),

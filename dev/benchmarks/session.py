@@ -73,11 +73,11 @@ class Session:
         self.close()
 
     def start(self, command: list[str], **environment: str) -> subprocess.Popen[bytes]:
-        """Starts a command in a process group of its own; what it prints goes to a file (see `output`).
+        """Starts a command in its own process group; its output goes to a file (see `output`).
 
         Args:
             command: The command.
-            environment: Variables of its environment, beside those of the session.
+            environment: Environment variables in addition to those of the session.
         """
         with open(self.folder / f"{len(self._processes)}.log", "wb") as file:
             process = subprocess.Popen(
@@ -108,14 +108,14 @@ class Session:
         """Starts a node and waits until it offers a service.
 
         Raises:
-            RuntimeError: If it does not; with what it has printed.
+            RuntimeError: If it does not; with its output.
         """
         process = self.start(command)
         self._until(lambda: self._master.lookupService(service), f"there is {service}", process)
         return process
 
     def place_camera(self) -> None:
-        """Puts the camera where it sees arm and floor."""
+        """Moves the camera to where it sees arm and floor."""
         self.start(["rosrun", "tf2_ros", "static_transform_publisher", *CAMERA_POSE, "rpbi/world", "rpbi/camera"])
 
     def watch(
@@ -129,7 +129,7 @@ class Session:
 
         Args:
             topics: What it subscribes to.
-            seconds: For how long it then goes on [s].
+            seconds: Time for which it then continues [s].
             stock: Whether it is an ordinary node, which takes /clock too where that is the time.
             spent_by: A process; the processor time of its main thread is noted with each message.
         """
@@ -152,12 +152,12 @@ class Session:
         """Waits until a process has printed a text.
 
         Raises:
-            RuntimeError: If it does not; with what it has printed.
+            RuntimeError: If it does not; with its output.
         """
         self._until(lambda: text in self.output(process), f"it printed '{text}'", process)
 
     def result_of(self, process: subprocess.Popen[bytes], timeout_s: float = 600.0) -> Any:
-        """Waits for one of `programs/` to end and returns what it prints after `result: `, as JSON.
+        """Waits for one of `programs/` to end and returns the JSON that it prints after `result: `.
 
         Raises:
             RuntimeError: If it fails.
@@ -209,6 +209,6 @@ class Watcher:
         self._session, self._path = session, path
 
     def arrivals(self) -> dict[str, arrivals.Arrivals]:
-        """Waits until its time is over and returns what it received, by topic."""
+        """Waits until its time is over and returns the received messages, by topic."""
         self._session.result_of(self.process)
         return arrivals.load(self._path)

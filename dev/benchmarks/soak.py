@@ -19,7 +19,7 @@ SILENCE_S = 0.5
 
 
 def run(quick: bool, seconds: float | None = None) -> list[Result]:
-    """Measures memory, and what is received, from beginning to end.
+    """Measures memory and received messages from beginning to end.
 
     Args:
         quick: Whether a minute will do.

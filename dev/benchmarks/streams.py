@@ -1,4 +1,4 @@
-"""Effort and lag of an iiwa that follows 50 targets a second with jitter and stalls, beside targets at every tick.
+"""Effort and lag of an iiwa: 50 targets a second with jitter and stalls, compared with targets at every tick.
 
 The floor is the largest effort with targets at every tick. Offline cases depend on nothing but their seeds: five with
 `--quick`, else fifty, on none of which the jitter buffer was tuned. Live, a node sends targets beside none, two and
@@ -137,7 +137,7 @@ def _follow(folder: Path, sent: Sequence[Sent], velocities: bool) -> tuple[float
 
 
 def _live(seconds: float, busy: int, *options: str) -> float:
-    """Returns the largest effort [N m] of a robot that a node swings with options, beside so many busy processes."""
+    """Returns the largest effort [N m] of a robot that a node swings with options, while some processes are busy."""
     with Session(use_sim_time=False) as ros:
         ros.simulator(_world(ros.folder))
         for _ in range(busy):

@@ -1,4 +1,4 @@
-"""How long a bag takes to become tables, beside a bare loop that only reads its messages."""
+"""Time to convert a bag to tables, compared with a bare loop that only reads its messages."""
 
 from __future__ import annotations
 

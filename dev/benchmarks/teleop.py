@@ -1,6 +1,6 @@
 """How often a lively hand is stopped: `teleop.launch real_robot:=true` with emulated devices, and the stand-in's arm.
 
-A guard checks what moves the simulated arm, another one what the stand-in is commanded to. The control is the same
+One guard checks the commands of the simulated arm, another one those of the stand-in. The control is the same
 hand without guards. The targets are then judged once more by a guard that refuses, with and without smoothing.
 """
 

@@ -1,4 +1,4 @@
-"""Has each reader of bags read hostile ones, and prints a table of what became of that.
+"""Reads hostile bags with each reader of bags, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/bags.py'`, it reads 1,000 of them with each reader and with replay, each
 in a process of its own; the table in docs/security.md is its.

@@ -41,7 +41,7 @@ def text(random: Random) -> str:
 
 
 def make_launch(seed: int, folder: Path) -> str:
-    """Makes a file in a folder, or what is none, and returns a line that completes arguments of a launch."""
+    """Makes a file or another entry in a folder, and returns a line that completes arguments of a launch."""
     random = Random(seed)
     path = folder / f"h{seed}.launch"
     names = [text(random) for _ in range(random.choice((1, 3, 30)))]

@@ -1,4 +1,4 @@
-"""Has each reader of folders of episodes read hostile ones, and prints a table of what became of that.
+"""Reads hostile folders with each reader of episodes, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/episode_folders.py'`, it reads 1,000 of them with each reader, each in a
 process of its own; the table in docs/security.md is its.
@@ -47,7 +47,7 @@ def main() -> None:
     for name in ("episodes", "view", "export"):
         command_of(f"rpbi_data.console.{name}")
     importlib.import_module("pyarrow.parquet")
-    gc.freeze()  # else each fork copies what its collections look at
+    gc.freeze()  # otherwise garbage collection in each fork copies the visited memory
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell has its background jobs ignore
     readers = {name: READERS[name] for name in arguments.readers}
     table: dict[str, list[Trial]] = {name: [] for name in readers}

@@ -36,7 +36,7 @@ TICKS = 5
 Readers = Mapping[str, Callable[[], object]]
 """Readers by name."""
 Entry = tuple[str, dict[str, object]]
-"""Argument of `write_world`, and what its file says."""
+"""Argument of `write_world`, and the text of its file."""
 
 
 def hostile(kind: str, seed: int, folder: Path) -> tuple[tuple[str, dict[str, object] | Path], Readers]:

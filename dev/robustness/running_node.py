@@ -1,4 +1,4 @@
-"""Has a running simulator add what is in hostile files, and finds out how long its world stands still meanwhile."""
+"""Adds objects of hostile files to a running simulator, and measures how long its world stops meanwhile."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Pauses(NamedTuple):
 
     Attributes:
         wall: As it was.
-        own: Less what its thread waited for a processor; at most the processor time of the process.
+        own: Without the time that its thread waited for a processor; at most the processor time of the process.
         python: Less what PyBullet's functions that load, remove and step took of that.
     """
 
@@ -69,7 +69,7 @@ class WatchedNode:
         self._ros.call("/rpbi/start", Trigger)
 
     def new_output(self) -> str:
-        """Returns what it has printed since the last time."""
+        """Returns its output since the last call."""
         said = self._ros.output(self.process)
         new, self._seen = said[self._seen :], len(said)
         return new
@@ -125,7 +125,7 @@ def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> I
 
 
 def _ask(ros: RosSystem, node: WatchedNode, what: Any) -> tuple[str, str]:
-    """Has the node add what is in a file; returns the verdict and the answer."""
+    """Lets the node add the object of a file; returns the verdict and the answer."""
     try:
         section, given = what
         if isinstance(given, Path):

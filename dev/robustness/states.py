@@ -1,4 +1,4 @@
-"""Has each reader of `.world` files read hostile ones, and prints a table of what became of that.
+"""Reads hostile `.world` files with each of their readers, and prints a table of the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/states.py'`, it reads 300 of them with each reader, each in a process of
 its own. `states_in_node.py` has a running simulator restore them. The table in docs/security.md is theirs.
@@ -55,7 +55,7 @@ def write_good(folder: Path) -> list[Path]:
     """Writes states of a world with an arm, bodies and commands of several kinds, from its start and from a keyframe.
 
     Returns:
-        Their files; the world's main file is beside them.
+        Their files; the world's main file is in the same folder.
     """
     world = World.from_file(
         write_world(folder, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),)),

@@ -53,12 +53,12 @@ def vector(random: Random, length: int = 3) -> str:
 
 
 def number(random: Random, share_of_bad: float = 0.004) -> str:
-    """Returns a number, or what is none."""
+    """Returns a number, or a text that is not one."""
     return random.choice(NUMBERS) if random.random() < share_of_bad else f"{random.uniform(-1.0, 1.0):.6g}"
 
 
 def positive(random: Random, share_of_bad: float = 0.004) -> str:
-    """Returns a number above 0, or what is none."""
+    """Returns a number above 0, or a text that is not one."""
     return random.choice(NUMBERS) if random.random() < share_of_bad else f"{random.uniform(0.01, 1.0):.6g}"
 
 

@@ -1,4 +1,4 @@
-"""Has every reader of this workspace read hostile files, and prints a table of what became of that.
+"""Reads hostile files with every reader of this workspace, and prints a table of the results.
 
 Run it by `./rpbi shell -c 'python3 dev/robustness/try_files.py'`; exits with 1 if a reader did what none may do.
 """
@@ -80,7 +80,7 @@ def shown(kind: str, found: Iterable[Outcome]) -> Iterable[Outcome]:
 
 
 def _row(kind: str, number: int, found: list[Outcome]) -> tuple[object, ...]:
-    """Returns a row of the table; taken and refused are what the reader `world` or `node` says, the rest is of all."""
+    """Returns a row of the table; accepted and refused files are those of `world` or `node`, others of all readers."""
     first = Counter(outcome.verdict for outcome in found if outcome.reader in ("world", "node"))
     every = Counter(outcome.verdict.split()[0] for outcome in found)
     bad = (every[each] for each in ("signal", "traceback", "silent", "hang", "code"))

@@ -22,7 +22,7 @@ import pybullet
 SHORTEST_S = 0.005
 """Pauses that are shorter are not written."""
 PRIORITY = -15
-"""Beside other work; whoever may not have it runs without."""
+"""Priority over other work; without permission, it runs without it."""
 INDIVISIBLE = (
     *("loadURDF", "loadSoftBody", "createVisualShape", "createCollisionShape", "createMultiBody", "removeBody"),
     "stepSimulation",

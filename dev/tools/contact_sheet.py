@@ -36,7 +36,7 @@ STANDING_TICKS, SETTLED_TICKS = 100, 3000
 
 
 def scene(name: str) -> Image.Image:
-    """Returns what the camera of a scene sees while it acts."""
+    """Returns images of a scene's camera while the scene acts."""
     env = make_env(name, "rgb_array")
     env.task.seed = SEED
     env.reset(seed=SEED)
@@ -71,7 +71,7 @@ def robot(name: str) -> Image.Image:
 
 
 def settled(name: str) -> Image.Image:
-    """Returns what the camera of a world sees once its things are at rest."""
+    """Returns an image of a world's camera after its objects have come to rest."""
     world = built(name)
     for _ in range(SETTLED_TICKS):
         world.step()

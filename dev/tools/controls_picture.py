@@ -20,7 +20,7 @@ OPENS_S = 40.0
 
 
 def main() -> None:
-    """Opens the window, waits, and writes what the screen shows."""
+    """Opens the window, waits, and writes a screenshot."""
     reader, writer = os.pipe()
     screen = ["Xvfb", "-displayfd", str(writer), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-nolisten", "tcp"]
     server = subprocess.Popen(screen, pass_fds=[writer], stderr=subprocess.DEVNULL)

@@ -66,7 +66,7 @@ def new_guard(robot: RobotModel, world: str) -> Guard:
 
 
 def distances_m(guard: Guard, q: np.ndarray, kind: type) -> dict[Pair, float]:
-    """Returns how near the pairs of a check are [m]; negative: in each other."""
+    """Returns the distances of the pairs of a check [m]; negative if they penetrate."""
     (check,) = (each for each in guard.checks if isinstance(each, kind))
     return {pair: contact.distance for pair, contact in check.proximity.contacts(q, 2.0)}
 
@@ -135,7 +135,7 @@ def main() -> None:
                 axes[row, column].set(title=f"{title}, {word}", xticks=[], yticks=[])
                 world.close()
                 at_goal = distances_m(judge, goal, kind)
-                met = [pair for pair, distance in at_goal.items() if distance < 0.0]  # others may be near all the way
+                met = [pair for pair, distance in at_goal.items() if distance < 0.0]  # others may always be near
                 distances = [1e3 * min(distances_m(judge, q, kind)[pair] for pair in met) for q in commands]
                 print(title, word, f"nearest command: {min(distances):.1f} mm")
                 times = PERIOD_S * np.arange(len(commands))

@@ -37,7 +37,7 @@ async def main(page: Path, out: Path, times: list[str]) -> None:
     """Opens the page from its file; with several times, the pictures are `OUT_TIME.png`.
 
     Raises:
-        RuntimeError: If the page asks for anything but its file and what is in it.
+        RuntimeError: If the page requests anything but its own file and its content.
     """
     with tempfile.TemporaryDirectory() as profile:
         port = unused_port()
@@ -93,7 +93,7 @@ class Tab:
                 return message["result"]
 
     async def picture(self) -> str:
-        """Returns a picture that does not change any more; a browser that draws by software needs a while."""
+        """Returns a picture that no longer changes; a browser that draws in software needs a while."""
         before, end_s = "", time.monotonic() + OPENS_S
         while time.monotonic() < end_s:
             await asyncio.sleep(DRAWS_S)

@@ -23,7 +23,7 @@ CLOSED_FORM = "closed form"
 
 
 class Span(NamedTuple):
-    """The least and the most of what was measured in several ways."""
+    """Smallest and largest value of several measurements."""
 
     least: float
     most: float
@@ -53,7 +53,7 @@ class Table(NamedTuple):
         return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
     def results(self, about: str) -> list[Result]:
-        """Returns its numbers as figures; the closed form, if it has one, is their floor."""
+        """Returns its numbers as figures; the closed form, if it has one, is their lower bound."""
         found = []
         for name, values in self.rows:
             cells = dict(zip(self.columns[1:], values))
@@ -70,7 +70,7 @@ class Table(NamedTuple):
 
 
 def _shown(value: Cell) -> str:
-    """Returns a cell; what is less than 0.0001 is told as 0."""
+    """Returns a cell; values below 0.0001 are written as 0."""
     if isinstance(value, (str, Span)):
         return str(value)
     return "0" if abs(value) < 1e-4 else f"{value:.4g}"
@@ -136,7 +136,7 @@ def plane_floor(**more: Any) -> dict[str, Any]:
 
 
 def floor_of_tf(**more: Any) -> dict[str, Any]:
-    """Returns a floor whose upper side is 0.5 m above its frame, which TF has to put there."""
+    """Returns a floor whose upper side is 0.5 m above its frame, which TF has to move there."""
     shape = {"shapeType": "GEOM_BOX", "halfExtents": [3.0, 3.0, 0.5]}
     return {
         **box_floor(),
@@ -153,7 +153,7 @@ def box(name: str, half_m: Sequence[float], height_m: float | None = None, yaw: 
     Args:
         name: Its name.
         half_m: Half its edges [m].
-        height_m: Height of its centre [m]; without it, it stands on the floor.
+        height_m: Height of its centre [m]; without it, it rests on the floor.
         yaw: How it is turned [rad].
         more: Further keys; those of `changeDynamics` are added to its own.
     """

@@ -18,7 +18,7 @@ MASS_KG = 2.0
 
 
 def weighing() -> Table:
-    """What the floor feels of a soft cube of 2 kg, by time step and stiffness of the cube."""
+    """Force of a soft cube of 2 kg on the floor, by time step and stiffness of the cube."""
     rows = []
     for pascals in (4e3, 4e5):
         cells: list[Cell] = []

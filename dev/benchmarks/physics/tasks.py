@@ -68,7 +68,7 @@ def _robot(name: str, urdf: str, position: list[float], yaw: float = 0.0, **more
 
 
 def _move(world: World, robot: str, seconds: float, target: Callable[[float], dict[str, float]]) -> list[Any]:
-    """Moves a robot for so long [s] by positions of joints, as told by the share of the time; returns all samples."""
+    """Moves a robot for a time [s] by joint positions, a function of the share of that time; returns all samples."""
     samples = []
     ticks = round(seconds / world.config.timeStep)
     for tick in range(ticks):
@@ -162,7 +162,7 @@ WIPES: dict[str, tuple[dict[str, Any], dict[str, Any] | None]] = {
 
 
 def wiping() -> Table:
-    """Friction over that of Coulomb's law, and how far off its direction is, of what a gantry drags over a table."""
+    """Friction of an object dragged over a table, relative to Coulomb's law, and the error of its direction."""
     rows = []
     for degrees in (0.0, 20.0, 45.0, 70.0, 90.0):
         cells: list[Cell] = []

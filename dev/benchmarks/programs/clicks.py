@@ -21,7 +21,7 @@ from ros_pybullet_interface.msg import WorldCommands
 
 PATIENCE_S = 30.0
 SILENCE_S = 0.3
-"""Time without a joint state after which the world stands still [s]."""
+"""Time without a joint state after which the world counts as stopped [s]."""
 PAUSE_S = (0.1, 0.3)
 """Shortest and longest time before a click, so that it comes at any time between two redraws [s]."""
 DRAG_PX, STEP_PX = 6, 2
@@ -93,7 +93,7 @@ class Simulator:
         self.numbers.append(message.header.seq)
 
     def stops(self, since_s: float) -> float:
-        """Waits until the world stands still, and returns since when, counted from a time [s]."""
+        """Waits until the world has stopped, and returns the time of the stop after a given time [s]."""
 
         def change() -> float | None:
             last_s = self.joint_states[-1]

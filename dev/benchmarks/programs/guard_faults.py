@@ -58,7 +58,7 @@ class Outcome(NamedTuple):
 
     @classmethod
     def of(cls, commands: Sequence[tuple[float, tuple[float, ...]]], fault_s: float, may_brake: bool) -> Outcome:
-        """Judges commands: times of a clock [s], and positions; a braking is what gets slower until it rests."""
+        """Judges commands: times of a clock [s], and positions; braking is a motion that slows down until rest."""
         times_s = [time_s - fault_s for time_s, _ in commands]
         steps = [[abs(x - y) for x, y in zip(b, a)] for (_, a), (_, b) in zip(commands, commands[1:])]
         moving = [k for k, step in enumerate(steps, start=1) if any(step)]
@@ -129,7 +129,7 @@ class Experiment:
             process.kill()
 
     def outcome(self, course: Course) -> Outcome:
-        """Returns what is commanded after a fault."""
+        """Returns the commands after a fault."""
         self._until(lambda: self._call("stop"), "the guard takes no targets")
         self._until(lambda: self._call("start"), "the guard takes targets")
         self._commands.clear()

@@ -1,4 +1,4 @@
-"""A hand that moves an emulated device of `teleop.launch`, lively but sane; and what the guards and the driver say."""
+"""A hand that moves an emulated device of `teleop.launch` fast but plausibly; records status of guards and driver."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ DEVICES: dict[str, type[Device]] = {"spacenav": Cap, "keyboard": Keys, "mouse": 
 
 
 class Witness:
-    """Notes the targets, and what the guards and the driver say of what came of them."""
+    """Records the targets, and the status of the guards and of the driver."""
 
     def __init__(self, targets: str) -> None:
         self.targets: list[tuple[float, ...]] = []

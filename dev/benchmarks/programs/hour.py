@@ -1,4 +1,4 @@
-"""Runs a world with a target at each tick and with keyframes, and goes on from a state just before the next keyframe.
+"""Runs a world with a target at each tick and with keyframes, and continues from a state just before the next keyframe.
 
 It is the program of a user, without ROS. Arguments: time of the world, and period of its keyframes [s].
 """
@@ -56,7 +56,7 @@ def _run(world: World, seconds: float, every_s: float, random: np.random.Generat
 
 
 def _continuations(world: World, candidate: list[Any]) -> dict[str, tuple[float, float, bool]]:
-    """Returns wall time and processor time to go on from the present state [s], by way, and whether it is exact."""
+    """Returns wall and processor time to continue from the present state [s], by method, and whether it is exact."""
     times, hashes = {}, {}
 
     def timed(way: str, call: Any) -> Any:

@@ -9,7 +9,7 @@ from rpbi_data.farm import Policy
 
 
 class Push(Policy):
-    """Swings the arm against a box that stands at random, which succeeds if the box is pushed far enough."""
+    """Swings the arm against a box at a random place, which succeeds if the box is pushed far enough."""
 
     def __init__(self, world: World, rng: np.random.Generator) -> None:
         super().__init__(world, rng)

@@ -16,7 +16,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("world", help="main YAML file")
     path = parser.parse_args().world
-    World.from_file(path).close()  # what is read for the first time comes from the disk
+    World.from_file(path).close()  # files that are read for the first time come from the disk
     loads = [_time(lambda: World.from_file(path).close()) for _ in range(10)]
     world = World.from_file(path)
     ticks = [_time(world.step) for _ in range(2000)]

@@ -20,7 +20,7 @@ ROBOT, JOINT = "kuka_lwr", "lwr_arm_1_joint"
 
 
 def main() -> None:
-    """Prints the times and what has grown as JSON."""
+    """Prints the times and the growth of memory as JSON."""
     parser = argparse.ArgumentParser()
     parser.add_argument("resets", type=int)
     resets = parser.parse_args().resets

@@ -1,4 +1,4 @@
-"""ROS time that jumps, and stands still."""
+"""ROS time that jumps and stops."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Count:
 
 
 def main() -> None:
-    """Prints what it noted as JSON."""
+    """Prints its records as JSON."""
     parser = argparse.ArgumentParser()
     parser.add_argument("seconds", type=float, help="how long")
     parser.add_argument("robot")

@@ -1,4 +1,4 @@
-"""Subscribes to topics and notes when each message came and what its stamp was."""
+"""Subscribes to topics and records arrival time and stamp of each message."""
 
 from __future__ import annotations
 

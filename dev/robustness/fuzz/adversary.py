@@ -12,7 +12,7 @@ from .scenes import PERIOD_S
 
 
 class Target(NamedTuple):
-    """A target, and what its stamp says."""
+    """A target, and its stamp."""
 
     position: tuple[float, ...]
     age_s: float = 0.0

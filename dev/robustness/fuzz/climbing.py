@@ -31,7 +31,7 @@ class Course(NamedTuple):
     """Targets for a robot.
 
     Attributes:
-        start: n positions at which the robot stands at first [rad].
+        start: n initial positions of the robot at rest [rad].
         goals: Positions that are asked for one after the other, GOALS x n [rad].
         periods: Number of periods for which each goal is asked for.
     """
@@ -95,7 +95,7 @@ class Climber:
             assert decision.command is not None
             followed, ready = ready, guard.stop_commands
             if len(followed) and decision.command == tuple(followed[0].tolist()) and len(ready) == len(followed) - 1:
-                continue  # the braking goes on, and has been judged
+                continue  # the braking continues and has been judged
             least_m = min(least_m, self._smallest_of(np.array([decision.command, *ready])))
         return least_m
 

@@ -14,7 +14,7 @@ from .oracle import Oracle
 from .scenes import Scene
 
 CALM = {"limit": 0.6, "reject": 0.99}
-"""Share of ordinary targets: a guard that halts has to be started again, and then the robot stands."""
+"""Share of ordinary targets: a guard that has halted must be started again, and the robot is at rest then."""
 RUN = 2000
 """So many commands are judged at once, at most."""
 
@@ -47,7 +47,7 @@ def fuzz(
     """Sends hostile targets to a guard, and judges each command, and all of the braking from some.
 
     Args:
-        scene: The robot, and what is around it.
+        scene: The robot and its surroundings.
         guard: A started guard of that robot.
         oracle: What judges.
         count: How many targets.

@@ -24,7 +24,7 @@ LEG, MAX_LEGS, MAX_COMMANDS = 0.1, 60, 400
 """How far the robot is sent on a way out at once [rad], how often, and how many commands it is given for it."""
 CLEAR = 1.5
 AROUND = 16
-"""Where the ways that the guard tells of lead nowhere, targets in so many directions are tried."""
+"""Number of directions in which targets are tried where the exits that the guard names lead nowhere."""
 SMALLER = 0.5
 """The margin with which a locked robot is driven out, as a share of the smallest distance."""
 
@@ -59,7 +59,7 @@ def leave_margin(scene: Scene, oracle: Oracle, count: int, generator: np.random.
     Straight ways are asked for at once, by a target at their end; on the others, the robot follows `Guard.way_out`.
 
     Args:
-        scene: A robot of two joints, and what is around it.
+        scene: A robot of two joints and its surroundings.
         oracle: What judges.
         count: How many configurations.
         generator: What they are random by.
@@ -101,7 +101,7 @@ class Driver:
     """Sends targets to a guard of the policy `limit`.
 
     Args:
-        scene: A robot, and what is around it.
+        scene: A robot and its surroundings.
         around: Whether shapes are checked.
         margin_m: The margin [m].
     """
@@ -111,7 +111,7 @@ class Driver:
         self._around = scene.around
 
     def drive(self, start: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """Returns what is commanded when a robot that stands is sent to a target, from the start on."""
+        """Returns the commands to a robot at rest that is sent to a target, from the start on."""
         self.guard.halt()
         self.guard.start()
         measured = dict(zip(self.guard.joint_names, start.tolist()))
@@ -119,7 +119,7 @@ class Driver:
         return np.array([start, *self.until_rest(target)])
 
     def until_rest(self, target: np.ndarray) -> list[tuple[float, ...]]:
-        """Returns what is commanded when the robot is sent to a target."""
+        """Returns the commands when the robot is sent to a target."""
         commands = list[tuple[float, ...]]()
         for _ in range(MAX_COMMANDS):
             decision = self.guard.decide(tuple(target.tolist()), self._around)
@@ -130,7 +130,7 @@ class Driver:
         return commands
 
     def follow(self, start: np.ndarray) -> np.ndarray:
-        """Returns what is commanded when a robot is sent where the guard says that the way out is."""
+        """Returns the commands when a robot is sent to the exit that the guard names."""
         commands = list(self.drive(start, start))
         limits = self.guard.limits
         for _ in range(MAX_LEGS):

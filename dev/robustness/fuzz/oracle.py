@@ -20,12 +20,12 @@ FAR_M = 0.05
 
 
 class Oracle:
-    """Judges commands by what they are. Meshes are their triangles, as they are in the files.
+    """Judges commands independently of the guard, with the triangles of the mesh files.
 
     Pairs are all links that no joint ties, and all moving links with each box.
 
     Args:
-        scene: The robot, and what is around it.
+        scene: The robot and its surroundings.
 
     Attributes:
         lower: The least n positions, by the robot's description [rad].
@@ -85,7 +85,7 @@ class Oracle:
         return float(pinocchio.computeDistance(self._shapes, self._found, pair).min_distance)
 
     def moves(self, commands: Sequence[Sequence[float]], from_rest: bool = True) -> None:
-        """Judges the differences of successive commands, whether the robot stands before the first or not."""
+        """Judges the differences of successive commands, whether or not the robot is at rest before the first."""
         rows = np.array([commands[0]] * 3 * from_rest + list(commands))
         if len(rows) < 4:
             return

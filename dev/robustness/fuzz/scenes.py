@@ -1,4 +1,4 @@
-"""The robots that are sent hostile targets, what is around them, and their guards."""
+"""The robots that receive hostile targets, their surroundings, and their guards."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Scene(NamedTuple):
     """A robot and boxes around it.
 
     Attributes:
-        urdf: Its description; meshes are beside it.
+        urdf: Its description; meshes are in the same folder.
         home: n positions from where nothing is near [rad].
         boxes: Extents and places of boxes in the robot's root [m].
     """
@@ -38,7 +38,7 @@ class Scene(NamedTuple):
 
     @property
     def around(self) -> CheckContext:
-        """The boxes, as a guard is told of them."""
+        """The boxes, as a guard gets them."""
         return CheckContext(
             obstacles=tuple(Obstacle(name, "box", size, Pose(place)) for name, (size, place) in self.boxes.items())
         )

@@ -36,7 +36,7 @@ def many_columns(rng: random.Random, path: Path) -> None:
 
 
 def no_two_alike(rng: random.Random, path: Path) -> None:
-    """Messages of one size, each with lengths of its own, so that none can be read with another."""
+    """Messages of one size with different lengths of their fields, so that each must be read on its own."""
     strings, size = rng.choice(((2, 5000), (20, 1000), (20, 100), (200, 1000)))
     definition = "".join(f"string s{index}\n" for index in range(strings))
     raws = []

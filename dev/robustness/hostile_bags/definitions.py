@@ -42,7 +42,7 @@ LENGTHS = ("", "", "[]", "[0]", "[1]", "[3]", "[1001]", "[2000000000]", "[999999
 
 
 def nested(rng: random.Random, path: Path) -> None:
-    """Types in types, each with several of the next; 11 kB may stand for 2^200 values."""
+    """Nested types, each with several of the next; 11 kB may describe 2^200 values."""
     levels, width = rng.choice((3, 10, 30, 45, 60, 600, 3000)), rng.randint(1, 4)
     length = rng.choice(("", "", "[2]", "[1000000]", "[]"))
     last = rng.choice(("", "uint8 x\n", "string x\n", "float64[0] x\n", "uint8[] x\n"))

@@ -1,4 +1,4 @@
-"""Bags whose index, chunks or bytes are not what they say."""
+"""Bags with a wrong index, wrong chunks or wrong bytes."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Hostile(NamedTuple):
     Attributes:
         seed: By which it was made.
         how: What was done.
-        path: The file, in a folder of its own; code in it makes `canary` beside it.
+        path: The file, in a folder of its own; code in it makes `canary` in the same folder.
     """
 
     seed: int

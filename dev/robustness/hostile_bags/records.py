@@ -64,7 +64,7 @@ class Bag:
         compression: Of all chunks.
         claims: Numbers in the place of true ones: `size` of chunks, `count` of entries in index records, `chunks` and
             `connections` in the file's header, `index` as its position, `position` of chunks, `offset` of messages.
-        repeats: How often each index entry, chunk info and connection record is there, by `entries`, `infos`,
+        repeats: How often each index entry, chunk info and connection record is repeated, by `entries`, `infos`,
             `connections`.
         head: More fields of the file's header.
     """

@@ -32,7 +32,7 @@ def _session_with(path: Path, change: Callable[[str, bytes], list[bytes]]) -> No
 
 
 def rewrite(path: Path, change: Callable[[str, bytes], list[bytes]]) -> None:
-    """Gives a bag other messages; `change` gets the topic and a message, and returns what it is to be."""
+    """Gives a bag other messages; `change` gets the topic and a message, and returns the replacement."""
     with path.open("rb") as file:
         bag = BagFile(file)
         found = [(number, time_ns, raw) for number, raw, time_ns in bag.messages(bag.connections)]

@@ -31,7 +31,7 @@ class Trial(NamedTuple):
 
     Attributes:
         verdict: `taken`, `refused`, or what must not be: `signal N`, `traceback`, `silent` or `code`.
-        said: The end of what it said.
+        said: The end of its output.
         cpu_s: Processor time [s].
         memory_mb: Most memory that it had at once, with Python and all libraries.
     """
@@ -63,7 +63,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 
 def tried(read: Callable[[Path], object], path: Path) -> Trial:
-    """Reads a bag in a fork of this process; code in the bag makes a file `canary` beside it."""
+    """Reads a bag in a fork of this process; code in the bag makes a file `canary` next to it."""
     with tempfile.TemporaryFile() as said:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -27,7 +27,7 @@ class HostileDataset(NamedTuple):
     Attributes:
         seed: By which it was made.
         how: What was done.
-        path: Its folder, in a folder of its own; code in it makes `canary` beside it.
+        path: Its folder, in a folder of its own; code in it makes `canary` in the same folder.
     """
 
     seed: int

@@ -62,7 +62,7 @@ def elsewhere(file: h5py.File, chance: random.Random) -> None:
 
 
 def unfolding(file: h5py.File, chance: random.Random) -> None:
-    """Has very many values that take no room."""
+    """Has very many values that need no memory."""
     place = chance.choice(("data/demo_0/actions", f"{OBSERVATIONS}/state", f"{OBSERVATIONS}/images_camera_colour"))
     del file[place]
     shape = chance.choice(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 CANARY = "canary"
-"""Name of the file that code in a data set makes, beside its folder."""
+"""Name of the file that code in a data set makes, next to its folder."""
 DEEP = 5000
 LONG = 200_000
 
@@ -95,7 +95,7 @@ def change_bytes(folder: Path, chance: random.Random) -> None:
 
 
 def special_entries(folder: Path, chance: random.Random) -> None:
-    """Has a link, a pipe, a socket or many folders in place of a file, or beside it."""
+    """Has a link, a pipe, a socket or many folders in place of a file, or next to it."""
     path = some_file(folder, chance)
     if chance.random() < 0.7:
         path.unlink()

@@ -121,7 +121,7 @@ def _meshes(place: Place) -> None:
 
 
 def _where(place: Place) -> Path:
-    """Returns a place of the folder, cleared of what was there, or a stored file."""
+    """Returns an emptied place of the folder, or a stored file."""
     stored = [f"files/{each.name}" for each in sorted((place.demos / "files").iterdir())]
     path = place.demos / place.rng.choice((*PLACES, *stored))
     path.parent.mkdir(exist_ok=True)
@@ -463,7 +463,7 @@ class Hostile(NamedTuple):
         seed: By which it was made.
         how: What was done.
         demos: The folder of episodes.
-        outside: The folder beside it that must stay as it is.
+        outside: The folder next to it, which must stay unchanged.
     """
 
     seed: int

@@ -99,7 +99,7 @@ def _content(folder: Path) -> list[tuple[Any, ...]]:
 
 
 def _watched(read: Callable[[Path], object], demos: Path) -> None:
-    """Reads a folder; writes outside and modules of others are noted in a file `canary` beside it."""
+    """Reads a folder; writes outside of it, and foreign modules, are recorded in a file `canary` next to it."""
     inside = demos.parent
     temporary = inside / "temporary"
     temporary.mkdir(exist_ok=True)

@@ -103,7 +103,7 @@ class Hostile(NamedTuple):
 
     @property
     def canary(self) -> Path:
-        """The file that is there if code in the hostile one was run."""
+        """The file that exists if code in the hostile one was run."""
         return self.path.parent / "canary"
 
 
@@ -339,7 +339,7 @@ BOMBS = (
     f"timeStep: {'9' * 5000}",
     "resetSimulation: {flags: 1180591620717411303424}",
 )
-"""YAML that takes far more than it is long, or names what nobody should load."""
+"""YAML that expands far beyond its length, or names classes that must not be loaded."""
 
 
 def _bag(random: random.Random, folder: Path) -> tuple[Path, dict[str, Callable[[], object]]]:
@@ -367,7 +367,7 @@ REPLACED = (
     ('"files": {}', '"files": {"/proc/kmsg": "0", "/dev/zero": "0", "/etc/shadow": "0"}'),
     ('"config"', '"conf"'),
 )
-"""What may be hostile in the description of a recorded world, in the place of what is there."""
+"""Hostile replacements in the description of a recorded world."""
 
 
 def write_session(
@@ -377,7 +377,7 @@ def write_session(
 
     Args:
         definition_code: A file that code in the definition of one message makes, if it is run.
-        change: Returns what the world's description is to be, of what it is.
+        change: Returns the changed description of the world.
         last_tick: The tick that the last state is said to be of, if it is not 0.
     """
     world = World(

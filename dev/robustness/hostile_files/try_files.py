@@ -1,4 +1,4 @@
-"""Reads many broken and hostile files, each in a process of its own, and prints a table of what became of that.
+"""Reads many broken and hostile files, each in its own process, and prints a table of the results.
 
 URDFs, meshes and YAML files are read by the program behind `./rpbi check` and by the simulator node, bags by our tools.
 Run it by `./rpbi shell -c 'python3 dev/robustness/hostile_files/try_files.py'`; the table in docs/security.md is its.
@@ -64,7 +64,7 @@ def _master() -> Iterator[None]:
 
 
 def _outcomes(hostile: Hostile) -> list[Outcome]:
-    """Returns what became of each reader, and prints what is not fine."""
+    """Returns the results of each reader, and prints the failures."""
     outcomes = {name: outcome_of(read, hostile.canary) for name, read in hostile.readers.items()}
     if all(each.is_fine for each in outcomes.values()) and _agree(list(outcomes.values())):
         shutil.rmtree(hostile.path.parent)
@@ -79,7 +79,7 @@ def _agree(outcomes: list[Outcome]) -> bool:
 
 
 def _row(kind: str, found: list[list[Outcome]]) -> tuple[object, ...]:
-    """Returns a row of the table: what is taken and refused is what the first reader says, the rest is of all."""
+    """Returns a row of the table: the first reader's numbers of accepted and refused files, and all counts."""
     first = Counter(outcomes[0].verdict for outcomes in found)
     every = Counter(each.verdict.split()[0] for outcomes in found for each in outcomes)
     bad = every["signal"], every["traceback"] + every["silent"], every["hang"], every["code"]

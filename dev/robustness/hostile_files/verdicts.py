@@ -1,4 +1,4 @@
-"""Makes hostile files in a folder, reads each, and prints kind, seed, reader, verdict and what was said, as JSON lines.
+"""Makes hostile files in a folder, reads each, and prints kind, seed, reader, verdict and message as JSON lines.
 
 Arguments: `alone`, or `node` if the simulator node is to read them too, which needs a ROS master; the folder, the first
 seed, how many of each kind, and the kinds. `controls` are files that must not be fine with who reads them without care.

@@ -54,7 +54,7 @@ def floor_picture(path: Path) -> None:
 
 
 def rate_picture(path: Path) -> None:
-    """Draws the first touch by length of the tick, and forces that chatter by which of them are told."""
+    """Draws the first touch by length of the tick, and chattering forces by which of them are reported."""
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.2))
     for colour, step_ms in zip(COLOURS, (1, 2, 4)):
         force = pushed(step_ms / 1000.0, length_m=0.05)

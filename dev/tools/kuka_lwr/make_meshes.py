@@ -19,7 +19,7 @@ from mesh import Mesh, merge, moved, revolve, write_materials, write_obj
 
 FOLDER = Path(__file__).parents[3] / "src/rpbi_examples/robots/kuka_lwr"
 NECK, ELBOW, WRIST, FLANGE = 0.060, 0.072, 0.055, 0.037  # radii of roll, pitch, wrist and last joint [m]
-SEAM = 0.029  # the wrist's pitch joint closes this far beside the arm's axis [m]
+SEAM = 0.029  # the wrist's pitch joint closes at this distance from the arm's axis [m]
 HIDDEN = 0.0045  # how far both halves of a pitch joint reach past its seam, inside the ring [m]
 
 

@@ -1,4 +1,4 @@
-"""Reads a data set of `./rpbi export` with LeRobot's own reader, and compares every cell with what was exported.
+"""Reads a data set of `./rpbi export` with LeRobot's own reader, and compares every cell with the exported one.
 
 Started by `dev/tools/lerobot/check.sh DIR`, in an environment that has LeRobot.
 """

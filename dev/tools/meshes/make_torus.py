@@ -1,4 +1,4 @@
-"""Writes a torus beside itself: torus.vtk of tetrahedra, to be simulated as a soft body, and what it looks like.
+"""Writes a torus to its own folder: torus.vtk of tetrahedra, to be simulated as a soft body, and its visible mesh.
 
 PyBullet's EGL renderer shows soft bodies with checks unless they have a texture of their own, so torus.obj brings one.
 """

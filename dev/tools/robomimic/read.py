@@ -1,4 +1,4 @@
-"""Reads a data set of `./rpbi export` by robomimic's published layout, and compares every cell with what was exported.
+"""Reads a data set of `./rpbi export` by robomimic's published layout, and compares every cell with the exported one.
 
 Started by `dev/tools/robomimic/check.sh DIR`.
 """

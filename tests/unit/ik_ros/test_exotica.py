@@ -219,7 +219,7 @@ BOMB = '<!DOCTYPE a [<!ENTITY b "ha"><!ENTITY c "&b;&b;&b;">]>'
         ("<a/>", "expected a problem"),
         ("<a>" + "<b/>" * 20_000 + "</a>", "10000 elements"),
         ("<a>" + " " * 2_000_000 + "</a>", "expected at most 1000000"),
-        ("<a><IKSolver Name='a'><Name>b</Name></IKSolver></a>", "'Name' is there twice"),
+        ("<a><IKSolver Name='a'><Name>b</Name></IKSolver></a>", "'Name' is given twice"),
     ],
 )
 def test_hostile_files_are_rejected(tmp_path, text, message):

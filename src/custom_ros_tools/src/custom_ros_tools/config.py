@@ -233,7 +233,7 @@ def _size(node: yaml.Node, known: dict[int, int]) -> int:
         return 1
     if id(node) in known:
         if not known[id(node)]:
-            raise yaml.YAMLError("an alias stands for something that contains it")
+            raise yaml.YAMLError("an alias refers to a value that contains it")
         return known[id(node)]
     known[id(node)] = 0
     children = node.value if isinstance(node, yaml.SequenceNode) else [part for pair in node.value for part in pair]

@@ -57,7 +57,7 @@ class Problem:
     Attributes:
         file: Path of the YAML file as the user wrote it; `"~config"` when it came from the parameter server.
         key: Dotted key path with list indices, such as `intrinsics.range[1]`; empty for the file as a whole.
-        message: What was expected, what was found and what to write instead.
+        message: The expected value, the value found, and what to write instead.
     """
 
     file: str

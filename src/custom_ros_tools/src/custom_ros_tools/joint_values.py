@@ -48,7 +48,7 @@ class JointValues:
         velocity: Iterable[float] | None = None,
         effort: Iterable[float] | None = None,
     ) -> JointValues:
-        """Returns checked values; None stands for a quantity that is not given.
+        """Returns checked values; None means that the quantity is not given.
 
         Raises:
             ValueError: If lengths differ, a joint is named twice or a value is not finite.
@@ -90,7 +90,7 @@ class JointValues:
 
         Raises:
             MissingJointsError: If a joint to convert is missing; it names all of them.
-            ValueError: If a joint gets the name of another, or a value is not finite any more.
+            ValueError: If a joint gets the name of another, or a value is no longer finite.
         """
         if not conversions:
             return self

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 MAX_TOGETHER = 32
 """Largest number of messages that are buffered until the next flush and sent by one system call."""
 _at_once = threading.Event()
-"""Set once nothing flushes any more."""
+"""Set when no thread flushes any longer."""
 log = logging.getLogger(__name__)
 HEADER_TIMEOUT_S = 60.0
 """Time within which a connection has to send its header [s]; then it is closed."""
@@ -48,7 +48,7 @@ class BufferedSocket:
         self._kept: deque[bytes] = deque(maxlen=limit)
         self._most_together = min(limit, MAX_TOGETHER)
         self._error: OSError | None = None
-        """Why the other side cannot be reached any more."""
+        """Error that closed the connection; None while it is open."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._socket, name)

@@ -117,7 +117,7 @@ def fitted(values: Array, samples: Array, conditions: Array | None = None, rough
         values: Basis functions at m samples, shape (m, k).
         samples: Samples of d signals, shape (m, d).
         conditions: Rows that are 0 for all weights, shape (c, k).
-        roughness: Matrix of a smooth prior of the weights, shape (k, k): it decides what the samples leave open.
+        roughness: Matrix of a smooth prior of the weights, shape (k, k): it determines what samples leave open.
 
     Returns:
         Weights, shape (d, k).

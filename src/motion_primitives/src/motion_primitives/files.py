@@ -29,7 +29,7 @@ class PrimitiveFile(ConfigModel):
 
 
 def save(primitive: Primitive, path: str | Path) -> None:
-    """Writes a learned primitive; a file of this name is replaced at once, or stays as it was.
+    """Writes a learned primitive; a file of this name is replaced atomically, or stays unchanged.
 
     Raises:
         NotLearnedError: If it has learned nothing.

@@ -3,7 +3,7 @@
 from rpbi.world import World
 
 GOAL = (-0.1, 0.1)
-"""Where the middle of the box is to be [m]."""
+"""Goal of the middle of the box [m]."""
 BEHIND_M = 0.09
 """Distance of the hand behind the middle of the box, seen from the goal [m]."""
 HEIGHT_M = 0.06
@@ -18,4 +18,4 @@ def box_to_goal(world: World) -> float:
     hand = arm.link_pose(arm.link_indices[-1]).position
     place = (box[0], box[1] - BEHIND_M, HEIGHT_M)
     to_goal = (box[0] - GOAL[0]) ** 2 + (box[1] - GOAL[1]) ** 2
-    return PER_M2 * to_goal + sum((mine - wanted) ** 2 for mine, wanted in zip(hand, place, strict=True))
+    return PER_M2 * to_goal + sum((actual - desired) ** 2 for actual, desired in zip(hand, place, strict=True))

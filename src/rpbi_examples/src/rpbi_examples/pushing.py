@@ -34,7 +34,7 @@ PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
 PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
 """Mean speed of the ball [m/s]."""
 JOINT_SPEED = 0.8
-"""Mean speed of the joint with the largest motion [rad/s], on the way from an arbitrary posture."""
+"""Mean speed of the joint with the largest motion [rad/s], of the motion from an arbitrary posture."""
 MIN_DURATION_S = 0.5
 """Least time for a straight line [s]."""
 SPACING_M = 0.02

@@ -29,7 +29,7 @@ class Plant(ABC):
     """A system that is measured and commanded, and that advances in time.
 
     Attributes:
-        is_timed: Whether time passes by itself, as for hardware. Then late plans are discarded; otherwise the plant
+        is_timed: Whether it runs in real time, as hardware does. Then late plans are discarded; otherwise the plant
             waits, and no decision depends on the speed of the computer.
     """
 

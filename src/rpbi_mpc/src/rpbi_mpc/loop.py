@@ -24,13 +24,15 @@ class LoopConfig(ConfigModel):
         hz: Cycles a second [Hz].
         delay_s: Time from a measurement until its command acts [s], at most one cycle. It is constant: in simulation
             however long the solver takes, on hardware as long as the solver is faster.
-        max_missed: Number of cycles without a new plan for which the last one goes on; after that the plant stands, and
-            the loop stops.
+        max_missed: Number of cycles without a new plan for which the last plan is executed; after that, plant and loop
+            stop.
     """
 
     hz: Hz = Field(25.0, description="Cycles a second.")
     delay_s: Annotated[NonNegative, Unit("s")] = Field(0.02, description="Time from a measurement to its command.")
-    max_missed: Annotated[int, Field(ge=0)] = Field(5, description="Cycles that the last plan goes on without another.")
+    max_missed: Annotated[int, Field(ge=0)] = Field(
+        5, description="Cycles that execute the last plan without a new one."
+    )
 
     @model_validator(mode="after")
     def _acts_within_its_cycle(self) -> LoopConfig:
@@ -88,11 +90,11 @@ class LockStep:
     """Senses, solves, acts and steps, one cycle at a time.
 
     The measurement of a cycle decides the command that acts `delay_s` later. A simulated plant waits for the solver, so
-    the same start leads to the same end on any computer. A timed plant does not wait: a plan that is there after its
-    time is not used.
+    the same start leads to the same end on any computer. A timed plant does not wait: late plans are
+    discarded.
 
-    Without a new plan the last one goes on, for `max_missed` cycles; then the plant stands and the loop stops. Without
-    a measurement the plant stands, and goes on by itself with the next one.
+    Without a new plan, the last one is executed for `max_missed` cycles; then plant and loop stop. Without a
+    measurement, the plant stops until the next one.
 
     Args:
         plant: The controlled system.

@@ -53,7 +53,7 @@ class PlantConfig(ConfigModel):
     )
     target_hz: Hz = Field(100.0, description="Rate of targets; a whole number of them is in each part of a cycle.")
     timed: Switch = Field(
-        False, description="Whether time passes by itself, as on hardware; else the world is stepped."
+        False, description="Whether the plant runs in real time, as hardware does; otherwise the world is stepped."
     )
 
 

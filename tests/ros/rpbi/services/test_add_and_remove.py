@@ -182,7 +182,7 @@ REFUSED = {
         "",
         ["config: is not YAML: its aliases repeat more than 1000000 values"],
     ),
-    "an alias of itself": (DYNAMIC, "a: &a [*a]", "", ["an alias stands for something that contains it"]),
+    "an alias of itself": (DYNAMIC, "a: &a [*a]", "", ["an alias refers to a value that contains it"]),
     "a path too long": (
         DYNAMIC,
         box(createCollisionShape={"shapeType": "GEOM_MESH", "fileName": "a" * 5000}),

@@ -13,7 +13,7 @@ class Argument(NamedTuple):
     A keyword-only parameter is an option; all others are positional arguments.
 
     Attributes:
-        shown: Placeholders of its words on the page, such as `X Y Z`. `NAME ...` stands for one word or more,
+        shown: Placeholders of its words on the page, such as `X Y Z`. `NAME ...` means one word or more,
             `[NAME ...]` for any number of words.
         flag: Name of an option, by default `--` and the name of the parameter.
         parse: Returns the value of a word, or raises ValueError if the word is invalid.

@@ -14,7 +14,7 @@ def bench(
     quick: Annotated[bool, Argument("")] = False,
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*")] = None,
 ) -> int:
-    """Runs the benchmarks, each beside its floor.
+    """Runs the benchmarks, each with its lower bound.
 
     Args:
         NAME: by default all but controls, datasets, dressing, examples, farm, forks, guard_faults, gym, haptics,

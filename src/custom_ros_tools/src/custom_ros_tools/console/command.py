@@ -140,7 +140,7 @@ class Command:
             The exit code: 0, 1 if something went wrong, with the message on stderr, or that of the function.
 
         Raises:
-            BrokenPipeError: If nobody reads the standard output any more, see `run_command`.
+            BrokenPipeError: If the reader of the standard output has closed it, see `run_command`.
         """
         if {"-h", "--help"} & set(words):
             print(self.section, end="")

@@ -79,4 +79,4 @@ def docs() -> None:
         path.parent.mkdir(exist_ok=True)
         is_new = not path.exists() or path.read_text(encoding="utf-8") != text
         path.write_text(text, encoding="utf-8")
-        print(f"{'written' if is_new else 'as it was'}: {path.relative_to(root)}")
+        print(f"{'written' if is_new else 'unchanged'}: {path.relative_to(root)}")

@@ -43,7 +43,7 @@ class ConfigModel(BaseModel):
         Args:
             data: The mapping; it is neither changed nor stored.
             file: Name of the file, for messages; `"~config"` when it came from the parameter server.
-            context: Further entries of `info.context` for validators, beside `file`, such as the folders to search.
+            context: Further entries of `info.context` for validators, such as the folders to search.
 
         Raises:
             ConfigError: With one `Problem` for each fault.

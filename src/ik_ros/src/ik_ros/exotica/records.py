@@ -88,7 +88,7 @@ def _record(element: _Element, where: str) -> XmlRecord:
     fields: dict[str, str | list[XmlRecord]] = dict(element.attributes)
     for child in element.children:
         if child.tag in fields:
-            raise ValueError(f"{where}: '{child.tag}' is there twice")
+            raise ValueError(f"{where}: '{child.tag}' is given twice")
         inner = f"{where}.{child.tag}"
         fields[child.tag] = [_record(each, f"{inner}.{each.tag}") for each in child.children] or child.text.strip()
     return XmlRecord(element.tag, fields)

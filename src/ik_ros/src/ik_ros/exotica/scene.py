@@ -126,7 +126,7 @@ class ExoticaScene:
         """Checks frames of a problem.
 
         Raises:
-            UnknownNameError: If the scene lacks one of them, or what it is attached to.
+            UnknownNameError: If the scene lacks one of them, or the object that it is attached to.
             ValueError: If joints would move one; frames on the robot are those of the XML.
         """
         for name in frames:

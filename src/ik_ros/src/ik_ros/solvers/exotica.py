@@ -76,7 +76,7 @@ class ExoticaSolver(Solver):
         file = read_problem(config.xml_filename)
         try:
             if file.solver is None and not config.use_scipy_solver:
-                raise KeyedError("", "expected an IKSolver beside the problem, or the option use_scipy_solver: true")
+                raise KeyedError("", "expected an IKSolver next to the problem, or the option use_scipy_solver: true")
             kind = type(file.problem).__name__
             with errors_of(f"{kind}.PlanningScene.Scene"):
                 self.scene = ExoticaScene(file.problem.PlanningScene[0])

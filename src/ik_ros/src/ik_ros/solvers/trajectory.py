@@ -84,7 +84,7 @@ class TrajectoryConfig(KdlConfig):
             if shape.link is not None and shape.link not in links:
                 raise KeyedError(f"shapes[{i}].link", str(UnknownNameError("link of the chain", shape.link, links)))
             if shape.link is not None and shape.sphere is None:
-                raise KeyedError(f"shapes[{i}]", "shapes on links must be spheres; several can stand for one link")
+                raise KeyedError(f"shapes[{i}]", "shapes on links must be spheres; several can approximate one link")
         return self
 
 

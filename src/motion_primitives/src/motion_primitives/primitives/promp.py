@@ -116,7 +116,7 @@ class MeanPath:
     """The mean of a distribution of motions.
 
     Args:
-        known: Points and rates that are known besides the goal.
+        known: Points and rates that are known, in addition to the goal.
         goal: The last point, None if it is one of the known points.
 
     Raises:

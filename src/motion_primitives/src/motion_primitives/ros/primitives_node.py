@@ -63,7 +63,7 @@ class PrimitivesNode:
         self._config = private_config(PrimitivesNodeConfig)
         self._space = self._config.source.space
         self._primitive = self._new_primitive()
-        trust_only({"motion_primitives"}, "a node of primitives imports what its ~config names when it starts, no more")
+        trust_only({"motion_primitives"}, "a node of primitives imports only what its ~config names when it starts")
         self._lock = threading.RLock()
         self._warn = ThrottledWarning()
         self._mode, self._message = IDLE, ""

@@ -1,4 +1,4 @@
-"""A controller that lets a humanoid stand on both feet and reach with a hand."""
+"""A controller with which a humanoid stands on both feet and reaches with a hand."""
 
 from __future__ import annotations
 

@@ -207,7 +207,7 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
 
 def _make_way(file: Path, options: argparse.Namespace) -> None:
-    """Refuses a launch file that would stop a running simulator, unless it is to replace it.
+    """Refuses a launch file that would stop a running simulator, unless it shall replace the simulator.
 
     Raises:
         InterfaceError: If it would stop one, or if another one already publishes the clock of this master.

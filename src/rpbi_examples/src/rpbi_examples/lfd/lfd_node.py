@@ -190,7 +190,7 @@ class LfdNode:
         self._publish("demonstration", run.table[["tip/x", "tip/y"]].to_numpy())
         rospy.loginfo("demonstration %d: %d rows; the box is %s", run.episode, len(run.table), run.error)
         if not run.error.is_good_to_learn:
-            rospy.logwarn("what is learned from it may not bring the box there: press 2 to demonstrate again")
+            rospy.logwarn("a skill learned from it may not bring the box to the goal: press 2 to demonstrate again")
         self._become("demonstrated" if run.error.is_good_to_learn else "missed")
 
     def _learn_or_execute(self) -> None:

@@ -15,7 +15,7 @@ Place = tuple[float, float]
 HALF_SIDE_M, TIP_RADIUS_M = 0.1, 0.015
 """Half of a side of the box, and the radius of the ball at the tip [m]."""
 CLEARANCE_M = 0.035
-"""Distance of the tip from the box on the way around it [m]."""
+"""Distance of the tip from the box while it moves around it [m]."""
 ALIGNED_M, PASSED_M = 0.003, 0.015
 """Distance from its end at which a leg is complete: for the last leg before a push, and for others [m]."""
 CLOSE_M, CLOSE_RAD = 0.02, math.radians(5.0)
@@ -29,7 +29,7 @@ TURN_ARM_M2 = 0.006
 MAX_ASIDE_M = 0.05
 """Largest distance of a push from the middle [m]."""
 STILL_SPEED, STILL_S = 0.005, 0.2
-"""Speed below which the tip stands still [m/s], and time for which it has to [s]."""
+"""Speed below which the tip counts as at rest [m/s], and time for which it must be at rest [s]."""
 HERE_M, MIN_PUSH_M = 0.02, 0.02
 """Bonus length of a push from the present side of the tip, and least length of a push that turns the box [m]."""
 PUSHED_M, PRESS_SHARE = 0.006, 0.75

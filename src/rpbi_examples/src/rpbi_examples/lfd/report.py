@@ -30,7 +30,7 @@ SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
 SIZE, DPI = (15.0, 8.4), 100
 BESIDE = 0.025
-"""Width of labels beside a plot, as a share of the figure."""
+"""Width of the labels next to a plot, as a share of the figure."""
 
 
 class BoxError(NamedTuple):

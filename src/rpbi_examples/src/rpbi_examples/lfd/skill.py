@@ -122,7 +122,7 @@ class PushSkill:
         self._push = learn(shown.times[split:], shown.places[split:])
 
     def plan(self, start: Array) -> PushPlan:
-        """Returns the motion from a start [m]: the approach, and the push as it was shown."""
+        """Returns the motion from a start [m]: the approach, and the demonstrated push."""
         approach, push = self._approach.plan(start=start), self._push.plan()
         parts: tuple[MotionPlan, MotionPlan] = approach, push
         times = np.concatenate([approach.times, approach.duration_s + push.times[1:]])

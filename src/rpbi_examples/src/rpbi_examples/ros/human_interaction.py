@@ -162,7 +162,7 @@ class Watch:
             )
         if self._is_scripted:
             if report is None or report.error > MAX_ERROR:
-                self._failure = f"the force is not what it should be: {summary}"
+                self._failure = f"the force differs from the expected one: {summary}"
             self._over.set()
 
     def _show(self) -> None:

@@ -25,7 +25,7 @@ from .joint_targets import wait_until_ready
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 """Start of the search [rad], unless `~home` names another; other joints at 0."""
 APPROACH_S = 5.0
-"""Time for the way to the figure [s]."""
+"""Time of the motion to the figure [s]."""
 WAYPOINTS = 16
 """Number of waypoints of a round, where the trajectory is planned as a whole."""
 WHOLE_TRAJECTORIES = "trajectory"

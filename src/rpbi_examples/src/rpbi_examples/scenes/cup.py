@@ -69,7 +69,7 @@ class Cup(Scene):
         yield from self._until(PALM, arm.swing(start.moved(NEAR_M, GRASP_M), SLOW_SPEED, TURN_SPEED))
         yield from self._move_fingers(OPEN, CLOSED, 1.0)
         if not {f"j2s6s200_link_finger_tip_{n}" for n in FINGERS} <= self._touching():
-            raise SceneFailedError("kinova: expected both fingertips at the cup, got a hand that closed beside it")
+            raise SceneFailedError("kinova: expected both fingertips at the cup, got a hand that closed next to it")
         yield from arm.swing(arm.spot.moved(up=ABOVE_M), SPEED, TURN_SPEED)
         yield from self.measure()
         cup = PolarPoint.of(self.sensed.poses["cup"].position)

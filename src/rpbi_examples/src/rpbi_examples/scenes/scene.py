@@ -165,7 +165,7 @@ class Scene(ABC):
         sensed: The view that policies act by: `seen`, and with noise the poses and tags that sensors report.
         landmarks: Further poses that a policy senses, in the world, such as that of a palm; `sensed.poses` has them.
         is_noisy: Whether sensors have noise and delay, see `sensing`; set before `prepare`.
-        goal_numbers: Numbers of the episode that a policy needs besides observations, such as a place [m].
+        goal_numbers: Numbers of the episode that a policy needs in addition to observations, such as a place [m].
     """
 
     world: ClassVar[str]
@@ -203,7 +203,7 @@ class Scene(ABC):
         """Acts for robots that no policy moves, such as a person, in place of `act`; does nothing by default.
 
         Raises:
-            SceneFailedError: If the task cannot be done any more.
+            SceneFailedError: If the task can no longer be done.
         """
         yield from ()
 

@@ -124,7 +124,7 @@ class SceneTask(WorldTask):
         return self.scene.has_succeeded()
 
     def has_ended(self) -> bool:
-        """Returns whether the scene has succeeded, or cannot succeed any more."""
+        """Returns whether the scene has succeeded, or can no longer succeed."""
         return self._has_failed or self.has_succeeded()
 
     def _see(self) -> Seen:

@@ -18,7 +18,7 @@ ARM = "kuka_lwr", URDF, "lwr_arm_0_link", SPONGE, Pose((0.5, 0.0, 0.0))
 FACING = (1.0, 0.0, 0.0, 0.0)
 """Orientation of the sponge on the board: its z axis points into the board."""
 PIVOT, FACE_M = (-0.16, 0.0, 0.15), 0.06
-"""Ball joint of the board's stand in the world [m], and height of the board's face over it."""
+"""Ball joint of the board's support in the world [m], and height of the board's face over it."""
 RANGES = ((-0.02, -0.02, -0.1, 0.3, -0.15, 2000.0, 0.4), (0.02, 0.02, 0.1, 0.5, 0.15, 5000.0, 1.0))
 """Shift of the board along x and y [m], rotations about x, y and z [rad], stiffness of the sponge [N/m], friction."""
 SIZE_M, STAINS, CELLS, STAIN_M = (0.25, 0.36), (8, 10), (50, 72), 0.009

@@ -152,7 +152,7 @@ class LoopNode:
         if cycle.status != self._said and cycle.status != Status.SOLVED:
             (rospy.loginfo if cycle.status == Status.FINISHED else rospy.logwarn)(text)
         elif cycle.status == Status.SOLVED and self._said in (Status.WAITING, Status.LAST_PLAN):
-            rospy.loginfo("solved: the robot goes on")
+            rospy.loginfo("solved: the robot moves again")
         self._said = cycle.status
         message = MpcStatus(cycle=cycle.index, running=self._running, status=str(cycle.status), reason=cycle.reason)
         message.header.stamp = rospy.Time.from_sec(cycle.sensed.time_s)

@@ -1,4 +1,4 @@
-"""The robot and the slider as plants: a world that is stepped by services, or one in which time passes by itself."""
+"""The robot and the slider as plants: a world that is stepped by services, or one that runs in real time."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ MAX_WAIT_S = 10.0
 MAX_LOOK_S = 1.0
 """Longest time for connecting to a subscriber, to see whether it lives [s]."""
 SENDING_S = 0.2
-"""Time for rospy to send the last lines [s]; it drops what it has not sent when the process ends."""
+"""Time for rospy to send the last lines [s]; it drops unsent lines when the process ends."""
 LOG_PARAMETER = "/rosout_disable_topics_generation"
 """Parameter to which rospy subscribes with the first line that it logs."""
 

@@ -72,7 +72,7 @@ def run_node(
             `start` has returned.
         anonymous: Whether the name is made unique.
         ros_time: Whether the node uses ROS time; otherwise it never waits for a clock.
-        loggers: Top-level Python modules whose loggers go to /rosout, beside that of `start`.
+        loggers: Top-level Python modules whose loggers go to /rosout, in addition to that of `start`.
     """
     if not _wait_for_master():
         return

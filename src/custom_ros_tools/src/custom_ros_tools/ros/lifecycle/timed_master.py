@@ -105,7 +105,7 @@ def _is_of_this_computer(address: str) -> bool:
 def unused_port() -> int:
     """Returns a port for a private master.
 
-    The kernel assigns it to nobody, so that no other node takes it before the master does.
+    The kernel assigns it to no program, so no other node can take it before the master does.
 
     Raises:
         OSError: If there is none.

@@ -2,7 +2,7 @@
 
 rospy cannot send to many subscribers from one thread without waiting, cannot register again with a restarted ROS
 master, and confuses connections. Each use is tested when a node starts. If rospy has different internals, one warning
-reports what was expected, what was found and what is lost, and the node continues without it.
+names the expected part, the difference and the lost function, and the node continues without it.
 """
 
 from .connections import close_poller_with, keep_accepting, keep_new_connections

@@ -79,7 +79,7 @@ class Registry:
     """The topics and services of this node, from rospy.
 
     Attributes:
-        subscriptions: Connects the node to the publishers of what it subscribes to.
+        subscriptions: Connects the node to the publishers of its topics.
     """
 
     def __init__(self) -> None:

@@ -74,7 +74,7 @@ class Belt:
         acceleration: Its acceleration, which parts follow by friction [m/s^2].
 
     Attributes:
-        is_on: Whether it is to run.
+        is_on: Whether it shall run.
     """
 
     def __init__(self, scene: Scene, slot: str, joint: str, way_m: float, speed: float, acceleration: float) -> None:

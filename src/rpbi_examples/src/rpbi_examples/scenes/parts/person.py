@@ -33,7 +33,7 @@ SHOULDER_M, MIDDLE_M, SWING_M = 1.43, 0.55, 0.08
 
 
 class SwayingPerson:
-    """Moves the arms of an avatar; the right palm sways as that of someone who stands.
+    """Moves the arms of an avatar; the right palm sways as that of a standing person.
 
     Args:
         scene: The scene that it acts in.
