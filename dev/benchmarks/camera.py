@@ -1,4 +1,4 @@
-"""Joint states at 1 kHz beside a camera of 640x480 pixels at 30 Hz, with images and with point clouds.
+"""Joint states at 1 kHz with a camera of 640x480 pixels at 30 Hz, with images and with point clouds.
 
 The reference only publishes, or only draws.
 """

@@ -1,4 +1,4 @@
-"""How punctual the 1 kHz loop of a haptic device is beside the simulator; the reference is a bare loop beside the
+"""Jitter of the 1 kHz loop of a haptic device while the simulator runs; the reference is a bare loop with the
 simulator.
 """
 

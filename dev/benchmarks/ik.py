@@ -24,7 +24,7 @@ from rpbi.geometry import Pose
 
 POSES, QUICK_POSES = 1000, 100
 GLOBAL_PART = 0.05
-"""Part of the poses for `global`, which makes all its starts for each."""
+"""Share of the poses for `global`, which tries all its starts for each."""
 NEAR = 0.1
 """Standard deviation of near starts [rad]."""
 PATH_STEPS, PATH_RADIUS_M = 1000, 0.1

@@ -31,7 +31,7 @@ from rpbi.world import World  # noqa: E402
 SEEDS, QUICK_SEEDS = 200, 5
 FIRST_SEED = 9000
 REPORTED = 10
-"""Number of sessions after which counts are printed, so that a run that is cut off has some."""
+"""Number of sessions after which counts are printed, so that an interrupted run has some."""
 SHORTEST, LONGEST = 100, 900
 """Ticks before a keyframe."""
 SINCE, ON = 200, 300

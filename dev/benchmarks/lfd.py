@@ -1,4 +1,4 @@
-"""Whether a box is at its goal after a person has shown how to push it: scripted, and by real keys in a window."""
+"""Whether a box is at its goal after a demonstrated push: scripted, and by real keys in a window."""
 
 from __future__ import annotations
 

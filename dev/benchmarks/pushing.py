@@ -113,7 +113,7 @@ def _sampled() -> list[Result]:
 
 
 def _times(what: str, trials: list[PushingTrial]) -> list[Result]:
-    """Returns solve times; those of the processor do not depend on what else the machine does."""
+    """Returns solve times; processor times do not depend on the load of the machine."""
     plans = [cycle.plan for trial in trials for cycle in trial.cycles if cycle.plan and cycle.plan.iterations]
     processor, wall = (np.array([getattr(plan, name) for plan in plans]) for name in ("processor_s", "wall_s"))
     failed = float(np.mean([not plan.converged for plan in plans]))

@@ -1,4 +1,4 @@
-"""What a benchmark finds out, and how it is shown."""
+"""Figures of a benchmark, and their table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """What a figure has to reach.
+    """Target of a figure.
 
     Attributes:
         limit: The limit, in the figure's unit or in multiples of its floor.

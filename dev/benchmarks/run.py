@@ -102,7 +102,7 @@ def _processor() -> str:
 
 
 def _renderer() -> str:
-    """Returns what draws the images; asked in a process of its own, since some drivers end it."""
+    """Returns the name of the renderer; it is requested in its own process, since some drivers end the process."""
     found = subprocess.run([sys.executable, "-c", FIND_RENDERER], capture_output=True, text=True)
     # PyBullet and its plugin print a lot around it
     names = [line.partition(": ")[2] for line in found.stdout.splitlines() if line.startswith("renderer: ")]

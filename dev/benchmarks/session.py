@@ -33,7 +33,7 @@ CAMERA_POSE = "-0.32 -2.05 2.2 -0.346 0 -2.22".split()  # x y z [m], yaw pitch r
 
 
 class Session:
-    """Starts everything of a benchmark on a master of its own and leaves nothing of it behind.
+    """Starts all processes of a benchmark with its own master, and ends all of them.
 
     Args:
         use_sim_time: Whether ROS time is the simulator's.
@@ -125,7 +125,7 @@ class Session:
         stock: bool = True,
         spent_by: subprocess.Popen[bytes] | None = None,
     ) -> Watcher:
-        """Starts a subscriber in a process of its own and waits until it has received from every topic.
+        """Starts a subscriber in its own process and waits until it has received from every topic.
 
         Args:
             topics: What it subscribes to.
@@ -145,7 +145,7 @@ class Session:
         return self.output_file(process).read_text(errors="replace")
 
     def output_file(self, process: subprocess.Popen[bytes]) -> Path:
-        """Returns the file that has what a process prints."""
+        """Returns the file with the output of a process."""
         return self.folder / f"{self._processes.index(process)}.log"
 
     def wait_for_output(self, process: subprocess.Popen[bytes], text: str) -> None:
@@ -169,7 +169,7 @@ class Session:
         return json.loads(found[-1].partition(": ")[2]) if found else None
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Ends a process and its children as Ctrl-C would, and by force if that does not do."""
+        """Ends a process and its children as Ctrl-C would, and by SIGKILL if that has no effect."""
         for number, timeout_s in ((signal.SIGINT, 60.0), (signal.SIGKILL, 5.0)):
             if process.poll() is not None:
                 return

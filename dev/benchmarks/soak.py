@@ -1,4 +1,4 @@
-"""An hour at 1 kHz with a camera, objects in contact, and a controller: does it hold, and does memory stay flat?
+"""An hour at 1 kHz with camera, contacts and a controller: is the rate kept, and does memory stay constant?
 
 It takes an hour, so it runs only when it is named; `--quick` takes a minute.
 """
@@ -15,7 +15,7 @@ ROBOT, JOINT = "kuka_lwr", "lwr_arm_1_joint"
 SECONDS, QUICK_SECONDS = 3600.0, 60.0
 LARGEST_GROWTH = 0.02
 SILENCE_S = 0.5
-"""After so long without a status, those who watch over a simulator would take it for dead."""
+"""Time without a status after which monitors consider a simulator dead."""
 
 
 def run(quick: bool, seconds: float | None = None) -> list[Result]:

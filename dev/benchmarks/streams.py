@@ -104,7 +104,7 @@ def _world(folder: Path) -> dict[str, Any]:
 
 
 def _late(seed: int, stamps: str, jitter_s: float, stall_s: float = 0.0) -> list[Sent]:
-    """Returns targets that come up to so much too late, one of them by a stall; none overtakes another."""
+    """Returns targets that are late by up to a time, one of them because of a stall; their order is kept."""
     rng = random.Random(seed)
     count = round(SECONDS / PERIOD_S)
     stalled = rng.randrange(round(SETTLING_S / PERIOD_S), count - 10) if stall_s else None

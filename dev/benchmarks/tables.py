@@ -99,7 +99,7 @@ def _write_with_images(path: Path, megabytes: int, messages: int) -> None:
 
 
 def _read(path: Path) -> None:
-    """Reads the messages and leaves them serialised: less than this cannot be done with rosbag."""
+    """Reads the messages and leaves them serialised: the least that rosbag can do."""
     with rosbag.Bag(str(path)) as bag:
         for _ in bag.read_messages(raw=True):
             pass

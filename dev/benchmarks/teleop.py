@@ -1,4 +1,4 @@
-"""How often a lively hand is stopped: `teleop.launch real_robot:=true` with emulated devices, and the stand-in's arm.
+"""How often a fast hand is stopped: `teleop.launch real_robot:=true` with emulated devices, and the stand-in's arm.
 
 One guard checks the commands of the simulated arm, another one those of the stand-in. The control is the same
 hand without guards. The targets are then judged once more by a guard that refuses, with and without smoothing.
@@ -29,9 +29,9 @@ CONTROL_SECONDS = 60.0
 REFUSING = {"period_s": 0.009, "start_from": "target", "limits": {"acceleration": 10.0, "jerk": 1000.0}}
 REFUSING |= {"start_tolerance": 10.0}  # it is started again wherever the target is
 TARGETS = {True: "/guarded/joint_states/target", False: "/rpbi/kuka_lwr/joint_states/target"}
-"""Where inverse kinematics publishes, with and without guards."""
+"""Topics of inverse kinematics, with and without guards."""
 LOAD_REASONS = ("staleness", "source", "master", "command_rate", "command_timeout", "following_error", "torque")
-"""How reasons begin that depend on how busy the machine is, too; others follow from the commands alone."""
+"""Beginnings of reasons that also depend on the load of the machine; others follow from the commands alone."""
 ROW = "{:<9} {:>4}  {:<5} {:>7} {:>7}  {}"
 HEADING = ROW.format("device", "seed", "guard", "time", "targets", "stopped by")
 
@@ -69,7 +69,7 @@ def run(quick: bool) -> list[Result]:
 
 
 def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[dict[str, Any], np.ndarray]:
-    """Returns what came of one run (see `programs/hand.py`), and its targets [rad], k x 7."""
+    """Returns the result of one run (see `programs/hand.py`), and its targets [rad], k x 7."""
     with virtual_screen(1280, 1024) as screen, Session(use_sim_time=False) as ros:
         display = f"DISPLAY={screen}"
         socket, file = str(ros.folder / "spnav.sock"), ros.folder / "targets.npy"

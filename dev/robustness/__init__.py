@@ -1,1 +1,1 @@
-"""Hostile files by structure and by bytes, what reads them, and what becomes of that."""
+"""Hostile files by structure and by bytes, their readers, and the results."""

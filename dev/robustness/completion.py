@@ -1,4 +1,4 @@
-"""Has bash complete hostile launch files and answers of rogue nodes, and prints a table of the outcomes.
+"""Completes hostile launch files and answers of rogue nodes in bash, and prints a table of the outcomes.
 
 Run it by `./rpbi shell -c 'python3 dev/robustness/completion.py'`; it exits with 1 if code ran, a program printed a
 traceback, or a completion took more than 60 s or 2 GB. The table in docs/security.md is its.
@@ -84,7 +84,7 @@ def rogue_names(seed: int) -> list[str]:
 
 
 def trial(terminal: Terminal, folder: Path, line: str) -> tuple[str, float]:
-    """Types a line that ends with a tab, and has the result echoed; returns the verdict and the time [s]."""
+    """Types a line that ends with a tab, and echoes the result; returns the verdict and the time [s]."""
     (folder / CANARY).unlink(missing_ok=True)
     began_s = time.monotonic()
     try:
@@ -100,7 +100,7 @@ def trial(terminal: Terminal, folder: Path, line: str) -> tuple[str, float]:
 
 
 def _row(kind: str, lines: Iterator[str], folder: Path, **environment: str) -> bool:
-    """Completes lines in a terminal of their own and prints a row of the table; returns whether all were fine."""
+    """Completes lines in a new terminal and prints a row of the table; returns whether all were fine."""
     terminal = Terminal(folder, **environment)
     found = []
     for number, line in enumerate(lines):

@@ -1,4 +1,4 @@
-"""Has `check_dataset` check hostile data sets, and prints a table of the outcomes.
+"""Checks hostile data sets with `check_dataset`, and prints a table of the outcomes.
 
 Run by `./rpbi shell -c 'nice -n 19 python3 dev/robustness/datasets.py'`, it checks 500 of each format, each in a
 process of its own; the table in docs/security.md is its.
@@ -34,7 +34,7 @@ MODULE = "canary_module"
 
 
 def main() -> None:
-    """Checks the data sets; exits with 1 if one of them did what none may do."""
+    """Checks the data sets; exits with 1 if a check failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=500, help="of each format; default: %(default)s")
     parser.add_argument("--first", type=int, default=0, help="the first seed; default: %(default)s")
@@ -83,7 +83,7 @@ def _is_fine(trial: Trial) -> bool:
 
 
 def _content(folder: Path) -> str:
-    """Returns a digest of the names, sizes and times of all that is in a folder."""
+    """Returns a digest of the names, sizes and times of all files in a folder."""
     digest = hashlib.sha256()
     for place, folders, files in sorted(os.walk(folder)):
         for name in sorted((*folders, *files)):

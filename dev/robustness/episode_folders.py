@@ -33,7 +33,7 @@ from rpbi_data.datasets.formats import FORMATS  # noqa: E402
 
 
 def main() -> None:
-    """Reads the folders; exits with 1 if a reader of one of them did what none may do."""
+    """Reads the folders; exits with 1 if a reader failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=1000, help="default: %(default)s")
     parser.add_argument("--first", type=int, default=0, help="the first seed; default: %(default)s")

@@ -1,4 +1,4 @@
-"""Hostile targets for the guard, judged by an oracle that knows nothing of it.
+"""Hostile targets for the guard, judged by an independent oracle.
 
     ./rpbi shell -c 'python3 dev/robustness/guard_fuzz.py --robot seven --targets 1000000 --seed 0'
     ./rpbi shell -c 'python3 dev/robustness/guard_fuzz.py --robot lwr --geometry exact --targets 0 --climbs 30'
@@ -21,7 +21,7 @@ from fuzz.oracle import Oracle
 from fuzz.scenes import MARGIN_M, SCENES
 
 SHOWN = 20
-"""Of faults no more are printed."""
+"""Largest number of printed faults."""
 
 
 def main() -> int:

@@ -104,7 +104,7 @@ def write_hostile(seed: int, place: Path, good: Sequence[Path]) -> tuple[Path, s
 
 
 def _other(rng: random.Random, text: str) -> str:
-    """Returns a text in which one number, text or class is another."""
+    """Returns a text with one number, text or class replaced."""
     found = list(re.finditer(r"-?\d+\.?\d*(e-?\d+)?|\"[^\"\\]*\"|[\w.]+:[A-Z]\w+", text))
     if not found:
         return rng.choice(VALUES)

@@ -1,4 +1,4 @@
-"""Hostile meshes: some that are made up part by part, and good files with changed bytes."""
+"""Hostile meshes: some that are invented part by part, and good files with changed bytes."""
 
 from __future__ import annotations
 

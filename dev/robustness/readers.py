@@ -1,4 +1,4 @@
-"""Readers of hostile files: each returns if it takes the file, and raises an InterfaceError or ValueError if not."""
+"""Readers of hostile files: each returns if it accepts the file, or raises an InterfaceError or ValueError."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def _build_with(folder: Path, section: str, file: Path) -> None:
 
 
 def _run(main: str) -> None:
-    """Builds a world, runs it for some ticks, and has the renderer's copy and a replay build the same."""
+    """Builds a world, runs it for some ticks, and builds the same in the renderer's copy and in a replay."""
     with contextlib.closing(World(load_world(main), connection_mode=pybullet.DIRECT)) as world:
         text = world.describe()
         for _ in range(TICKS):

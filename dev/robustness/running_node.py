@@ -87,7 +87,7 @@ class WatchedNode:
 
 
 def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> Iterator[Outcome]:
-    """Yields what became of each file; prints the longest pauses and the largest size at the end."""
+    """Yields the outcome of each file; prints the longest pauses and the largest size at the end."""
     command = ["rosmaster", "--core", "-p", str(workplace.port.number)]
     master = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     worst: list[tuple[Pauses, int, str]] = []

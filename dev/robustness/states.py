@@ -36,7 +36,7 @@ MAX_MB = 2_000
 FOREIGN = {name.partition(":")[0].partition(".")[0] for name in CLASSES} - {
     *("rpbi", "os", "subprocess", "builtins", "pickle", "pathlib", ""),
 }
-"""Packages that no file may have imported."""
+"""Packages that files must not import."""
 WRITING = {
     "os.remove",
     "os.rename",
@@ -137,7 +137,7 @@ def watched(read: Callable[[Path], object]) -> Callable[[Path], object]:
 
 
 def main() -> None:
-    """Reads the files; exits with 1 if one of them did what none may do."""
+    """Reads the files; exits with 1 if a reader failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=300, help="default: %(default)s")
     parser.add_argument("--first", type=int, default=0, help="the first seed; default: %(default)s")

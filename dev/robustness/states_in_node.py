@@ -1,4 +1,4 @@
-"""Has a running simulator restore hostile `.world` files by its service, and prints what became of that.
+"""Restores hostile `.world` files in a running simulator by its service, and prints the results.
 
 Run by `./rpbi shell -c 'python3 dev/robustness/states_in_node.py'`. A restore that takes longer than 10 s is ended by
 `rpbi/stop`, as a user would. It exits with 1 if the node ends, prints a traceback, runs code, or does not answer.

@@ -1,4 +1,4 @@
-"""Values that make no sense, and changes to texts and bytes that are good."""
+"""Invalid values, and changes of valid texts and bytes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def positive(random: Random, share_of_bad: float = 0.004) -> str:
 
 
 def name(random: Random, good: str, share_of_bad: float = 0.006) -> str:
-    """Returns a name, or what should be none."""
+    """Returns a name, or an invalid one."""
     return random.choice(NAMES) if random.random() < share_of_bad else good
 
 

@@ -1,4 +1,4 @@
-"""Reads hostile files in processes of their own, with limits, and finds out what became of it."""
+"""Reads hostile files in processes with limits, and returns the results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LONGEST_S = 60.0
 MAX_BYTES = 4 * 2**30
 """Memory that a process may take."""
 MAX_BATCH = 100
-"""Files that one process reads, as long as it lives."""
+"""Number of files that one process reads, unless it ends before."""
 
 
 class Outcome(NamedTuple):
@@ -50,12 +50,12 @@ class Outcome(NamedTuple):
 
     @property
     def is_fine(self) -> bool:
-        """Whether the file was taken or refused, as a good reader does."""
+        """Whether the file was accepted or refused, as by a correct reader."""
         return self.verdict in ("taken", "refused")
 
 
 def outcomes(kind: str, seeds: range, folder: Path) -> Iterator[Outcome]:
-    """Yields what became of each reader of the hostile files of a kind."""
+    """Yields the outcome of each reader of the hostile files of a kind."""
     waiting = list(seeds)
     while waiting:
         done = 0

@@ -1,4 +1,4 @@
-"""Hostile URDFs: robots that are made up part by part, and good files with changed bytes."""
+"""Hostile URDFs: robots that are invented part by part, and good files with changed bytes."""
 
 from __future__ import annotations
 

@@ -20,14 +20,14 @@ from typing import Any
 import pybullet
 
 SHORTEST_S = 0.005
-"""Pauses that are shorter are not written."""
+"""Shorter pauses are not written."""
 PRIORITY = -15
 """Priority over other work; without permission, it runs without it."""
 INDIVISIBLE = (
     *("loadURDF", "loadSoftBody", "createVisualShape", "createCollisionShape", "createMultiBody", "removeBody"),
     "stepSimulation",
 )
-"""PyBullet's functions that add and remove objects, and its step: each call lasts as long as PyBullet wants."""
+"""PyBullet's functions that add and remove objects, and its step: PyBullet determines the duration of each call."""
 inside_s = 0.0
 """Processor time that they have taken."""
 

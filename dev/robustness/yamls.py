@@ -1,4 +1,4 @@
-"""Hostile YAML: objects that are made up by the schemas of their files, and good files with changed bytes."""
+"""Hostile YAML: objects that are invented from the schemas of their files, and good files with changed bytes."""
 
 from __future__ import annotations
 

@@ -72,12 +72,12 @@ def distances_m(guard: Guard, q: np.ndarray, kind: type) -> dict[Pair, float]:
 
 
 def distance_m(guard: Guard, q: np.ndarray, kind: type) -> float:
-    """Returns how near the nearest pair of a check is [m]."""
+    """Returns the smallest distance of the pairs of a check [m]."""
     return min(distances_m(guard, q, kind).values())
 
 
 def folded(guard: Guard) -> np.ndarray:
-    """Returns a configuration within limits in which the arm is in itself, far from the table."""
+    """Returns a configuration within limits in which the arm penetrates itself, far from the table."""
     choose = random.Random(0)
     low, high = guard.limits.lower, guard.limits.upper
     while True:
@@ -89,7 +89,7 @@ def folded(guard: Guard) -> np.ndarray:
 
 
 def drive(world: World, guard: Guard | None, goal: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """Moves the arm smoothly to a configuration, as far as the guard lets it; returns all commands."""
+    """Moves the arm smoothly to a configuration, as far as the guard permits; returns all commands."""
     command, commands = HOME, []
     for k in range(round(SHOWN_S / PERIOD_S)):
         t = min(k * PERIOD_S / DURATION_S, 1.0)
@@ -109,7 +109,7 @@ def drive(world: World, guard: Guard | None, goal: np.ndarray, names: tuple[str,
 
 
 def picture(world: World) -> np.ndarray:
-    """Returns what a camera sees."""
+    """Returns the image of a camera."""
     pb = world.bodies["kuka_lwr"].pb
     view = pybullet.computeViewMatrixFromYawPitchRoll(**CAMERA, upAxisIndex=2)
     lens = pybullet.computeProjectionMatrixFOV(45.0, WIDTH / HEIGHT, 0.1, 5.0)

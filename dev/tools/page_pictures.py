@@ -109,7 +109,7 @@ class Tab:
 
 
 def _address(port: int) -> str:
-    """Returns the address of the browser's tab, once it has started."""
+    """Returns the address of the browser's tab as soon as the browser has started."""
     listing, end_s = f"http://127.0.0.1:{port}/json", time.monotonic() + OPENS_S
     while True:
         try:

@@ -121,7 +121,7 @@ class Experiment:
             rospy.wait_for_service(SERVICE.format("start"), timeout=60.0)
 
     def close(self) -> None:
-        """Ends all that was started."""
+        """Ends all started processes."""
         for process in reversed(self._processes):
             with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
                 process.send_signal(signal.SIGINT)

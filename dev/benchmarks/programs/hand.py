@@ -22,9 +22,9 @@ from safe_robot.msg import Status
 START_S = 180.0
 """Longest time until the arm is at its target [s]."""
 RESTS, TURNS = 0.2, 0.3
-"""How often the hand rests, and how often it turns the cap, too."""
+"""Probability of a rest, and of an additional rotation of the cap."""
 RISES_S, HOLDS_S = (0.02, 0.1, 0.3, 0.6), (0.1, 1.5)
-"""How long it takes to push, and how long it then pushes."""
+"""Time to push, and time for which it is held then."""
 QUEUE_SIZE = 1000
 GUARDS = {
     "/robot_safety/status": "the guard before the simulated arm",
@@ -119,7 +119,7 @@ class Witness:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a guard has refused something, or the driver has stopped."""
+        """Whether a guard has refused a target, or the driver has stopped."""
         return bool(self.unsafe or self.driver.reflexes)
 
     def _subscribe(self, topic: str, kind: type, on_message: object) -> None:
@@ -132,7 +132,7 @@ class Witness:
 
 
 def main() -> None:
-    """Moves the device until its time is over, or the arm is stopped; prints as JSON what came of it."""
+    """Moves the device until its time is over, or the arm is stopped; prints the result as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("device", choices=DEVICES)
     parser.add_argument("seconds", type=float)
@@ -165,7 +165,7 @@ def main() -> None:
 
 
 def _motions(chance: random.Random, step_s: float) -> Iterator[list[float]]:
-    """Yields where the hand moves the device, a step apart: minimum jerk from push to push, or rest."""
+    """Yields positions of the device step by step: minimum jerk from push to push, or rest."""
     now = [0.0] * 6
     while True:
         goal = [0.0] * 6

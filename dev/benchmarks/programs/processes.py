@@ -1,4 +1,4 @@
-"""What the processes of nodes hold."""
+"""Memory and handles of the processes of nodes."""
 
 from __future__ import annotations
 

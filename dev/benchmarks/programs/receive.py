@@ -1,4 +1,4 @@
-"""Receives datagrams on a port and does nothing with them."""
+"""Receives datagrams on a port and discards them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws a world as fast as it goes, as the renderer process does, without physics or ROS."""
+"""Draws a world as fast as possible, as the renderer process does, without physics or ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What loading a world, a tick of it and the hash of its state take without ROS."""
+"""Times to load a world, for a tick and for the hash of its state, without ROS."""
 
 from __future__ import annotations
 

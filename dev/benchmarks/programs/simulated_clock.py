@@ -19,15 +19,15 @@ class SimulatedClock:
         threading.Thread(target=self._run, daemon=True).start()
 
     def jump(self, by_s: float) -> None:
-        """Is so much later from now on [s]."""
+        """Shifts the clock forward [s]."""
         self._offset_s += by_s
 
     def stand_still(self, at_s: float | None = None) -> None:
-        """Stands still, where it is or at a time [s]."""
+        """Stops at the present or at a given time [s]."""
         self._stands_at_s = time.time() + self._offset_s if at_s is None else at_s
 
     def go_on(self) -> None:
-        """Goes on after it stood still."""
+        """Continues after a stop."""
         self._stands_at_s = None
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""Notes for a long time what a simulator sends and holds, while a controller commands it."""
+"""Records messages and memory of a simulator for a long time, while a controller commands it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WARM_UP_MESSAGES = 10
 
 
 class Count:
-    """How often something came, and the longest time in between [s]."""
+    """Number of arrivals, and the longest time between two of them [s]."""
 
     def __init__(self, topic: str, message_type: type) -> None:
         self.number, self.longest_gap_s = 0, 0.0
@@ -91,7 +91,7 @@ def _control(robot: str, joint: str) -> None:
 
 
 def _ends(values: list[float], of: Callable[[list[float]], float] = statistics.median) -> tuple[float, float]:
-    """Returns the medians, or something else, of the first and of the last tenth."""
+    """Returns the medians, or another statistic, of the first and of the last tenth."""
     tenth = max(1, len(values) // 10)
     return of(values[:tenth]), of(values[-tenth:])
 

@@ -1,4 +1,4 @@
-"""Sends a joint position steps and notes how long it takes until a joint state shows that it moves."""
+"""Sends position steps to a joint, and records the time until a joint state shows its motion."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Client:
 
     @property
     def is_connected(self) -> bool:
-        """Whether targets are heard and states can be."""
+        """Whether targets have a subscriber and states a publisher."""
         return self._publisher.get_num_connections() > 0 and self._subscriber.get_num_connections() > 0
 
     def publish(self, position: float) -> None:

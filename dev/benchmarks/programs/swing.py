@@ -1,4 +1,4 @@
-"""Swings a joint by 50 targets a second, stamped as they are sent or not at all, and notes its efforts."""
+"""Swings a joint by 50 targets a second, with the stamp of sending or without stamps, and records its efforts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A haptic device whose hand presses again and again, and which writes down when it was read."""
+"""A haptic device whose hand presses repeatedly, and which records the times of reading."""
 
 import time
 from array import array
@@ -32,7 +32,7 @@ class TimedHand(ScriptedDevice):
         return super().goal(time_s % self._press.duration_s)
 
     def read(self) -> HapticReading | None:
-        """Returns where the handle is."""
+        """Returns the position of the handle."""
         self._times.append(time.monotonic())
         return EmulatedDevice.read(self)
 

@@ -17,7 +17,7 @@ SETTLE_S = 1.0
 
 
 def main() -> None:
-    """Waits for every topic, says `ready`, notes for a while, writes it."""
+    """Waits for every topic, prints `ready`, records for a while, and writes the records."""
     parser = argparse.ArgumentParser()
     parser.add_argument("path", help="file to write, .npz")
     parser.add_argument("seconds", type=float, help="how long to note")

@@ -1,1 +1,1 @@
-"""Hostile targets for the guard, and an oracle that judges what comes of them."""
+"""Hostile targets for the guard, and an oracle that judges the resulting commands."""

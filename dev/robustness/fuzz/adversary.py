@@ -22,7 +22,7 @@ class Target(NamedTuple):
 def adversary(
     generator: np.random.Generator, lower: np.ndarray, upper: np.ndarray, count: int, calm: float
 ) -> Generator[Target, np.ndarray, None]:
-    """Yields targets of every bad kind, between them ordinary ones.
+    """Yields targets of every bad kind, with ordinary ones in between.
 
     It is sent the last three commands, 3 x n; before the first target, to be started, nothing.
 

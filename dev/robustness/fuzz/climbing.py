@@ -1,4 +1,4 @@
-"""Hill climbing on the smallest distance that a guard lets a robot come to, brakings included."""
+"""Hill climbing on the smallest distance that a guard permits, braking included."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from safe_robot.guard import Guard
 from .scenes import MARGIN_M, Scene
 
 GOALS, LONGEST = 3, 15
-"""A course has this many goals, each of which is asked for in at most this many periods."""
+"""Number of goals of a course, and largest number of periods for which each is the target."""
 SPREAD, FINEST = 0.3, 0.003
-"""Standard deviations of the changes of goals at first and at last [rad]."""
+"""Standard deviations of the changes of goals, at the start and at the end [rad]."""
 CHANGED = 0.3
-"""Share of the numbers of a course that a change changes."""
+"""Share of the numbers of a course that a mutation changes."""
 AROUND_M = 0.023
-"""A course begins no further from something than this [m]."""
+"""Largest distance from a body at which a course begins [m]."""
 SAMPLES, NEAR_M = 3, 0.03
-"""Number of rows of a braking that are judged, and the distance [m] below which all of them are."""
+"""Number of judged rows of a braking motion, and the distance [m] below which all rows are judged."""
 TOLERANCE_M = 1e-6
-"""Distances below the margin by no more than this count as the margin [m]."""
+"""Largest violation of the margin that is tolerated [m]."""
 
 
 class Course(NamedTuple):
@@ -42,7 +42,7 @@ class Course(NamedTuple):
 
 
 class Climber:
-    """Changes courses so that the robot comes nearer and nearer to things.
+    """Mutates courses so that the robot approaches bodies more and more.
 
     Every command counts, and so does every braking that the guard holds ready after one, since a target that is no
     target would have it sent. Distances are those of links to boxes as the guard measures them, but at every command.
@@ -65,7 +65,7 @@ class Climber:
         self._pairs = [(link, i) for link in links for i in range(len(boxes))]
 
     def climb(self, steps: int) -> tuple[float, Course]:
-        """Returns the smallest distance that one climb ends with [m], and its course.
+        """Returns the smallest distance of one climb [m], and its course.
 
         It ends before, when it has found a distance below the margin.
         """
@@ -81,7 +81,7 @@ class Climber:
         return least_m, best
 
     def smallest_distance(self, course: Course) -> float:
-        """Returns the smallest distance at any command of a course, and of the brakings after it [m]."""
+        """Returns the smallest distance at any command of a course, and while braking from it [m]."""
         guard, around = self._guard, self._scene.around
         guard.rest()
         guard.start()
@@ -104,7 +104,7 @@ class Climber:
         return min(self._distances.distance(pair, math.inf, NEAR_M) for pair in self._pairs)
 
     def _smallest_of(self, rows: np.ndarray) -> float:
-        """Returns the smallest distance in k configurations [m]; where nothing is near, of some of them."""
+        """Returns the smallest distance in k configurations [m]; of only some of them if no body is near."""
         some = rows[np.linspace(0, len(rows) - 1, SAMPLES).astype(int)]
         least_m = min(map(self._nearest, some))
         return least_m if least_m > NEAR_M else min(map(self._nearest, rows))

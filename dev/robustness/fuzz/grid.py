@@ -1,4 +1,4 @@
-"""Ways of a robot of two joints over a grid of places that keep a distance."""
+"""Paths of a robot of two joints over a grid of configurations that keep a distance."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from scipy.sparse.csgraph import dijkstra
 from .oracle import Oracle
 
 STEP = 0.02
-"""Between two places on the grid [rad]."""
+"""Distance between two points of the grid [rad]."""
 BEYOND_M = 0.002
-"""A way ends where all is further apart by so much more than it has to be [m]."""
+"""A path ends where all distances exceed the required one by this value [m]."""
 
 
 class Grid:
@@ -25,14 +25,14 @@ class Grid:
 
     @cached_property
     def _nearest_m(self) -> np.ndarray:
-        """The smallest distance at each place [m]."""
+        """The smallest distance at each point [m]."""
         turns, elbows = self._places
         return np.array([[self._oracle.distances((turn, elbow)).min() for elbow in elbows] for turn in turns])
 
     def way_out(self, start: np.ndarray, keep_m: float, end_m: float) -> list[np.ndarray] | None:
-        """Returns the shortest way over places that keep a distance [m] to one that keeps another; None without one.
+        """Returns the shortest path over points that keep one distance to a point that keeps another [m], or None.
 
-        It begins at the place of those that is nearest to the start.
+        It begins at the point that is nearest to the start.
         """
         is_free = self._nearest_m >= keep_m
         rows = np.stack(np.meshgrid(*self._places, indexing="ij"), axis=-1)[is_free]

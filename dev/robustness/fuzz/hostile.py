@@ -1,4 +1,4 @@
-"""Sends hostile targets to a guard, and has its commands judged."""
+"""Sends hostile targets to a guard and judges its commands."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .scenes import Scene
 CALM = {"limit": 0.6, "reject": 0.99}
 """Share of ordinary targets: a guard that has halted must be started again, and the robot is at rest then."""
 RUN = 2000
-"""So many commands are judged at once, at most."""
+"""Largest number of commands that are judged at once."""
 
 
 class Report(NamedTuple):
-    """What came of some targets.
+    """Result of some targets.
 
     Attributes:
         targets: How many.
@@ -44,7 +44,7 @@ class Report(NamedTuple):
 def fuzz(
     scene: Scene, guard: Guard, oracle: Oracle, count: int, generator: np.random.Generator, every: int = 10
 ) -> Report:
-    """Sends hostile targets to a guard, and judges each command, and all of the braking from some.
+    """Sends hostile targets to a guard, and judges each command, and the complete braking motion from some of them.
 
     Args:
         scene: The robot and its surroundings.

@@ -1,4 +1,4 @@
-"""From states inside the margin a robot of two joints is sent out of it."""
+"""Sends a robot of two joints from states inside the margin out of it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .oracle import Oracle
 from .scenes import MARGIN_M, Scene
 
 NEARER_M = 1e-4
-"""What was inside its margin may come nearer by so much [m], since the guard's boxes have rounded edges."""
+"""Largest approach of a pair inside its margin [m]; the guard's boxes have rounded edges."""
 BETWEEN_M = 0.002
-"""What was outside its margin may come into it by so much, since a braking is not tried everywhere [m]."""
+"""Largest violation of the margin by a pair outside of it [m]; braking is not tried everywhere."""
 LEG, MAX_LEGS, MAX_COMMANDS = 0.1, 60, 400
-"""How far the robot is sent on a way out at once [rad], how often, and how many commands it is given for it."""
+"""Length of a step out of the margin [rad], number of steps, and number of commands for each."""
 CLEAR = 1.5
 AROUND = 16
 """Number of directions in which targets are tried where the exits that the guard names lead nowhere."""
@@ -30,7 +30,7 @@ SMALLER = 0.5
 
 
 class Leaving(NamedTuple):
-    """What came of states inside the margin: of how many there was which way out.
+    """Results of states inside the margin: number of states by kind of exit.
 
     Attributes:
         straight: States with a straight way on which no pair that is inside its margin comes nearer, and none comes in.
@@ -54,7 +54,7 @@ class Leaving(NamedTuple):
 
 
 def leave_margin(scene: Scene, oracle: Oracle, count: int, generator: np.random.Generator) -> Leaving:
-    """Starts in configurations that are nearer to something than the margin, and tries to get away.
+    """Starts in configurations inside the margin, and tries to leave it.
 
     Straight ways are asked for at once, by a target at their end; on the others, the robot follows `Guard.way_out`.
 
@@ -145,7 +145,7 @@ class Driver:
 def leave_with_smaller_margin(
     scene: Scene, oracle: Oracle, grid: Grid, start: np.ndarray, out: EscapeDirection
 ) -> str | None:
-    """Drives a locked robot out, as docs/safety.md advises; returns what went wrong, None if it got out.
+    """Drives a locked robot out, as docs/safety.md advises; returns the fault, None if it got out.
 
     The guard has a margin below all distances that the message told of. The way is the shortest one on a grid over
     places that keep more than this margin.
@@ -166,7 +166,7 @@ def leave_with_smaller_margin(
 
 
 def straight_way(oracle: Oracle, q: np.ndarray, generator: np.random.Generator) -> np.ndarray | None:
-    """Returns a straight way out on which no pair that is inside its margin comes nearer, and no other one comes in.
+    """Returns a straight path out on which no pair inside its margin approaches, and no other pair enters its margin.
 
     Of those that are found it is the one that leads away the least at first.
     """
@@ -185,7 +185,7 @@ def straight_way(oracle: Oracle, q: np.ndarray, generator: np.random.Generator) 
 
 
 def fault_of(oracle: Oracle, commands: np.ndarray) -> str | None:
-    """Returns by how much a pair comes nearer than it was at first and than its margin, None if none does."""
+    """Returns by how much a pair comes nearer than initially and than its margin, None if none does."""
     distances = _distances_on(oracle, commands)
     nearer = distances[0] - distances
     is_allowed = nearer <= np.where(distances[0] < MARGIN_M, NEARER_M, BETWEEN_M)
@@ -193,13 +193,13 @@ def fault_of(oracle: Oracle, commands: np.ndarray) -> str | None:
 
 
 def _nearer_m(oracle: Oracle, commands: np.ndarray) -> float:
-    """Returns by how much a pair that is inside its margin at first comes nearer, at most [m]."""
+    """Returns the largest approach of a pair that is initially inside its margin [m]."""
     distances = _distances_on(oracle, commands)
     return float((distances[0] - distances)[:, distances[0] < MARGIN_M].max(initial=0.0))
 
 
 def is_locked(oracle: Oracle, q: np.ndarray) -> bool:
-    """Returns whether a small motion in none of many directions takes all that is inside the margin further apart.
+    """Returns whether no small motion of many directions separates all pairs inside the margin.
 
     It is as `safe_robot.way_out` has it: by a share of how fast each can go apart by itself, and nothing else comes in.
     Since both measure that over a step, the oracle asks for some more.

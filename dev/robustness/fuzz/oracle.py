@@ -12,11 +12,11 @@ import pinocchio
 from .scenes import LIMITS, PERIOD_S, Scene
 
 ROUNDING = 1e-6
-"""Relative, of differences."""
+"""Relative tolerance of differences."""
 WATCHED_M = 0.022
-"""Pairs that are nearer are measured where a command puts the robot [m]."""
+"""Distance below which pairs are measured at a command [m]."""
 FAR_M = 0.05
-"""What is further apart counts as this [m]."""
+"""Upper limit of measured distances [m]."""
 
 
 class Oracle:
@@ -60,7 +60,7 @@ class Oracle:
                     self._shapes.addCollisionPair(pinocchio.CollisionPair(i, j))
 
     def place(self, q: Sequence[float]) -> None:
-        """Judges where a command puts the robot."""
+        """Judges the configuration of a command."""
         q = np.asarray(q)
         if not ((q >= self.lower - 1e-12) & (q <= self.upper + 1e-12)).all():
             self.faults.append(f"outside the limits of position: {q}")
@@ -74,7 +74,7 @@ class Oracle:
         self.nearest_m = min(self.nearest_m, nearest)
 
     def distances(self, q: Sequence[float]) -> np.ndarray:
-        """Returns how far the things of each pair are apart, at most `FAR_M` [m]."""
+        """Returns the distance of each pair, at most `FAR_M` [m]."""
         self._place(np.asarray(q))
         return np.minimum([self._distance(i) for i in range(len(self._shapes.collisionPairs))], FAR_M)
 
@@ -97,7 +97,7 @@ class Oracle:
 
 
 def _with_boxes(scene: Scene) -> str:
-    """Returns the description of the robot, with the boxes as links that are fixed to its root."""
+    """Returns the description of the robot, with the boxes as links fixed to its root."""
     robot = ElementTree.parse(scene.urdf).getroot()
     children = {child.get("link") for child in robot.findall("joint/child")}
     root = next(link.attrib["name"] for link in robot.findall("link") if link.get("name") not in children)

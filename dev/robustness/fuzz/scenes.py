@@ -89,4 +89,4 @@ SCENES = {
     ),
     "lwr": Scene(LWR, np.array((0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)), {"table": ((0.7, 1.2, 0.1), (0.7, 0.0, 0.05))}),
 }
-"""By how many joints they have, the links of the second one being meshes; and an arm of cylinders."""
+"""By number of joints; the second one has meshes. And an arm of cylinders."""

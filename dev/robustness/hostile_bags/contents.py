@@ -1,4 +1,4 @@
-"""Names, numbers of columns, values and topics that are long, many, or of several types."""
+"""Long names, many columns, values and topics, and topics of several types."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def long_names(rng: random.Random, path: Path) -> None:
 
 
 def many_columns(rng: random.Random, path: Path) -> None:
-    """Columns by the thousand, each in one row."""
+    """Thousands of columns, each in one row."""
     messages, each = rng.choice(((10, 10), (20, 30), (20, 30), (30, 100), (300, 300), (5, 30_000)))
     raws = []
     for index in range(messages):
@@ -60,7 +60,7 @@ def many_values(rng: random.Random, path: Path) -> None:
 
 
 def many_topics(rng: random.Random, path: Path) -> None:
-    """Topics by the thousand, of one name when it is that of a file, or of names that no file can have."""
+    """Thousands of topics with equal file names, or with names that no file can have."""
     count = rng.choice((1, 10, 10, 200, 1001, 20_001))
     name = rng.choice(("/a", "/" * 300, "../../a", "\0", "a" * 300, "a" * 60_000, "/proc/self", "\n", "ä" * 200, ""))
     count = min(count, 20_000_000 // (len(name) + 200))

@@ -1,4 +1,4 @@
-"""Definitions of messages that nest, that are those of other types, or that are spoilt."""
+"""Definitions of messages that are nested, belong to other types, or are broken."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def empties(rng: random.Random, path: Path) -> None:
 
 
 def known(rng: random.Random, path: Path) -> None:
-    """Types that have rows of their own, with other definitions."""
+    """Types with special rows, with other definitions."""
     definition = _random_fields(rng)
     for name in ("a_msgs/B", "a_msgs/E", "std_msgs/Header"):
         definition += f"{LINE}\nMSG: {name}\n{_random_fields(rng, 'B') if name != 'a_msgs/E' else ''}"

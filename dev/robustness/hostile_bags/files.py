@@ -30,7 +30,7 @@ def false_index(rng: random.Random, path: Path) -> None:
 
 
 def large_chunks(rng: random.Random, path: Path) -> None:
-    """Chunks that unfold to far more than they are, or than they say; messages that go from one to another."""
+    """Chunks that expand beyond their length, or beyond the given one; messages that span chunks."""
     size = rng.choice((1_000_000, 30_000_000))
     chunks = []
     for chunk in range(rng.choice((1, 2))):

@@ -1,4 +1,4 @@
-"""Definitions and serialised messages of types that have rows of their own, and a bag of one topic."""
+"""Definitions and serialised messages of types with special rows, and a bag of one topic."""
 
 from __future__ import annotations
 

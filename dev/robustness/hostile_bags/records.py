@@ -1,4 +1,4 @@
-"""Writes ROS bags record by record, so that each number in them may be a lie."""
+"""Writes ROS bags record by record, so that each number in them may be wrong."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def header(operation: int | None, **fields: bytes) -> bytes:
 
 @dataclass
 class Topic:
-    """A connection: a topic with the type of its messages, and what else its header is to have."""
+    """A connection: a topic, the type of its messages, and further fields of its header."""
 
     name: str | bytes
     type: str

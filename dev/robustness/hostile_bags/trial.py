@@ -1,4 +1,4 @@
-"""Reads a bag with one reader in a process of its own, and measures what becomes of that."""
+"""Reads a bag with one reader in its own process, and measures the result."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "bag_to_table, CSV": lambda path: _to_files(path, "csv"),
     "replay": lambda path: sys.exit(command_of("rpbi_data.console.replay").run([str(path), "--quiet"])),
 }
-"""Readers of bags by name; a refusal is an InterfaceError, or an exit with 1 and words on stderr or stdout."""
+"""Readers of bags by name; a refusal is an InterfaceError, or an exit with 1 and a message on stderr or stdout."""
 
 
 def tried(read: Callable[[Path], object], path: Path) -> Trial:

@@ -1,1 +1,1 @@
-"""Folders of episodes that mean harm, and trials of their readers."""
+"""Hostile folders of episodes, and trials of their readers."""

@@ -1,4 +1,4 @@
-"""A good folder of episodes, which makers spoil: an arm with a mesh and a box, and a part whose recorder was killed."""
+"""A valid folder of episodes, which makers modify: an arm with a mesh, a box, and a part of a killed recorder."""
 
 from __future__ import annotations
 

@@ -341,7 +341,7 @@ def _stored(place: Place, suffix: str, content: bytes) -> None:
 
 
 def _urdfs(place: Place) -> None:
-    """The URDF is as its hash says, and names files outside."""
+    """The URDF matches its hash, and names files outside."""
     [copy] = (place.demos / "files").glob("*.urdf")
     urdf, rng = copy.read_text(), place.rng
     entity = f'<!DOCTYPE r [<!ENTITY x SYSTEM "file://{place.outside}/secret.obj">]>'
@@ -380,7 +380,7 @@ def _mesh_files(place: Place) -> None:
 
 
 def _parts(place: Place) -> None:
-    """Bags of killed recorders: cut, of zeros, or of blocks that unfold to gigabytes."""
+    """Bags of killed recorders: truncated, of zeros, or of blocks that expand to gigabytes."""
     active = place.demos / PART / f"{BAG}.active"
     content = active.read_bytes()
     rng = place.rng

@@ -1,4 +1,4 @@
-"""Readers of folders of episodes, each tried in a fork that reports writes outside and modules of others."""
+"""Readers of folders of episodes, each tried in a fork that reports writes outside and foreign modules."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 
 def trials(hostile: Hostile, readers: dict[str, Callable[[Path], object]] = READERS) -> Iterator[tuple[str, Trial]]:
-    """Yields what became of each reader of a folder; its verdict is also `outside` or `code`."""
+    """Yields the outcome of each reader of a folder; its verdict is also `outside` or `code`."""
     for name, read in readers.items():
         before = _content(hostile.outside)
         trial = tried(lambda path, read=read: _watched(read, path), hostile.demos)

@@ -1,4 +1,4 @@
-"""Broken and hostile files, made of good ones by a seed, and what becomes of who reads them.
+"""Broken and hostile files, made from good ones by a seed, and the outcomes of their readers.
 
 Each file is read in a process of its own, a fork of this one, so that a crash is seen and costs little. Worlds are read
 by the program behind `./rpbi check`, and by the simulator node, which needs a ROS master.
@@ -66,12 +66,12 @@ NUMBERS = (
 )
 WORDS = ("", " ", "world", "base", "a" * 300, "a" * 5000, "../" * 40, "/proc/kmsg", "%s%n", "ä\u202e", "-", "null")
 LONGEST_S = 120.0
-"""After so long a reader hangs."""
+"""Time after which a reader counts as hanging."""
 TICKS = 20
 
 
 class Outcome(NamedTuple):
-    """What became of who read a file.
+    """Outcome of a reader of a file.
 
     Attributes:
         verdict: `taken`, `refused`, or what must not be: `signal N`, `traceback`, `hang`, `silent` or `code`.
@@ -108,7 +108,7 @@ class Hostile(NamedTuple):
 
 
 def outcome_of(read: Callable[[], object], canary: Path | None = None) -> Outcome:
-    """Reads a file in a process of its own."""
+    """Reads a file in its own process."""
     said, saying = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -373,7 +373,7 @@ REPLACED = (
 def write_session(
     path: Path, folder: Path, definition_code: str = "", change: Callable[[str], str] = str, last_tick: int = 0
 ) -> None:
-    """Writes a recorded session of a ball that falls, by a world itself.
+    """Writes a recorded session of a ball that falls, by a world in this process.
 
     Args:
         definition_code: A file that code in the definition of one message makes, if it is run.

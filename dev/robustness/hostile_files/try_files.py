@@ -31,7 +31,7 @@ HEAD = ("files", "number", "taken", "refused", "signals", "tracebacks", "hangs",
 
 
 def main() -> None:
-    """Reads the files; exits with 1 if one of them did what none may do."""
+    """Reads the files; exits with 1 if a reader failed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--each", type=int, default=250, help="files of each kind; default: %(default)s")
     parser.add_argument("--first", type=int, default=0, help="the first seed; default: %(default)s")

@@ -80,7 +80,7 @@ def example(folder: Path, time_step_s: float = 0.001, **objects: Mapping[str, An
 def push(
     world: World, target_hz: float = TARGET_HZ, late_s: Callable[[], float] = lambda: 0.0, length_m: float = 0.3
 ) -> Force:
-    """Has the arm push the box along a straight line at constant speed, PUSH_SPEED.
+    """Pushes the box by the arm along a straight line at constant speed, PUSH_SPEED.
 
     Args:
         world: As `example` builds it.

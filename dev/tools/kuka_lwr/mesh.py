@@ -24,7 +24,7 @@ class Mesh(NamedTuple):
 
 
 class MassProperties(NamedTuple):
-    """What an evenly filled mesh weighs.
+    """Mass, centre and inertia of a homogeneous body.
 
     Attributes:
         volume: Enclosed volume [m^3].
@@ -75,7 +75,7 @@ def revolve(profile: list[tuple[float, float, float]], segments: int = 36, arc_p
 
 
 def merge(*meshes: Mesh) -> Mesh:
-    """Put several meshes into one."""
+    """Merge several meshes into one."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     shifted = [mesh._replace(faces=mesh.faces + start) for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(*(np.concatenate(parts) for parts in zip(*shifted, strict=True)))

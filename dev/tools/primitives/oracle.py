@@ -33,7 +33,7 @@ LOOKS = np.linspace(0.0, DURATION_S, 11)
 
 
 def demonstration():
-    """A motion that rests for its last samples: the library takes it for granted that it ends at rest."""
+    """A motion that rests for its last samples: the library assumes that it ends at rest."""
     u = np.clip(TIMES / 0.9, 0.0, 1.0)
     share = 10 * u**3 - 15 * u**4 + 6 * u**5
     bump = np.sin(np.pi * share) ** 2

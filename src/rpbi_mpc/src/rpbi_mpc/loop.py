@@ -186,7 +186,7 @@ class LockStep:
         return ""
 
     def _without(self, fault: str) -> tuple[Status, str]:
-        """Goes on with the last plan, as long as there is one."""
+        """Continues with the last plan, if there is one."""
         self._held.age += 1
         last = self._held.plan
         if last is not None and self._held.age <= min(self.config.max_missed, len(last.commands) - 1):
