@@ -156,20 +156,53 @@ OF_ROS = re.compile(
 )
 
 
-def ros_inside(src: Path) -> list[str]:
-    """Modules of these packages that need ROS, also by way of others, and are not at the edge."""
-    graph = graph_of(src)
+def needing_ros(graph: ImportGraph) -> dict[str, str]:
+    """Returns the modules that need ROS, also by way of others, and of each the import that leads to it."""
     direct = {
         name: target
         for name, path in graph.files.items()
         for target in imported_names(path, name, typing=False)
         if OF_ROS.match(target)
     }
+    return graph.leading_to(direct)
+
+
+def ros_inside(src: Path) -> list[str]:
+    """Modules of these packages that need ROS, also by way of others, and are not at the edge."""
     return [
         f"{name} needs ROS: it imports {target}"
-        for name, target in graph.leading_to(direct).items()
+        for name, target in needing_ros(graph_of(src)).items()
         if name.split(".")[0] in BY_FEATURE and not EDGE.fullmatch(name) and name not in DOCUMENTED
     ]
+
+
+FOR_ROS = re.compile(r".*(_node|_topics|_services|_action|_messages)|.*\.ros\..+")
+"""Modules whose names or folders say that they need ROS."""
+STILL_AT_THE_EDGE = {
+    "custom_ros_tools.ros.buffered_socket",
+    "custom_ros_tools.ros.console",
+    "custom_ros_tools.ros.lifecycle.roslaunch_watch",
+    "custom_ros_tools.ros.node",
+    "custom_ros_tools.ros.server_socket",
+    "rpbi.ros.reference.reference_world",
+    "rpbi_examples.ros.console.bench",
+    "rpbi_examples.ros.console.docs",
+    "rpbi_examples.ros.console.label_images",
+    "rpbi_examples.ros.console.score",
+    "rpbi_examples.ros.console.setup",
+    "rpbi_examples.ros.console.shell",
+    "rpbi_examples.ros.console.test",
+    "safe_robot.ros.target_queue",
+}
+"""Modules that need no ROS and have not left their `ros` folders yet. A line goes with its module; none is added."""
+
+
+def without_ros_at_the_edge(src: Path) -> list[str]:
+    """Modules below `ros` folders, or with names of the edge, that do not need ROS, not even by way of others."""
+    graph = graph_of(src)
+    modules = [name for name, path in graph.files.items() if path.name != "__init__.py" and FOR_ROS.fullmatch(name)]
+    free = set(modules) - needing_ros(graph).keys() - STILL_AT_THE_EDGE
+    return [f"{name} needs no ROS: it belongs to its feature" for name in sorted(free)]
 
 
 def repeated(src: Path) -> list[str]:
@@ -258,6 +291,7 @@ RULES: tuple[Callable[[Path], list[str]], ...] = (
     small_modules,
     ros_in_the_core,
     ros_inside,
+    without_ros_at_the_edge,
     repeated,
     shared_class_names,
     long_scenes,
@@ -295,6 +329,7 @@ BREAKS = {
         {f"{DATA}/labels/dataset.py": "def late():\n    from rpbi_data.bags.recorded_topics import Recorder"},
         "rpbi_data.labels.dataset needs ROS: it imports rpbi_data.bags.recorded_topics",
     ),
+    without_ros_at_the_edge: ({"ros/pace.py": "import rpbi.engine.pacer"}, "rpbi.ros.pace needs no ROS"),
     repeated: ({"engine/pacer.py": "import xml.etree.ElementTree"}, "rpbi.engine.pacer"),
     shared_class_names: ({"engine/pacer.py": "class Mailbox:\n    pass"}, "rpbi.engine.pacer"),
     long_scenes: (
