@@ -1,7 +1,7 @@
 """Poses and twists of the simulator, with PyBullet's arithmetic, and loads on links.
 
 PyBullet chains poses and turns vectors in single precision. The results of a simulation depend on it to the last bit,
-so poses that enter the world are chained by PyBullet too, whichever of both is a pose of `robot_model.geometry`.
+so PyBullet also chains a pose of this module with one of `robot_model.geometry`.
 """
 
 from __future__ import annotations

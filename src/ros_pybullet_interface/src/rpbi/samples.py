@@ -65,7 +65,7 @@ class BodyState(NamedTuple):
     Attributes:
         name: The body.
         base: Position [m] and quaternion xyzw of the base's inertial frame, as in PyBullet.
-        joints: Positions of all joints [rad or m] in index order, of a ball joint its turn as x, y, z, w.
+        joints: Positions of all joints [rad or m] in index order, of a ball joint its rotation as x, y, z, w.
         nodes: Positions of the simulated corners of a soft body [m]; rigid bodies have none.
     """
 
@@ -158,7 +158,7 @@ class ContactsSample:
 
     @cached_property
     def points(self) -> tuple[ContactPoint, ...]:
-        """All points that touch; made when they are asked for, since many are not."""
+        """All contact points; computed on first use, since many are never used."""
         return self._points()
 
     def __eq__(self, other: object) -> bool:

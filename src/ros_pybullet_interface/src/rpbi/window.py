@@ -15,7 +15,7 @@ from rpbi.engine.client import Client
 
 RECORD = "--mp4="
 """Beginning of the option of `connect` that records the window."""
-TRIED_CALLS = 10
+MEASURED_CALLS = 10
 
 
 class WindowKeyEvent(NamedTuple):
@@ -59,14 +59,14 @@ class Window:
         self._pb = pb
         self._keys, self._buttons = ButtonHistory(), ButtonHistory()
 
-    def leave_keys_to_others(self) -> None:
-        """Switches off what keys do in the window itself: `i` holds it up, for instance; Escape still closes it."""
+    def disable_shortcuts(self) -> None:
+        """Disables the keys of the window itself, such as `i`, which pauses it; Escape still closes it."""
         self._pb.configureDebugVisualizer(pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS, 0)
 
     def key_events(self) -> Iterator[WindowKeyEvent]:
-        """Yields events of keys since the last call, and one of each that is held; this costs half a microsecond."""
+        """Yields key events since the last call, and one for each key that is held; a call takes half a microsecond."""
         for key, state in self._pb.getKeyboardEvents().items():
-            if key >= 0:  # keys that PyBullet has no code of are all -1
+            if key >= 0:  # PyBullet reports all keys without a code as -1
                 for happened in self._keys.observe(key, state):
                     yield WindowKeyEvent(key, happened)
 
@@ -80,7 +80,7 @@ class Window:
                     yield MouseEvent(kind, x, y, button, happened)
 
     def camera(self) -> ResetDebugVisualizerCamera:
-        """Returns the view of the window, as the mouse has left it."""
+        """Returns the present view of the window, which the mouse may have changed."""
         found = self._pb.getDebugVisualizerCamera()
         yaw, pitch, distance, target = found[8:12]
         return ResetDebugVisualizerCamera.model_construct(
@@ -94,21 +94,23 @@ class Window:
     def seconds_per_call(self) -> float:
         """Returns the present duration of a call of PyBullet, answered between two frames of the window [s]."""
         begin_s = time.monotonic()
-        for _ in range(TRIED_CALLS):
+        for _ in range(MEASURED_CALLS):
             self._pb.getPhysicsEngineParameters()
-        return (time.monotonic() - begin_s) / TRIED_CALLS
+        return (time.monotonic() - begin_s) / MEASURED_CALLS
 
     def image(self, width_px: int, height_px: int) -> npt.NDArray[np.uint8]:
-        """Returns what the window looks at, as high as it, drawn anew in another size.
+        """Returns the view of the window, drawn again in another size with the same vertical opening.
 
-        The world stands still meanwhile.
+        The world does not advance meanwhile.
 
         Returns:
             Colours red, green, blue, alpha; shape (height, width, 4).
         """
         found = self._pb.getDebugVisualizerCamera()
         projection = list(found[3])
-        projection[0] = projection[5] * height_px / width_px  # else it would be as wide as the window, squeezed
+        projection[0] = (
+            projection[5] * height_px / width_px
+        )  # otherwise it would show the window's whole width, squeezed
         image = self._pb.getCameraImage(
             width_px,
             height_px,

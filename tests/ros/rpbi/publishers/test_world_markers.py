@@ -176,15 +176,15 @@ def test_rate_of_0_switches_markers_off(ros, tmp_path):
     assert TOPIC not in [topic for topic, _ in published]
 
 
-def test_many_shapes_are_looked_at_in_several_polls(ros, tmp_path, monkeypatch):
-    monkeypatch.setattr(world_markers, "LONGEST_LOOK_S", 0.0)
+def test_many_shapes_are_checked_in_several_polls(ros, tmp_path, monkeypatch):
+    monkeypatch.setattr(world_markers, "LONGEST_CHECK_S", 0.0)
     world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
     markers = world_markers.WorldMarkers(world, 1000.0)
     listener = ros.listen(TOPIC, MarkerArray)
     polls = 0
     while not listener.messages:
         markers.poll()
-        polls += markers._look is not None
+        polls += markers._check is not None
     (message,) = listener.messages
     markers._publisher.unregister()
     world.close()

@@ -180,7 +180,7 @@ def main() -> None:
 
 
 def as_sent(error: Exception) -> Exception:
-    """Returns an error that another process can read: itself, or its words."""
+    """Returns an error that another process can read: itself, or an InterfaceError with its text."""
     try:
         if str(pickle.loads(pickle.dumps(error))) == str(error):
             return error

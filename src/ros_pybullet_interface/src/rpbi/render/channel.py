@@ -67,7 +67,12 @@ class SceneAccepted(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """To the simulator: the frame of a synchronous camera of that stamp [ns] was handed on, or nobody looks at it."""
+    """To the simulator: the frame of a synchronous camera was passed to the sink, or has no viewers.
+
+    Attributes:
+        camera: The camera.
+        stamp_ns: Stamp of the frame [ns].
+    """
 
     camera: str
     stamp_ns: int

@@ -64,7 +64,7 @@ class RenderClient:
         use_egl: bool = True,
     ) -> None:
         self.wanted: frozenset[str] = frozenset()
-        """Names of the cameras that somebody looks at."""
+        """Names of the cameras whose images have viewers."""
         self.renderer = ""
         """Name of the renderer, empty until it is ready."""
         self._cameras = {camera.name: camera for camera in cameras}

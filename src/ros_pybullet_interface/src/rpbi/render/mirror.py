@@ -16,9 +16,8 @@ from rpbi.world.load_log import LogEntry, apply
 from .camera import depth_in_metres
 from .channel import DrawnScene
 from .frame import Camera, Frame
-from .renderers import Renderer
+from .renderers import Renderer, Transparency, TransparentShape
 from .tessellation import FineShapes
-from .transparency import Transparency, TransparentShape
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +28,7 @@ SHORTEST_STEP_S = 1e-9
 class SoftShapes:
     """Sets the shapes of soft bodies in a client without physics.
 
-    PyBullet draws a soft body as it was after the last step, so there must be a step now and then.
+    PyBullet draws a soft body as it was after the last step, so a new shape needs a step.
 
     Args:
         pb: The client, whose world has just been set up.
@@ -41,7 +40,7 @@ class SoftShapes:
             pb.setGravity(0.0, 0.0, 0.0)
             pb.setTimeStep(SHORTEST_STEP_S)
 
-    def still(self, body: Body) -> None:
+    def disable_physics(self, body: Body) -> None:
         """Disables collisions and forces of a new body."""
         if self._pb.is_deformable:
             body.detach()
@@ -49,7 +48,7 @@ class SoftShapes:
                 self._pb.setCollisionFilterGroupMask(body.body_id, link, 0, 0)
 
     def show(self, nodes: Sequence[tuple[Body, Sequence[Vector]]]) -> None:
-        """Sets corners of soft bodies; rigid bodies must be placed afterwards.
+        """Moves the corners of soft bodies; rigid bodies must be placed afterwards.
 
         Args:
             nodes: Soft bodies and the places of all of their simulated corners [m].
@@ -89,7 +88,7 @@ class Mirror:
             if entry.what == "world":
                 self._soft_shapes = SoftShapes(self._pb)
             elif entry.what == "add":
-                self._soft_shapes.still(self._bodies[entry.name])
+                self._soft_shapes.disable_physics(self._bodies[entry.name])
         except Exception as error:
             log.warning("cannot render '%s': %s", entry.name, error)
         self._transparency.update({body.body_id for body in self._bodies.values()})

@@ -29,17 +29,18 @@ for your own world.
   that of a [controller](controllers.md) in a robot's YAML.
 - Names without `/` in front are relative: a namespace moves them.
 - All that is of one tick has that tick's stamp. Rates are in the world's time unless they are said to be in wall time.
-- Keys such as `broadcast_hz` set the rate or open the topic; they stand in [config_reference.md](config_reference.md).
-- A message that has NaN, an unknown joint or the wrong number of values changes nothing and is named in the log. A
-  service that refuses answers `success: false` and why."""
+- Keys such as `broadcast_hz` set the rate or open the topic; they are in [config_reference.md](config_reference.md).
+- A message that has NaN, an unknown joint or the wrong number of values changes nothing and is logged. A
+  service that refuses a request answers `success: false` and the reason."""
 WINDOW = """\
-With `connection_mode: GUI`, see [gui.md](gui.md); without a window nothing is published, and what asks is refused."""
+With `connection_mode: GUI`, see [gui.md](gui.md); without a window nothing is published, and changes of the view are
+refused."""
 OBJECTS = """\
 The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Objects of your own types and
-your own sensors have what their classes say besides, see [extending.md](extending.md)."""
+your own sensors also have those that their classes name, see [extending.md](extending.md)."""
 CAMERAS = """\
-`camera` is the first camera, whatever its name; further ones have `rpbi/NAME/...`. A node of its own publishes them,
-named after the simulator with `_camera` behind. Nothing is drawn that nobody subscribes to. The rate is `hz` of the
+`camera` is the first camera, whatever its name; further ones have `rpbi/NAME/...`. A separate node publishes them,
+with the name of the simulator and `_camera`. Images without subscribers are not drawn. The rate is `hz` of the
 camera, see [cameras.md](cameras.md)."""
 FOLLOWED = """\
 All have the prefix `tf_prefix` of the main file, if there is one, as have the frames under `poses`. The node listens to
@@ -73,8 +74,8 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     """
     of_bodies = {name: list(of_body(world, name, body)) for name, body in world.bodies.items()}
     of_cameras = [each for name in world.cameras for each in of_camera(world, name)]
-    told = {each for rows in (*of_bodies.values(), of_cameras) for each in rows}
-    rest = [each for each in endpoints(world) if each not in told]
+    listed = {each for rows in (*of_bodies.values(), of_cameras) for each in rows}
+    rest = [each for each in endpoints(world) if each not in listed]
     of_node = {each: [""] for each in rest if each.note != OF_WINDOW}
     of_window = {each: [""] for each in rest if each.note == OF_WINDOW}
     parts = [WRITTEN_BY, "# Topics and services", INTRODUCTION]

@@ -158,12 +158,12 @@ class SimulatorNode:
         for service in NODE_SERVICES:
             serve(service, context)
         gc.collect()
-        gc.freeze()  # collections, which stop the loop, leave out what is there from the start
+        gc.freeze()  # garbage collections, which stop the loop, then skip all objects made so far
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 
     def run(self) -> None:
-        """Simulates until ROS shuts down, which waits until everything here has ended in good order.
+        """Simulates until ROS shuts down, which waits until everything here has ended.
 
         Raises:
             PhysicsError: If PyBullet has ended, for instance because its window was closed.
@@ -181,10 +181,11 @@ class SimulatorNode:
             if self._priority is not None:
                 self._priority.end()  # while ROS shuts down, a thread of rospy spins
             has_gone = not self._world.is_connected
-            send_at_once()  # such as the results of goals that it ends in the middle of
+            send_at_once()  # such as the results of goals that end with it
             self._cameras.close()
             self._world.close()  # from here on, no object is added or removed
-            # Topics that are just being opened or closed would lock rospy up. Who waits for them ends with the process.
+            # rospy would lock up on topics that are being opened or closed. Threads that wait for these end with the
+            # process.
             self._objects.end(LONGEST_END_S)
             ended.set()
         if has_gone:

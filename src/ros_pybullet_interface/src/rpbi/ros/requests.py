@@ -87,8 +87,8 @@ class BodyContext(NamedTuple):
         Its PyBullet state is for the simulation thread alone.
 
         Raises:
-            UnknownNameError: If it has gone.
-            InterfaceError: If it cannot be found out, since the simulation has ended.
+            UnknownNameError: If it was removed.
+            InterfaceError: If the simulation has ended.
         """
         body = self.world.bodies.get(self.name)
         if body is None:  # a reset may be running; it is over when the simulation thread answers
@@ -105,7 +105,7 @@ class BodyContext(NamedTuple):
             body: The body that it uses, if it was looked up before.
 
         Raises:
-            UnknownNameError: If the body has gone meanwhile.
+            UnknownNameError: If the body was removed meanwhile.
             InterfaceError: If the world was reset meanwhile, the simulation has ended or makes no progress.
         """
         asked = self.body if body is None else body

@@ -15,8 +15,8 @@ class RosNode:
 
     Args:
         name: The node's name unless remapped.
-        options: Those of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals` the script sees
-            to Ctrl-C itself.
+        options: Those of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals` the script
+            handles Ctrl-C itself.
 
     Attributes:
         tf: TF.

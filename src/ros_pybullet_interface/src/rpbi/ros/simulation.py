@@ -49,10 +49,10 @@ class StepRequest:
 
 
 class RestoreRequest:
-    """A request to restore a state, and the way to it; the caller waits for `done`.
+    """A request to restore a state, and its progress; the caller waits for `done`.
 
     Args:
-        ticks: The ticks on the way, see `World.restoring`.
+        ticks: Runs the ticks up to the state and yields each, see `World.restoring`.
         end: The last of them.
     """
 
@@ -69,7 +69,7 @@ class RestoreRequest:
         return True
 
     def end(self, error: Exception | None = None) -> None:
-        """Ends it, and the wait; before its time, the world is reset."""
+        """Ends the restoration and the wait for it; if it is not complete, the world is reset."""
         self._ticks.close()
         if self.done.set_running_or_notify_cancel():
             self.done.set_result(None) if error is None else self.done.set_exception(error)
@@ -124,7 +124,7 @@ class Simulation:
             False if it runs already.
 
         Raises:
-            InterfaceError: If it is about the ticks of a request.
+            InterfaceError: If it is running the ticks of a request.
         """
         if self.running:
             return False
@@ -161,7 +161,7 @@ class Simulation:
             The new tick and its stamp [ns].
 
         Raises:
-            InterfaceError: If the world runs, or is about the ticks of another request.
+            InterfaceError: If the world runs, or the ticks of another request.
             PhysicsError: If something in the world is not finite any more.
         """
         self._refuse_while_moving()
@@ -178,7 +178,7 @@ class Simulation:
             The last tick and its stamp [ns], once everything of it has been passed to every subscriber.
 
         Raises:
-            InterfaceError: If the world runs, or is about the ticks of another request.
+            InterfaceError: If the world runs, or the ticks of another request.
         """
         self._refuse_while_moving()
         request = StepRequest(steps)
@@ -191,13 +191,13 @@ class Simulation:
         return request.done
 
     def reset(self, refill: Callable[[], None] = lambda: None) -> None:
-        """Resets the world to its state when built; it keeps running or standing still, and its time continues.
+        """Resets the world to its state when built; it stays running or stopped, and its time continues.
 
         Args:
             refill: Puts the inputs of the new start.
 
         Raises:
-            InterfaceError: If something cannot be loaded any more; then it stands still.
+            InterfaceError: If something cannot be loaded any more; then it is stopped.
         """
         self._interrupt_request()
         try:
@@ -215,8 +215,8 @@ class Simulation:
         refused. A stop ends it and resets the world.
 
         Returns:
-            What is done when the world keeps running or standing still from that state on. It fails with an
-            InterfaceError if the state is not reached; then the world was reset and stands still.
+            A future that is done when the world continues, running or stopped, from that state. It fails with an
+            InterfaceError if the state is not reached; then the world was reset and is stopped.
         """
         self._interrupt_request()
         restore = self._restore = RestoreRequest(self.world.restoring(to), to.tick)
@@ -318,7 +318,7 @@ class Simulation:
         return self.world.run_idle(min(ticks, self._state.ticks_to_hash - 1), end_s)
 
     def _run_tick(self, is_last: bool = False) -> None:
-        """Advances by a tick; of the last one before standing still everything is published, due or not."""
+        """Advances by a tick; of the last one before a stop everything is published, due or not."""
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
@@ -349,7 +349,7 @@ class Simulation:
         return request
 
     def _abort_request(self, error: Exception) -> None:
-        """Ends the ticks of a request before their time, with all of the last one published."""
+        """Ends the ticks of a request early, with all of the last one published."""
         request = self._end_request()
         self._halt()
         request.fail(error)

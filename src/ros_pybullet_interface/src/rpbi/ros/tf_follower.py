@@ -78,8 +78,8 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
 class FollowedFrame:
     """A pose input and the state of its frame.
 
-    It is looked up when it comes, about once a period: at other times, steps of a motion would differ. Where nothing
-    comes, since the frame moves with others, it is looked up after a period.
+    It is looked up when its transform arrives, about once a period: at other times, the steps of a motion would be
+    uneven. A frame without arrivals, which moves with its parent, is looked up once a period.
     """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:

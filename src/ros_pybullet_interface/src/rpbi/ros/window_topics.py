@@ -49,12 +49,12 @@ NUMBERS = Topic(
     meaning="The same as red, green, blue, alpha of each pixel, row by row.",
     key="publish_visualizer_image_hz",
 )
-CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Where the window looks from now; 30 Hz.")
+CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Present view of the window; 30 Hz.")
 WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
 """Topics that the window publishes."""
 CAMERA_HZ = 30.0
 LARGEST_SHARE = 0.25
-"""Largest share of wall time for drawing; images come less often rather than exceed it."""
+"""Largest share of wall time for drawing; if that is not enough, images come less often."""
 HELD_HZ = 60.0
 """Rate at which a held key is published [Hz] of wall time; presses and releases are published at once."""
 KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
@@ -63,7 +63,7 @@ NO_BUTTON = 255
 
 
 class GuiEvents:
-    """Publishes what happens to keys and mouse; what happened while nobody listened is not published later.
+    """Publishes events of keys and mouse; those that had no subscribers are not published later.
 
     Args:
         window: The window.
@@ -79,7 +79,7 @@ class GuiEvents:
         self._held_rate = WallRate(HELD_HZ)
 
     def poll(self) -> None:
-        """Publishes what has happened since the last time."""
+        """Publishes the events since the last call."""
         if self._keys is not None:
             self._poll_keys(self._keys)
         if self._mouse is not None:
@@ -206,7 +206,7 @@ class DebugCamera:
 
         Raises:
             InterfaceError: If there is no window.
-            ValueError: If the message is not sound.
+            ValueError: If a value in the message is not valid.
         """
         given = {key: getattr(message, key) for key in ResetDebugVisualizerCamera.model_fields}
         try:
@@ -228,7 +228,7 @@ RESET = Topic(
     "rpbi/reset_debug_visualizer_camera",
     CameraMessage,
     DebugCamera.reset,
-    "Where the window is to look from.",
+    "New view of the window.",
 )
 
 
@@ -252,7 +252,7 @@ class WindowTopics:
 def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callable[[], None]]:
     keyboard, mouse = config.enable_keyboard_publisher, config.enable_mouse_publisher
     if keyboard and not _asks_for_shortcuts(config):
-        window.leave_keys_to_others()
+        window.disable_shortcuts()
     if keyboard or mouse:
         yield GuiEvents(window, clock, keyboard, mouse).poll
     if config.publish_visualizer_image_hz:

@@ -1,4 +1,4 @@
-"""State of a controller as a sensor."""
+"""State of a controller."""
 
 from rpbi.control.controllers.manager import ControllerManager, ControllerStateSample
 
@@ -6,7 +6,7 @@ from .sensor import Sensor
 
 
 class ControllerStateSensor(Sensor):
-    """Reports whether a controller of a robot is active, and its own numbers."""
+    """Reports whether a controller of a robot is active, and the values that it publishes."""
 
     sample_type = ControllerStateSample
     ros_topic = "rpbi.ros.publishers.sample_topics:CONTROLLER_STATE"

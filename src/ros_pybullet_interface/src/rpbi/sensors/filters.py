@@ -33,12 +33,12 @@ _TICKS_PER_BLOCK = 256
 
 
 class SeededNoise:
-    """Normally distributed noise on top of a bias; the same at the same tick, whatever was read before.
+    """Normally distributed noise and a bias; the values depend only on seed and tick.
 
     Args:
         seed: Seed, 0 or greater.
-        deviation: n standard deviations.
-        bias: n means.
+        deviation: Standard deviation of each of n values.
+        bias: Mean of each.
     """
 
     def __init__(self, seed: int, deviation: Sequence[float], bias: Sequence[float]) -> None:

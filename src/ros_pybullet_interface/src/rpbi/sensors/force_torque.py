@@ -22,12 +22,12 @@ from .sensor import SensedBody, SensedWorld, Sensor
 class ForceTorqueSensor(Sensor):
     """Force and moment that a joint transmits, about its origin, in the axes of its child link's URDF frame.
 
-    PyBullet's own reading is of no use here: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
+    PyBullet's own reading cannot be used: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
     with them added it is still wrong, see docs/force_torque.md. The wrench is therefore the change of momentum of all
     links below the joint during the last tick, less their weight and less all contact, attachment and external forces
     (Newton-Euler, as an impulse balance). That holds for all types of joints, control modes and limits.
 
-    It is read at `default_hz` unless its part of the robot's YAML, the configuration, has a rate.
+    It is read at `default_hz` unless its configuration has a rate.
     """
 
     Config = ForceTorqueConfig
@@ -62,7 +62,7 @@ class ForceTorqueSensor(Sensor):
         self._attachments = world.attachments
 
     def before_step(self, tick: int) -> None:
-        """Notes how the links move, and in what world."""
+        """Stores the states of the links, gravity and the number of sub-steps."""
         self._gravity, self._contact_factor = self._robot.pb.gravity, max(1, self._robot.pb.sub_steps)
         if self._dynamics_changes != self._robot.dynamics_changes:
             self._dynamics_changes = self._robot.dynamics_changes
@@ -82,7 +82,7 @@ class ForceTorqueSensor(Sensor):
         return self._sample
 
     def _loads(self) -> Iterator[LinkWrench]:
-        """Yields what attachments and external wrenches did to the links below the joint in the last step."""
+        """Yields the loads of attachments and external wrenches on the links below the joint in the last step."""
         for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
             if load.link in self._subtree.links:
                 yield load
@@ -112,7 +112,7 @@ class ForceTorqueSensor(Sensor):
         """Returns force and moment of the last tick, as mean of that tick.
 
         With momentum p, angular momentum L about the joint's origin, which moves at v, first moment of mass s, weight
-        m g, and what touches, holds or pushes it (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
+        m g, and all other loads (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
 
         Raises:
             PhysicsError: If it is not finite.

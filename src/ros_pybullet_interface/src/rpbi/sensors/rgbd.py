@@ -1,4 +1,4 @@
-"""RGB-D cameras, as far as the world is concerned: what they see, not how it looks."""
+"""RGB-D cameras in the world: their poses and scenes, from which the renderer draws images."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from .sensor import SensedBody, Sensor
 
 
 class RgbdSensor(Sensor):
-    """Collects the scene for the renderer while somebody looks at the camera's images.
+    """Collects the scene for the renderer while the camera's images have viewers.
 
     Attributes:
         topic_name: Its name in topics.
@@ -40,7 +40,7 @@ class RgbdSensor(Sensor):
         return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
 
     def read(self, tick: int) -> SceneSample | None:
-        """Returns where everything is, None as long as the camera's own pose is unknown."""
+        """Returns the states of all bodies; None while the pose of the camera is unknown."""
         if self.pose is None:
             return None
         bodies = tuple(body.state() for body in self._bodies.values())

@@ -80,16 +80,16 @@ class SensedWorld(Protocol):
 
     @property
     def attachments(self) -> Any:
-        """Bodies that hold others, `Attachments`."""
+        """Attachments between bodies, an `Attachments`."""
 
 
 class Sensor(ABC):
-    """Reads something from the world at a rate; it owns neither timer nor thread.
+    """Reads a quantity from the world at a rate; it has no timer or thread of its own.
 
     Attributes:
         name: The body or sensor that its topics are named after.
         hz: Rate [Hz] of the world's time, 0 is never; the world changes it.
-        wanted: Whether its samples have receivers; it is not read without.
+        wanted: Whether its samples have receivers; without any, it is not read.
     """
 
     wanted: bool = True
@@ -107,7 +107,7 @@ class Sensor(ABC):
     not_in_keyframes: ClassVar[tuple[str, ...]] = ("wanted",)
     """Attributes that are no part of the world's state."""
     topic: str | None = None
-    """Name of its topic, where it is not the one that the Topic has."""
+    """Name of its topic, if it differs from that of its `Topic`."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name
@@ -125,10 +125,10 @@ class Sensor(ABC):
         """
 
     def before_step(self, tick: int) -> None:  # noqa: B027 (most sensors need nothing)
-        """Acts just before the physics of each tick, due or not; sensors that need nothing leave it."""
+        """Called just before the physics of each tick, whether the sensor is due or not."""
 
     def after_step(self, tick: int) -> None:  # noqa: B027
-        """Acts just after the physics of each tick, before sensors are read."""
+        """Called just after the physics of each tick, before sensors are read."""
 
     def inputs(self) -> Mapping[str, Input]:
         """Returns the inputs of the sensor by name."""
@@ -136,7 +136,7 @@ class Sensor(ABC):
 
 
 class BodySensor(Sensor):
-    """A sensor of another package, on a body.
+    """A sensor that any body can have in its `sensors`.
 
     A new one is a subclass with a `Config`, a `sample_type` and `read`; see docs/extending.md.
     """

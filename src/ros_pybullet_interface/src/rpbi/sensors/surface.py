@@ -9,7 +9,7 @@ from .sensor import SensedBody, Sensor
 
 
 class SurfaceSensor(Sensor):
-    """Where the triangles of a soft body's surface are."""
+    """Corners of the triangles of a soft body's surface."""
 
     sample_type = SurfaceSample
     ros_topic = "rpbi.ros.publishers.sample_topics:SURFACE"

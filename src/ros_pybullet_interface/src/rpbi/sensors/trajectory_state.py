@@ -1,4 +1,4 @@
-"""Progress of a robot on its trajectory as a sensor."""
+"""Progress of a robot on its trajectory."""
 
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.trajectories.follower import TrajectoryFollower
@@ -8,7 +8,7 @@ from .sensor import Sensor
 
 
 class TrajectoryStateSensor(Sensor):
-    """Where the joints of a robot's follower of trajectories are to be, and where they are."""
+    """Desired and measured states of the joints of a robot that follows trajectories."""
 
     sample_type = TrajectoryStateSample
     ros_topic = "rpbi.ros.publishers.sample_topics:TRAJECTORY_STATE"

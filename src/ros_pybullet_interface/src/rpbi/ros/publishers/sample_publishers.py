@@ -39,7 +39,7 @@ class TopicPublisher:
         """Sends a sample.
 
         Raises:
-            PluginError: If another package makes no message of it that can be sent.
+            PluginError: If code of another package fails to make a valid message of it.
         """
         key = type(sample), sample.name
         self._last[key] = sample, stamp_ns
@@ -90,7 +90,7 @@ class SamplePublishers:
         """The sensors of each body whose topics are open."""
 
     def find_topics(self, name: str) -> None:
-        """Finds the topics of a body before its first sample, those that other packages name too.
+        """Finds the topics of a body before its first sample, including those of other packages.
 
         Raises:
             InterfaceError: If there is one that cannot be found.
@@ -116,7 +116,7 @@ class SamplePublishers:
         """Publishes the samples of a tick.
 
         Raises:
-            PluginError: If another package makes no message of one that can be sent.
+            PluginError: If code of another package fails to make a valid message of one.
         """
         for sample in samples:
             self._elsewhere.get(type(sample), self._topics).publish(sample, stamp_ns)
@@ -169,13 +169,13 @@ class TickPublisher:
             self._clock.set_factor(real_time_factor)
 
     def publish_tick(self, samples: list[Any]) -> None:
-        """Publishes a tick and the samples that were due; the time of a tick without any can wait."""
+        """Publishes a tick and the samples that were due; of a tick without samples, nothing is published here."""
         if samples:
             self.publish_time()
             self._publishers.publish(samples, self._world.clock.stamp_ns)
 
     def publish_time(self) -> None:
-        """Publishes the time, if it is another one and its rate is not used up."""
+        """Publishes the time, if it has changed and its rate permits."""
         if self._clock is not None:
             self._clock.publish_tick()
 

@@ -39,7 +39,7 @@ STATE = Topic(
     key="state_hz",
 )
 WINDOW_S = 1.0
-"""Over how long the real-time factor is measured at least [s] of wall time."""
+"""Shortest period over which the real-time factor is measured [s] of wall time."""
 STOPPED_CLOCK_PERIOD_S = 0.05
 MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
@@ -102,20 +102,20 @@ class ClockPublisher:
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Publishes the present tick, if it is a new one and the rate is not used up."""
+        """Publishes the present tick, if it is a new one and the rate permits."""
         now_s = time.monotonic()
         if now_s >= self._due_s and self._clock.stamp_ns != self._sent_ns:
-            # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
+            # The next deadline follows from the last one, which keeps the mean rate, but pauses are not caught up.
             self._due_s = max(self._due_s + self._period_s, now_s - self._period_s)
             self._send()
 
     def publish_now(self) -> None:
-        """Publishes the present tick in any case, for the last one before standing still."""
+        """Publishes the present tick in any case, such as the last one before a stop."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 
     def repeat(self) -> None:
-        """Publishes the same tick again at intervals while the world stands still, for late subscribers."""
+        """Publishes the same tick again at intervals while the world is stopped, for late subscribers."""
         if time.monotonic() >= self._due_s or self._clock.stamp_ns != self._sent_ns:
             self.publish_now()
 
@@ -162,7 +162,7 @@ class StatusPublisher:
 
         Args:
             running: Whether the world runs.
-            stepping: Whether it is about the ticks of a request.
+            stepping: Whether it runs the ticks of a request.
             busy: Message of the diagnostics while it does something else.
         """
         if self._rate.is_due():

@@ -75,11 +75,11 @@ MARKERS = Topic(
     meaning="All visual shapes, for RViz; latched, sent when something comes, goes or moves; `markers_hz`.",
     key="markers_hz",
 )
-STILL = 1e-4
+SMALLEST_MOTION = 1e-4
 """Smallest motion of a shape that is sent [m, and parts of a quaternion]; less is ignored."""
 
-LONGEST_LOOK_S = 0.002
-"""Time after which a poll leaves the rest of a look at all shapes to the next one [s]."""
+LONGEST_CHECK_S = 0.002
+"""Longest check of all shapes in one poll [s]; the next poll continues it."""
 
 _Key = tuple[str, int]
 
@@ -96,36 +96,36 @@ class WorldMarkers:
         self._world = world
         self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
-        self._look: Iterator[None] | None = None
+        self._check: Iterator[None] | None = None
         """The running check of all shapes."""
         self._markers: dict[_Key, Marker] = {}
         self._sent: dict[_Key, Marker] = {}
         self._loose: list[tuple[_Key, Body, BodyShape]] = []
-        """Shapes that no frame of TF carries along."""
+        """Shapes of links that are not on TF."""
         self._shown: dict[_Key, Pose] = {}
-        """Where the loose ones were when they were last sent."""
+        """Poses of these shapes when they were last sent."""
         self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
 
     def poll(self) -> None:
         """Publishes changes, if a check is due."""
-        if self._look is None and not self._rate.is_due():
+        if self._check is None and not self._rate.is_due():
             return
         present = (len(self._world.log), *self._world.bodies.values())
         if present != self._seen:
-            self._seen, self._look = present, self._look_at_all()
-        if self._look is not None:
-            self._go_on(self._look)
+            self._seen, self._check = present, self._check_all()
+        if self._check is not None:
+            self._continue(self._check)
         elif self._loose and self._publisher.get_num_connections():
-            self._look_at_loose()
+            self._check_loose()
 
-    def _go_on(self, look: Iterator[None]) -> None:
-        end_s = time.monotonic() + LONGEST_LOOK_S
-        for _ in look:
+    def _continue(self, check: Iterator[None]) -> None:
+        end_s = time.monotonic() + LONGEST_CHECK_S
+        for _ in check:
             if time.monotonic() > end_s:
                 return
-        self._look = None
+        self._check = None
 
-    def _look_at_all(self) -> Iterator[None]:
+    def _check_all(self) -> Iterator[None]:
         """Yields after each shape, and publishes all at the end."""
         self._markers, self._loose, self._shown = {}, [], {}
         for body in self._world.bodies.values():
@@ -150,7 +150,7 @@ class WorldMarkers:
             self._loose.append((key, body, shape))
         self._markers[key] = shape_marker(*key, shape, frame, pose)
 
-    def _look_at_loose(self) -> None:
+    def _check_loose(self) -> None:
         links: dict[tuple[int, int], Pose] = {}
         has_moved = False
         for key, body, shape in self._loose:
@@ -168,7 +168,7 @@ class WorldMarkers:
 
 def _differs(one: Pose, other: Pose) -> bool:
     pairs = zip((*one.position, *one.quat_xyzw), (*other.position, *other.quat_xyzw))
-    return any(abs(a - b) > STILL for a, b in pairs)
+    return any(abs(a - b) > SMALLEST_MOTION for a, b in pairs)
 
 
 def _is_finite(pose: Pose) -> bool:

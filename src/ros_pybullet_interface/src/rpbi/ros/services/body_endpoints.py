@@ -34,20 +34,23 @@ from rpbi.ros.requests import BodyContext, Requests
 from rpbi.ros.simulation import Simulation
 from rpbi.sensors.filters import Zeroing
 
-from .robot_controllers import controllers, robots_with_controllers, set_gains, switch_controllers
-from .robot_ik import inverse_kinematics, move_by_ik, moved_by_ik
-from .robot_info import publish_description, robot_info
-from .robot_motion import (
+from .robot_control import (
+    controllers,
     move_to_eff_state,
     move_to_init_joint_state,
     move_to_initial_joint_state,
     move_to_joint_state,
+    robots_with_controllers,
     set_control_mode,
+    set_gains,
     set_joint_state,
     set_motor_gains,
     set_target,
     stop_motion,
+    switch_controllers,
 )
+from .robot_ik import inverse_kinematics, move_by_ik, moved_by_ik
+from .robot_info import publish_description, robot_info
 from .trajectory_action import open_trajectory_action
 from .trajectory_commands import follow_command, followers, query_state
 

@@ -1,6 +1,6 @@
-"""The services of the node: of time, of objects, cameras and sensors, and of how all behaves in contact and motion.
+"""The services of the node: time, objects, cameras, sensors and dynamics.
 
-A handler never touches PyBullet, it asks the simulation thread.
+Handlers never call PyBullet, they ask the simulation thread.
 """
 
 import logging
@@ -191,10 +191,10 @@ def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
 
 
 def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
-    """Returns an object's YAML, what to call its file in messages, and beside what its own files are looked for.
+    """Returns an object's YAML, the name of its file in messages, and the path beside which its own files are.
 
-    The caller's working directory is unknown here: what has no folder, such as a text, is looked for in the world's
-    search paths and PyBullet's data only.
+    The caller's working directory is unknown. Files of a YAML without a folder, such as a text, are looked for in the
+    world's search paths and PyBullet's data only.
     """
     if asked.filename:
         path = _find(node, asked.filename, "filename")
@@ -205,7 +205,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
-    """Does the same with YAML text under a key: all of it, or `file` and the keys that differ."""
+    """Returns the same of the YAML text of a key, which is an object, or `file` and the keys that differ."""
     data = load_configs(text, key, MAX_BYTES)
     if FILE not in data:
         return data, key, NO_FOLDER

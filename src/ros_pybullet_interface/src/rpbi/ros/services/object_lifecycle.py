@@ -23,9 +23,9 @@ from rpbi.world.saved.state import MAX_TICKS, WorldState
 
 
 class ObjectLifecycle:
-    """Adds, removes and resets, one at a time; any thread but the simulation's may ask for it.
+    """Adds and removes objects and resets the world, one at a time; for any thread but the simulation's.
 
-    It opens the topics and services of all that is in the world at the start.
+    On construction, it opens the topics and services of the world's objects.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
@@ -44,7 +44,7 @@ class ObjectLifecycle:
         """Adds a body.
 
         Raises:
-            InterfaceError: If it does not fit, or its topics cannot be opened; then there is nothing of it.
+            InterfaceError: If it does not fit, or its topics cannot be opened; then nothing of it remains.
         """
         with self._alone():
             config = with_initial_state(config, file)
@@ -82,7 +82,7 @@ class ObjectLifecycle:
                 raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
 
     def reset(self, to: WorldState | None = None) -> None:
-        """Makes the world what it was; what ROS has of bodies that were there all the time stays open.
+        """Resets the world, or restores a state; topics and services of bodies that stay remain open.
 
         Args:
             to: A saved state; by default that of the start.
@@ -172,7 +172,7 @@ class ObjectLifecycle:
         return changed, topics, None, None
 
     def _place_cameras(self) -> None:
-        """Follows the TF frames of the cameras that there are now, and no others."""
+        """Follows the TF frames of the present cameras, and no others."""
         cameras = self._world.cameras
         for name, camera in self._placed_cameras.items():
             if cameras.get(name) is not camera:
@@ -186,7 +186,7 @@ class ObjectLifecycle:
         """Opens the topics and services of a body."""
         body = self._world.bodies[name]
         self._open_bodies.add(name)
-        self._publishers.open(name)  # first, as it notes what is to be forgotten if one of the others fails
+        self._publishers.open(name)  # first, as it stores which samples to drop if one of the others fails
         self._inputs.open(name, body.inputs())
         self._endpoints.open(body)
 

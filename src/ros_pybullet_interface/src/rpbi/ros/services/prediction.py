@@ -40,7 +40,7 @@ NICENESS = 5
 class Predictor:
     """Predicts from the present state of a running world, in processes that follow it and end with this one.
 
-    The first prediction takes as long as simulating again from the last start or reset; later ones follow from there.
+    The first prediction takes as long as simulating again from the last start or reset; later ones continue from there.
 
     Args:
         simulation: The loop that runs the world.
@@ -59,10 +59,10 @@ class Predictor:
         """Number of calls of `cancel`."""
 
     def predict(self, candidates: list[Candidate], job: PredictionJob) -> tuple[int, int, list[Prediction]]:
-        """Returns the tick and stamp [ns] from which on is predicted, and what happens with each candidate.
+        """Returns the tick and stamp [ns] at which predictions begin, and the prediction for each candidate.
 
         Raises:
-            InterfaceError: If it is cancelled, the world cannot be saved, or does not come to the same state in another
+            InterfaceError: If it is cancelled, the world cannot be saved, or does not reach the same state in another
                 process.
         """
         cancels = self._cancels

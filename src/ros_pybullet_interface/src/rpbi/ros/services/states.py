@@ -54,7 +54,7 @@ def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
 
 
 def restore(node: Any, request: SetStringRequest) -> Answer:
-    """Restores the state of a file of this world, by simulating again from its start or keyframe; stamps go on.
+    """Restores the state of a file of this world, by simulating again from its start or keyframe; stamps continue.
 
     The node answers meanwhile; `rpbi/stop` ends it, and the world is reset.
     """

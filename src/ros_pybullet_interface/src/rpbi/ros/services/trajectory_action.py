@@ -43,7 +43,7 @@ LONGEST_END_S = 5.0
 class StampedActionServer(ActionServer):
     """An action server for a node that does not use ROS time.
 
-    actionlib has all stamps and its timer from rospy, which in the simulator is the wall clock regardless of
+    actionlib takes all stamps and its timer from rospy, which in the simulator is the wall clock regardless of
     `use_sim_time`: right for the timer, not for the stamps. It also passes messages to threads that may lose the last
     ones when the server closes; here they are sent at once.
 
@@ -71,7 +71,7 @@ class StampedActionServer(ActionServer):
         super().initialize()
         for key in ("status_pub", "result_pub", "feedback_pub"):
             publisher: rospy.Publisher = getattr(self, key)
-            # Both are the same topic to rospy, so it must not end with the first one: who just comes would be lost.
+            # Both are one topic to rospy, which must not close in between: new subscribers would be lost.
             setattr(self, key, _StampedTopic(publisher.resolved_name, publisher.data_class, self._clock))
             publisher.unregister()
 
@@ -141,7 +141,7 @@ class TrajectoryAction:
         _answer_before_shutdown()
 
     def close(self) -> None:
-        """Ends the action; the robot has gone before."""
+        """Ends the action, after the robot was removed."""
         _open_actions.discard(self)
         self.answer_all()
         self._server.stop()
@@ -156,7 +156,7 @@ class TrajectoryAction:
         while (task := self._tasks.get()) is not None:
             try:
                 task()
-            except Exception:  # the next goals shall have their answers all the same
+            except Exception:  # the next goals must still be answered
                 log.exception("%s: a goal could not be served", self._context.name)
 
     def _begin(self, goal: ServerGoalHandle) -> None:

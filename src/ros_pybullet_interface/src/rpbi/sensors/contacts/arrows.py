@@ -26,7 +26,7 @@ class ContactArrowsSensor(Sensor):
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:
-        """Reads the contacts and scales their forces; where there is none there is no arrow."""
+        """Reads the contacts and scales their forces; a force of zero has no arrow."""
         assert self._reader is not None  # ensured by the world
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))
@@ -36,7 +36,7 @@ class ContactArrowsSensor(Sensor):
 
 
 def contact_sensors(body: SensedBody, config: ContactsConfig | None) -> tuple[Sensor, ...]:
-    """Returns the sensors of a body's contacts; none if they are not asked for."""
+    """Returns the sensors of a body's contacts; none without a configuration."""
     if config is None:
         return ()
     contacts = (MeanContactsSensor if config.average else ContactsSensor)(body, config.hz)

@@ -22,8 +22,8 @@ class ContactReader:
     def __init__(self, pb: Client, bodies: Mapping[str, SensedBody]) -> None:
         self._pb, self._bodies = pb, bodies
         self._touches: dict[int, list[list[Touch]]] | None = None
-        """Contact points by body id, as either end, those between the same two links together; None if PyBullet has
-        to be asked."""
+        """Contact points by the ids of both of their bodies, grouped by pairs of links; None if PyBullet has to be
+        asked."""
         self._by_id: dict[int, SensedBody] = {}
         self._factor = 1.0
         self._are_finite = True
@@ -33,7 +33,7 @@ class ContactReader:
         self._touches = None
 
     def sample(self, body: SensedBody, tick: int) -> ContactsSample:
-        """Returns where a body touches others or, with one of its links, another of its own, in the last tick.
+        """Returns the contacts of a body in the last tick, those between its own links included.
 
         Raises:
             PhysicsError: If a number in it is not finite any more.
@@ -49,7 +49,7 @@ class ContactReader:
         self._by_id = {body.body_id: body for body in self._bodies.values()}
         # PyBullet divides the impulse of the last sub-step by the whole time step.
         self._factor = max(1, self._pb.sub_steps)
-        # Asked for one body, PyBullet turns normals towards it but not friction; asked for all, it turns nothing.
+        # Given a body, PyBullet turns normals towards it but not friction directions; without one, it turns neither.
         all_touches = self._pb.getContactPoints()
         self._are_finite = _finite(all_touches)
         by_body: dict[int, list[list[Touch]]] = {}
@@ -67,7 +67,7 @@ class ContactReader:
 
 
 def _finite(touches: Iterable[Touch]) -> bool:
-    """Returns whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
+    """Returns whether all numbers of contact points are finite; `dist` is finite only if both vectors are."""
     sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
     return isfinite(sum(sizes))
 

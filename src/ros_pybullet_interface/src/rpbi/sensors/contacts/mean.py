@@ -29,7 +29,7 @@ class MeanContactsSensor(ContactsSensor):
             self._ticks.clear()
 
     def read(self, tick: int) -> ContactsSample:
-        """Returns the means; while the world stands still, the last ones again."""
+        """Returns the means; while the world is stopped, the last ones again."""
         if self._ticks:
             self._latest = ContactsSample(self.name, partial(_mean_points, self._ticks))
             self._ticks = []

@@ -80,9 +80,10 @@ class AprilTagsConfig(TrackingSensorConfig):
 
 
 class AprilTagsSensor(BodySensor):
-    """Poses of tags in the optical frame of a camera, of those that it sees: before it, large enough, and uncovered.
+    """Poses of the tags that a camera sees, in its optical frame.
 
-    Collision shapes cover tags; for random occlusion see `occlusion`.
+    A tag is seen if it faces the camera, is large enough in the image, and no collision shape covers it. Tags can be
+    hidden at random, too, see `occlusion`.
     """
 
     Config = AprilTagsConfig
@@ -104,7 +105,7 @@ class AprilTagsSensor(BodySensor):
         self._delay: Delay[tuple[SeenTag, ...]] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> AprilTagsSample | None:
-        """Looks at the tags, and returns those that were seen long enough ago; None as long as there is no camera."""
+        """Detects tags, and returns the detections of `latency_s` ago; None while the camera or its pose is missing."""
         camera = self._world.cameras.get(self.config.camera)
         if camera is None:
             known = ", ".join(self._world.cameras) or "none"
@@ -129,7 +130,7 @@ class AprilTagsSensor(BodySensor):
                 yield SeenTag(tag.id, tag.size, self._noise[tag.id].on(in_camera, tick))
 
     def _pose_of(self, tag: TagConfig) -> tuple[Pose, int] | None:
-        """Returns where a tag is in the world, and PyBullet's id of its body; None if there is no such body or link."""
+        """Returns the pose of a tag in the world and PyBullet's id of its body; None without such a body or link."""
         body = self.body if tag.body is None else self._world.bodies.get(tag.body)
         if body is None:
             self._warn_once(str(tag.body), f"no body '{tag.body}' for tag {tag.id}; it is not seen")

@@ -19,7 +19,7 @@ Measured = TypeVar("Measured")
 
 
 class OcclusionConfig(ConfigModel):
-    """For how long and how often something is hidden, by chance."""
+    """Random occlusion."""
 
     share: Fraction = Field(description="Share of the time for which it is hidden.")
     length_s: Seconds = Field(0.5, description="Time is divided into parts of this length, each hidden or not.")
@@ -48,10 +48,10 @@ class TrackingSensorConfig(SensorConfig):
 
 
 class Occlusion:
-    """Hides something by chance; the same at the same tick, whatever was asked before.
+    """Random occlusion, which depends only on seed and tick.
 
     Args:
-        config: Its share and length; None is never.
+        config: Share and length; None for no occlusion.
         seed: Seed, 0 or greater.
         dt_s: Length of a tick [s].
     """
@@ -69,7 +69,7 @@ class Occlusion:
 
 
 class PoseNoise:
-    """Noise of poses; the same at the same tick.
+    """Noise of poses, which depends only on seed and tick.
 
     Args:
         config: Its deviations.
@@ -80,7 +80,7 @@ class PoseNoise:
         self._noise = SeededNoise(seed, (*config.noise_m, *[config.noise_rad] * 3), [0.0] * 6)
 
     def on(self, pose: Pose, tick: int) -> Pose:
-        """Returns a pose with the noise of a tick on it."""
+        """Returns a pose with the noise of a tick added."""
         x, y, z, *turn = self._noise.at(tick).tolist()
         rotated = Pose((0.0, 0.0, 0.0), quaternion_of((turn[0], turn[1], turn[2]))) @ Pose(
             (0.0, 0.0, 0.0), pose.quat_xyzw
@@ -105,7 +105,7 @@ class Delay(Generic[Measured]):
             self._waiting.append((tick, measured))
 
     def newest(self, tick: int) -> tuple[int, Measured] | None:
-        """Returns the newest one that is old enough at a tick with its own tick; None if there is none yet."""
+        """Returns the newest measurement that is old enough at a tick, and its own tick; None if there is none."""
         while len(self._waiting) > 1 and tick - self._waiting[1][0] >= self._ticks:
             self._waiting.popleft()
         first = self._waiting[0] if self._waiting else None

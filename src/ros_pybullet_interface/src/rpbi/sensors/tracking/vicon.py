@@ -1,4 +1,4 @@
-"""Bodies as Vicon reports them."""
+"""Poses of bodies as Vicon reports them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ViconConfig(TrackingSensorConfig):
 
 
 class ViconSensor(BodySensor):
-    """Pose of a link of a body in the world, as a motion capture system sees it; while it is hidden, nothing.
+    """Pose of a link in the world, as a motion capture system measures it; no samples while it is occluded.
 
     Attributes:
         tf_frames: The TF frame that is reported.
@@ -53,7 +53,7 @@ class ViconSensor(BodySensor):
         self._delay: Delay[Pose | None] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> ViconSample | None:
-        """Measures the body, and returns what was measured long enough ago; None if it was hidden then."""
+        """Measures the pose, and returns the measurement of `latency_s` ago; None if the link was occluded then."""
         self._delay.push(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
         newest = self._delay.newest(tick)
         seen_at, pose = newest or (tick, None)
