@@ -1,4 +1,4 @@
-"""The last seconds of a signal, and its way back from a message."""
+"""The last seconds of a signal, as records of a message and as arrays."""
 
 from __future__ import annotations
 
