@@ -51,7 +51,7 @@ FLOORS = {
         {"sensors"},
         {"bodies"},
         {"world"},
-        {"world_warnings", "render", "replay", "reference", "follower"},
+        {"render", "replay", "reference", "follower"},
         {"images", "gym", "ros"},
         {"ros_node"},
     )
@@ -184,7 +184,6 @@ STILL_AT_THE_EDGE = {
     "custom_ros_tools.ros.lifecycle.roslaunch_watch",
     "custom_ros_tools.ros.node",
     "custom_ros_tools.ros.server_socket",
-    "rpbi.ros.reference.reference_world",
     "rpbi_examples.ros.console.bench",
     "rpbi_examples.ros.console.docs",
     "rpbi_examples.ros.console.label_images",

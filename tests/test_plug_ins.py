@@ -186,7 +186,7 @@ from rpbi.world.schemas import file_schemas, schemas
 from rpbi.reference.config_page import config_page
 from rpbi.ros.publishers.sample_topics import sample_topic
 from rpbi.ros.interface_page import interface_page
-from rpbi.ros.reference.reference_world import reference_world
+from rpbi.reference.reference_world import reference_world
 from rpbi.world import World
 from rpbi_examples.plugins_page import plugins_page
 from rpbi_utils.console.spawn import kind_in, kinds

@@ -17,7 +17,7 @@ PLANTED = "import pathlib; pathlib.Path(__file__).with_name('canary').touch()\nc
 CLASSES = (
     *("planted:Thing", "planted:canary", "planted.inner:Thing", "antigravity:x", "this:x", "idlelib.__main__:x"),
     *("os:system", "subprocess:Popen", "builtins:eval", "pickle:loads", "pathlib:Path", "rpbi.world.world:World"),
-    *("rpbi.follower.__main__:main", "rpbi.render.__main__:main", "rpbi.ros.node:SimulatorNode", "rpbi:planted"),
+    *("rpbi.follower:main", "rpbi.render.__main__:main", "rpbi.ros.node:SimulatorNode", "rpbi:planted"),
     *("rpbi.world.saved.state:WorldState", "rpbi.config.world:WorldConfig", "rpbi.geometry:Pose", "../planted:Thing"),
     *("", ":", "planted", "planted:Thing\n\x1b[2J", "a" * 20_000 + ":b", ".".join("a" * 3000) + ":b"),
 )

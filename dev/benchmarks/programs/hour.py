@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rpbi.world import World
-from rpbi.world.keyframes.building import KeyframeMaker
+from rpbi.world.keyframes.maker import KeyframeMaker
 from rpbi.world.loading import load_world
 
 KUKA = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"

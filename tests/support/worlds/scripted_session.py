@@ -20,10 +20,10 @@ from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.config.attachments import AttachmentConfig
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
+from rpbi.config.world import AttachmentConfig
 from rpbi.control.controllers.manager import ControllerSwitch, ControllerUpdate
 from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.control.joint_command import JointCommand

@@ -15,9 +15,9 @@ from gripper import gripper
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.config.attachments import AttachmentConfig
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity
+from rpbi.config.world import AttachmentConfig
 from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.controllers.manager import ControllerSwitch
 from rpbi.control.external_wrenches import ExternalWrench

@@ -77,7 +77,7 @@ def test_later_camera_may_not_take_the_topics_of_the_first(ros):
     file = ros.write_yaml("camera.yaml", {**CAMERA, "name": "camera"})
     node = ros.simulator(box_world(ros, rgbd_sensor=CAMERA, rgbd_sensors=[file]), wait=False)
     assert node.wait(60.0) == 1
-    assert "name: 'camera' is what the topics of the first camera are called" in ros.output(node)
+    assert "name: topics of the first camera are named 'camera'" in ros.output(node)
 
 
 def test_cameras_come_and_go_by_service(ros):

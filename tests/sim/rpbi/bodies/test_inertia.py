@@ -13,7 +13,7 @@ from robot_model.urdf.for_pybullet import frame_masses
 from rpbi.control.joint_command import JointCommand
 from rpbi.samples import JointStateSample, LinkPoseSample, WrenchSample
 from rpbi.world import World
-from rpbi.world_warnings import world_warnings
+from rpbi.world.world_warnings import world_warnings
 
 DT_S = 0.001
 BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'

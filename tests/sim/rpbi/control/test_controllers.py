@@ -22,8 +22,7 @@ from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose, Twist
 from rpbi.world import World
 from rpbi.world.actions import TimedGoal
-from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.command_log import RecordedCommand, apply_command
 from rpbi.world.saved.values import to_text
 
 ROOT = Path(__file__).resolve().parents[4]

@@ -12,7 +12,7 @@ import pytest
 from worlds import iiwa, write_world
 
 from rpbi.control.joint_command import JointCommand
-from rpbi.control.streams.bounded_motion import BoundedMotion
+from rpbi.control.stream_motion import BoundedMotion
 from rpbi.world import World
 
 FIRST, SECOND = "lbr_iiwa_joint_1", "lbr_iiwa_joint_2"

@@ -11,8 +11,8 @@ from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from rpbi.config.attachments import AttachmentConfig
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.world import AttachmentConfig
 from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.controllers.manager import ControllerSwitch
 from rpbi.control.external_wrenches import ExternalWrench

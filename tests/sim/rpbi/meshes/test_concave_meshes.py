@@ -14,7 +14,7 @@ from worlds import FLOOR, ball, write_world
 from custom_ros_tools.errors import ConfigError
 from rpbi.meshes.triangles import volumes
 from rpbi.world import World
-from rpbi.world_warnings import world_warnings
+from rpbi.world.world_warnings import world_warnings
 
 RADIUS_M = 0.02
 PARTS_ADD_M = 4e-3

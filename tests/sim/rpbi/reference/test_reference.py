@@ -14,9 +14,9 @@ from custom_ros_tools.console.docs import files
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
+from rpbi.reference.reference_world import FOLLOWED, reference_world
 from rpbi.ros.headers import FRAMES
 from rpbi.ros.interface_table import FOLLOWS, endpoints
-from rpbi.ros.reference.reference_world import FOLLOWED, reference_world
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World
 

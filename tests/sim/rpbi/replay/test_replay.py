@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pybullet
@@ -23,7 +24,7 @@ from rpbi.replay.session import Replay
 from rpbi.world import World
 from rpbi.world.loading import load_world
 from rpbi.world.saved.description import WorldDescription
-from rpbi.world.saved.values import FORMER_NAMES, from_text, to_text
+from rpbi.world.saved.values import FORMER_MODULES, FORMER_NAMES, from_text, to_text
 
 TICKS = 3000
 EXAMPLES = Path(__file__).resolve().parents[4] / "src" / "rpbi_examples" / "configs"
@@ -70,6 +71,10 @@ def test_classes_of_older_recordings_are_found_by_their_present_names():
         assert find(present).__module__ == present.partition(":")[0]
         with pytest.raises(ValueError):
             find(former)
+    for former, present in FORMER_MODULES.items():
+        import_module(present)
+        with pytest.raises(ModuleNotFoundError):
+            import_module(former)
 
 
 def test_an_older_recording_can_be_read():

@@ -140,7 +140,7 @@ def test_problems_of_all_further_cameras_are_reported_with_their_files(tmp_path)
         "bad.yaml: hz: expected a number [Hz], got",
         "bad.yaml: depth_noise_m: must be >= 0 [m]",
         "bad.yaml: object_tf: missing",
-        "camera.yaml: name: 'camera' is what the topics of the first camera are called",
+        "camera.yaml: name: topics of the first camera are named 'camera'",
         "rgbd_sensors[2]",
         "rgbd_sensors[3]",
     ):

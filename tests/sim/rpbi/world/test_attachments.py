@@ -10,7 +10,7 @@ import pytest
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
-from rpbi.config.attachments import AttachmentConfig
+from rpbi.config.world import AttachmentConfig
 from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose

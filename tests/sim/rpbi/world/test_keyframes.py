@@ -24,11 +24,12 @@ from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.forks import shadow as shadows
 from rpbi.world.keyframes import keyframe as keyframes
-from rpbi.world.keyframes.building import KeyframeMaker
 from rpbi.world.keyframes.graph import GraphReader
+from rpbi.world.keyframes.maker import KeyframeMaker
 from rpbi.world.loading import load_object
 from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.description import WorldDescription
+from rpbi.world.saved.values import FORMER_MODULES
 
 AHEAD = 200
 """Ticks for which worlds go on."""
@@ -329,6 +330,17 @@ def test_worlds_with_unknown_state_are_refused(heap, tmp_path):
     heap.pb.changeDynamics(heap.bodies["box1"].body_id, -1, lateralFriction=0.1)
     with pytest.raises(InterfaceError, match="not recorded acts: PyBullet's changeDynamics"):
         heap.keyframe()
+
+
+def test_keyframe_with_former_names_of_classes_is_read(heap):
+    state = heap.save(keyframe=True)
+    older = text = keyframes._unpacked(state.keyframe)
+    for former, present in FORMER_MODULES.items():
+        older = older.replace(f'"{present}:', f'"{former}:')
+    assert older != text
+    again = World.from_state(state._replace(keyframe=keyframes._packed(older)))
+    assert hash_later(again) == hash_later(heap)
+    again.close()
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from rpbi.render.mirror import Mirror
 from rpbi.samples import JointStateSample, WrenchSample
 from rpbi.world import World
 from rpbi.world.load_log import replay
-from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.command_log import apply_command
 
 MOON = SetGravity(gravZ=-1.62)
 JOINT = "lbr_iiwa_joint_2"

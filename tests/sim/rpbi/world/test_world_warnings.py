@@ -10,7 +10,7 @@ import pytest
 from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
 from rpbi.world import World
-from rpbi.world_warnings import world_warnings
+from rpbi.world.world_warnings import world_warnings
 
 ROOT = Path(__file__).resolve().parents[4]
 SHIPPED = [path for path in sorted(ROOT.glob("src/*/configs/**/*.yaml")) if "\ntimeStep:" in path.read_text()]

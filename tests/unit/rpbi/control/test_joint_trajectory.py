@@ -17,9 +17,9 @@ from rpbi.control.trajectories.request import (
     JointTolerance,
     TrajectoryRefusedError,
     TrajectoryRequest,
+    resolved_tolerances,
 )
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
-from rpbi.control.trajectories.tolerances import resolved_tolerances
 from rpbi.control.trajectories.trajectory import Knot, Trajectory
 from rpbi.urdf.joints import Joint
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from rpbi.control.streams.bounded_motion import BoundedMotion
-from rpbi.control.streams.jitter_buffer import JitterBuffer
-from rpbi.control.streams.target_stream import TargetStream
+from rpbi.control.jitter_buffer import JitterBuffer
+from rpbi.control.stream_motion import BoundedMotion
+from rpbi.control.target_stream import TargetStream
 
 DT_S = 0.002
 PERIOD = 10

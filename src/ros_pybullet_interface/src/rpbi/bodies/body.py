@@ -80,9 +80,9 @@ class Body:
         self._base = Pose()
         """PyBullet's last pose of the base, and the frame pose computed from it; cached since most bodies rest."""
         self.pose_follower: PoseFollower | None = None
+        """Moves a fixed base along the poses of `object_tf`; None if the base is set to them instead."""
         self._has_jumped = False
         """Whether it was warned that the body moves without a velocity."""
-        """Moves a fixed base along the poses of `object_tf`; None if the base is set to them instead."""
         self.dynamics_changes = 0
         """Number of changes of its dynamics; caches of them compare it."""
 

@@ -110,10 +110,10 @@ def link_index(body: Body, link: str) -> int:
     if body.is_soft:
         raise ValueError(f"'{body.name}' is soft: its material is set in its file and cannot be changed")
     known = [body.root_link, *map(body.link_name, body.link_indices)]
-    wanted = link or body.root_link
-    if wanted not in known:
-        raise UnknownNameError(f"link of {body.name}", wanted, known)
-    return next((index for index in body.joint_indices if body.link_name(index) == wanted), -1)
+    name = link or body.root_link
+    if name not in known:
+        raise UnknownNameError(f"link of {body.name}", name, known)
+    return next((index for index in body.joint_indices if body.link_name(index) == name), -1)
 
 
 def read_dynamics(body: Body, link: str) -> LinkDynamics:

@@ -61,18 +61,18 @@ def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dic
 def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yields key and message of each fault in the files that parts of an object name, by their keys."""
     meshes: dict[Mesh, str] = {}
-    for key, asked in parts.items():
-        if isinstance(asked, (CreateVisualShape, CreateCollisionShape)):
-            found = [(f"{key}.{inner}", message) for inner, message in mesh_problems(asked)]
-            yield from found
-            if asked.fileName is not None and not found and (use := _use_of(asked)) is not None:
-                meshes[Mesh(use, asked.fileName)] = f"{key}.fileName"
-        elif isinstance(asked, LoadURDF):
-            for message in urdf_problems(asked.fileName):
+    for key, part in parts.items():
+        if isinstance(part, (CreateVisualShape, CreateCollisionShape)):
+            problems_of_mesh = [(f"{key}.{inner}", message) for inner, message in mesh_problems(part)]
+            yield from problems_of_mesh
+            if part.fileName is not None and not problems_of_mesh and (use := _use_of(part)) is not None:
+                meshes[Mesh(use, part.fileName)] = f"{key}.fileName"
+        elif isinstance(part, LoadURDF):
+            for message in urdf_problems(part.fileName):
                 yield f"{key}.fileName", message
-        elif isinstance(asked, LoadSoftBody):
+        elif isinstance(part, LoadSoftBody):
             for inner in ("fileName", "simFileName"):
-                file = getattr(asked, inner)
+                file = getattr(part, inner)
                 if file is not None:
                     problems = soft_mesh_problems(file)
                     yield from ((f"{key}.{inner}", message) for message in problems)

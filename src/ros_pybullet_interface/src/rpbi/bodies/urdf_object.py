@@ -8,13 +8,12 @@ from custom_ros_tools.schema import HzOrOff, Switch
 from robot_model.urdf.document import UrdfDocument, mimics_of
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
-from rpbi.control.couplings import couple
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.joints import Joint, JointModel
+from rpbi.urdf.joints import Joint, JointModel, couple
 from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .body import Body

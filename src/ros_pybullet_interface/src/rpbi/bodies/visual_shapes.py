@@ -65,8 +65,8 @@ def body_shapes(body: Body) -> list[BodyShape]:
     """
     if body.is_soft:
         return []  # it reports its surface itself
-    found = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
-    return [part for data in found for part in _parts(body, data)]
+    rows = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
+    return [part for data in rows for part in _parts(body, data)]
 
 
 def link_pose(body: Body, link_index: int) -> Pose:

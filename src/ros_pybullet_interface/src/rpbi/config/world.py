@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 
@@ -18,9 +18,11 @@ from custom_ros_tools.schema import (
     HzOrOff,
     KeyedError,
     ListOf,
+    Name,
     NonNegative,
     Pixels,
     Position,
+    Positive,
     Quat,
     Seconds,
     Switch,
@@ -33,7 +35,6 @@ from custom_ros_tools.transforms import quat_of
 from robot_model.asset_files import find_folder
 from rpbi.geometry import Pose
 
-from .attachments import AttachmentConfig
 from .object_entry import FileOrOverrides
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
@@ -119,6 +120,34 @@ class ControlsConfig(ConfigModel):
     """The window with buttons, see docs/controls.md."""
 
     robot_name: Text | None = optional("Robot whose joints it shows first; without it, the first one.")
+
+
+class AttachmentPose(ConfigModel):
+    """Where an attachment is on a link, in the link's URDF frame."""
+
+    position: Position = Field((0.0, 0.0, 0.0), description="Its position.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation, x, y, z, w.")
+
+    @property
+    def pose(self) -> Pose:
+        """The same as a pose."""
+        return Pose(self.position, self.orientation)
+
+
+class AttachmentConfig(ConfigModel):
+    """An attachment: it holds a link of one body to a link of another, as a magnet or a tool changer does."""
+
+    name: Name = Field(description="Its name, by which it is detached.")
+    parent: Text = Field(description="The parent: an object, or one of its links as NAME/LINK.")
+    child: Text = Field(description="The child: likewise.")
+    kind: Literal["fixed", "ball"] = Field("fixed", description="`fixed` holds the pose, `ball` the position alone.")
+    parent_pose: AttachmentPose | None = optional(
+        "Its place on the parent; by default the present one, so that nothing moves."
+    )
+    child_pose: AttachmentPose | None = optional(
+        "Its place on the child; its origin if neither is given. If both are, they are pulled together."
+    )
+    max_force: Annotated[Positive, Unit("N")] | None = optional("Force that it breaks beyond; none by default.")
 
 
 class WorldConfig(ConfigModel):

@@ -9,7 +9,7 @@ from rpbi.urdf.joints import JointModel
 
 from .motion import JointMotion, Motion
 from .motors import POSITION_MODES, Motors, ResolvedCommand
-from .streams.target_stream import TargetStreams
+from .target_stream import TargetStreams
 
 
 class JointDrive:

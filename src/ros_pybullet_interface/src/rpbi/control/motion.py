@@ -57,7 +57,7 @@ class Motion(ABC):
 
         Returns:
             Set points of `joints`, or of fewer: the others keep theirs. They are the positions at the beginning of the
-            tick, and the velocities that lead to where the joints are to be at its end (see `Motors.track`).
+            tick, and the velocities that lead to the positions at its end (see `Motors.track`).
         """
 
     def halt(self, reason: str, measured: JointMotion) -> None:

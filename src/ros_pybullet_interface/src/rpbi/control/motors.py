@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import pybullet
 
 from rpbi.config.pybullet_args import CONTROL_MODES, IMPEDANCE_CONTROL
-from rpbi.control.joint_command import JointCommand
 from rpbi.engine.client import Client
 from rpbi.urdf.joints import Joint, JointModel
+
+from .joint_command import JointCommand
 
 log = logging.getLogger(__name__)
 
@@ -339,7 +340,7 @@ class Motors:
         self._pb.setJointMotorControl2(self._body_id, index, mode, **arguments)
 
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
-        """Returns the arguments of PyBullet's position motor of a joint beside its set point."""
+        """Returns the arguments of PyBullet's position motor of a joint, except its set point."""
         arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
         effort = self._model.effort_limit(joint)
         if self._enforce_effort_limits and math.isfinite(effort):

@@ -189,8 +189,8 @@ class PoseFollower:
         way, turn = minus(pose.position, position), rotation_between(quat, pose.quat_xyzw)
         # PyBullet moves a rotating base by d + r x d, so the velocity is the inverse of that
         across = cross(turn, way)
-        told = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
-        linear, angular = scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn)
+        straight = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
+        linear, angular = scaled(1.0 / self._dt_s, straight), scaled(1.0 / self._dt_s, turn)
         self._pb.resetBaseVelocity(self._body_id, self._velocity_before(linear), angular)
         self._is_moving = True
 

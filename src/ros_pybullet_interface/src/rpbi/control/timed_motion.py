@@ -10,7 +10,7 @@ from .motion import JointMotion, Motion
 TOLERANCES = {"rad": 0.01, "m": 0.001}
 """Largest error of a joint at the end by unit; beyond it, the motion fails."""
 REST = {"rad": 0.05, "m": 0.005}
-"""Speed below which a joint counts as having come to rest there, by unit and second."""
+"""Speed below which a joint counts as at rest at its goal, by unit and second."""
 SETTLING_S = 1.0
 """Longest time after the last set point until joints rest at the goal [s] of the world's time; then it fails."""
 LONGEST_S = 1e6

@@ -82,9 +82,9 @@ class Schedule:
     """
 
     def __init__(self, hz: float, dt_ns: int) -> None:
-        wanted = max(Fraction(hz).limit_denominator(1_000_000), SLOWEST_HZ) * dt_ns / NS_PER_S
-        self.clamped = wanted > 1
-        self._numerator, self._denominator = min(wanted, Fraction(1)).as_integer_ratio()
+        per_tick = max(Fraction(hz).limit_denominator(1_000_000), SLOWEST_HZ) * dt_ns / NS_PER_S
+        self.clamped = per_tick > 1
+        self._numerator, self._denominator = min(per_tick, Fraction(1)).as_integer_ratio()
 
     def is_due(self, tick: int, since: int | None = None) -> bool:
         """Returns whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""

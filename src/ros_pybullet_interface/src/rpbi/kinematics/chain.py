@@ -67,16 +67,16 @@ class BulletChain:
     def error(self, target: Target) -> np.ndarray:
         """Returns the error to the target: 3 distances [m], and a rotation vector [rad] if it has an orientation."""
         position, quat = self.pose()
-        way = [goal - here for goal, here in zip(target.position, position)]
+        error = [goal - present for goal, present in zip(target.position, position)]
         if target.quat_xyzw is not None:
-            way += rotation_between(quat, target.quat_xyzw)
-        return np.array(way)
+            error += rotation_between(quat, target.quat_xyzw)
+        return np.array(error)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:
         """Returns the residual of the link at m positions [rad or m]."""
         self.set(q)
-        way = self.error(target).tolist()
-        return Residual(math.hypot(*way[:3]), math.hypot(*way[3:]))
+        error = self.error(target).tolist()
+        return Residual(math.hypot(*error[:3]), math.hypot(*error[3:]))
 
     def jacobian(self, q: np.ndarray, rows: int) -> np.ndarray:
         """Returns how the link's position, and with 6 rows its orientation, changes with the joints, rows x m."""

@@ -100,10 +100,10 @@ class Search:
                 break
             start = (near + random.normal(0.0, SPREAD, len(q))).tolist()
             inside, _ = self._limits.wrap_to_limits(start, self._current)
-            for found, off in self._descent(self._fast_step, np.array(inside)):
-                if off.size <= most:
-                    if (other := np.abs(found - near).max(initial=0.0)) < distance:
-                        q, residual, distance = found, off, other
+            for candidate, candidate_residual in self._descent(self._fast_step, np.array(inside)):
+                if candidate_residual.size <= most:
+                    if (candidate_distance := np.abs(candidate - near).max(initial=0.0)) < distance:
+                        q, residual, distance = candidate, candidate_residual, candidate_distance
                     break
         return q, residual
 

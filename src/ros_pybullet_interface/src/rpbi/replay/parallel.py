@@ -1,4 +1,4 @@
-"""Recordings read by other processes: parts of one by several at once, or all of it with limited processor time."""
+"""Work on recordings in forks of this process: parts by several at once, or the whole with limited processor time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 
 def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[RecordedPart]]:
-    """Returns parts in at most so many groups of neighbours, of about the same number each."""
+    """Returns parts in at most `jobs` groups of neighbours of about the same size."""
     count = max(1, min(jobs, len(parts)))
     bounds = [len(parts) * index // count for index in range(count + 1)]
     return [parts[begin:end] for begin, end in zip(bounds, bounds[1:])]

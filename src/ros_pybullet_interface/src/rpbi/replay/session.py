@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
-from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import KEYFRAME, apply_command
+from rpbi.world.saved.command_log import KEYFRAME, RecordedCommand, apply_command
 from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.values import from_text
 
@@ -144,20 +143,20 @@ class Replay:
 
         Args:
             parts: Parts of the recording in their order, all by default. A part that follows the previous one continues
-                from there; others begin at their recorded keyframes. Every part but the last of a life ends with a
-                keyframe that is compared with the recorded one: if all parts agree, wherever they were replayed, so
-                does the whole.
+                from there; others begin at their recorded keyframes. Every part but the last one before a reset
+                ends with a keyframe that is compared with the recorded one: if all parts agree, wherever they were
+                replayed, so does the whole.
         """
-        difference, goes_on = None, False
+        difference, continues = None, False
         try:
             for turn, part in enumerate(self._recording.parts() if parts is None else parts):
-                if not goes_on:
+                if not continues:
                     try:
                         self._begin(part, turn == 0)
                     except InterfaceError as error:
                         self._left_out.append(f"from the keyframe before command {part.first} on: {error}")
                         continue
-                difference, goes_on = self._live(part)
+                difference, continues = self._run_part(part)
                 if difference is not None:
                     break
         finally:
@@ -172,8 +171,8 @@ class Replay:
         self._resets, self._agreement = part.resets, None
         self._observe(self._world, part.resets, self._world.read_rest())
 
-    def _live(self, part: RecordedPart) -> tuple[Difference | None, bool]:
-        """Runs through a part; returns the first state that differs, and whether the next part goes on from there."""
+    def _run_part(self, part: RecordedPart) -> tuple[Difference | None, bool]:
+        """Runs through a part; returns the first state that differs, and whether the next part can continue there."""
         commands = self._recording.commands.get(part.resets, {})
         done = part.first
         ends = [] if part.end is None else [Checkpoint(part.resets, commands[part.end].tick, part.end + 1, "")]

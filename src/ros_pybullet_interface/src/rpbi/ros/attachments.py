@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 
 from ros_pybullet_interface.msg import Attachment, Attachments
 from ros_pybullet_interface.srv import ApplyWrenchRequest, AttachRequest
-from rpbi.config.attachments import AttachmentConfig, AttachmentPose
+from rpbi.config.world import AttachmentConfig, AttachmentPose
 from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.world import World
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
-from rpbi.ros.reference.reference_world import CONTROLLERS, JOINT, reference_world
+from rpbi.reference.reference_world import CONTROLLERS, JOINT, reference_world
 from rpbi.world import World
 
 from .headers import FRAMES

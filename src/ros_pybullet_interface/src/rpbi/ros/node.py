@@ -24,9 +24,9 @@ from rpbi.ros.publishers.transforms import StaticFrames
 from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.world import World
-from rpbi.world.keyframes.building import KeyframeMaker
+from rpbi.world.keyframes.maker import KeyframeMaker
 from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
-from rpbi.world_warnings import world_warnings
+from rpbi.world.world_warnings import world_warnings
 
 from .attachments import AttachmentPublisher
 from .endpoints import serve

@@ -1,4 +1,4 @@
-"""Joints of a robot."""
+"""Joints of a robot as PyBullet has them, and the couplings of mimic joints."""
 
 from __future__ import annotations
 
@@ -19,6 +19,12 @@ from rpbi.engine.client import Client
 
 _TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
 _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
+
+
+_COUPLING_EFFORT = 1e6
+"""Largest effort by which a joint is made to follow another [N m or N]."""
+_COUPLING_ERP = 1.0
+"""Share of an error that is corrected in a step, relative to that of other joints."""
 
 
 @dataclass(frozen=True)
@@ -247,3 +253,19 @@ class JointModel:
             for index, position in positions.items()
             if not self.joints[index].allows(position)
         ]
+
+
+def couple(pb: Client, body_id: int, couplings: Mapping[int, Coupling]) -> None:
+    """Makes joints follow others in PyBullet from now on, as if by gears; their own motors are disabled.
+
+    Args:
+        couplings: The coupling of each, by joint index.
+    """
+    for index, (leader, multiplier, offset) in couplings.items():
+        pb.setJointMotorControl2(body_id, index, pybullet.VELOCITY_CONTROL, force=0.0)
+        gear = pb.createConstraint(
+            body_id, index, body_id, leader, pybullet.JOINT_GEAR, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        )
+        pb.changeConstraint(
+            gear, gearRatio=-multiplier, relativePositionTarget=offset, erp=_COUPLING_ERP, maxForce=_COUPLING_EFFORT
+        )

@@ -1,4 +1,4 @@
-"""The world: its contents, their loading, and its step."""
+"""A simulated world: its contents, how they are loaded, and its step."""
 
 from .world import World
 

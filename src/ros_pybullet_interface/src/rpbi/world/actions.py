@@ -1,4 +1,4 @@
-"""Actions on bodies beside their inputs; a replay repeats them from the record."""
+"""Actions on bodies other than inputs; a replay repeats them from the record."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from rpbi.plain_values import as_tuple
 
 
 class TimedGoal(NamedTuple):
-    """Where joints are to be, and when.
+    """Target positions of joints, and the time to reach them.
 
     Attributes:
         positions: Positions [rad or m], either all by joint index or all by name.
-        duration_s: In what time [s].
+        duration_s: Duration of the motion [s].
     """
 
     positions: Mapping[Any, float]
@@ -73,12 +73,12 @@ def _follow(body: Any, clock: Clock, recorded: RecordedTrajectory) -> Motion:
 
 
 class Action(NamedTuple):
-    """Something that can be done to a body.
+    """An action on a body.
 
     Attributes:
-        do: Does it, with the world's clock and a value.
-        value: Returns that value of what somebody gave, who may write mappings for named tuples. It raises ValueError
-            for what is neither.
+        do: Applies it to a body, with the world's clock and a value.
+        value: Returns that value from a given one, which may be a mapping in place of a named tuple. It raises
+            ValueError for anything else.
     """
 
     do: Callable[[Any, Clock, Any], Any]
@@ -108,4 +108,4 @@ ACTIONS: dict[str, Action] = {
 }
 """Actions on bodies by name."""
 MOVES_AT_ONCE = ("teleport", "set_joint_state")
-"""Those that put a body elsewhere, which attachments would pull back."""
+"""Actions that place a body elsewhere at once; attachments would pull it back."""

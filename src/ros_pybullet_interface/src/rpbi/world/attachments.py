@@ -13,7 +13,7 @@ from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from robot_model.geometry import Vector, scaled
 from rpbi.bodies.body import Body
 from rpbi.bodies.dynamics import link_index
-from rpbi.config.attachments import AttachmentConfig
+from rpbi.config.world import AttachmentConfig
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.geometry import LinkWrench, Pose, rotated
 
@@ -25,7 +25,7 @@ _UNLIMITED_N = 1e9
 
 @dataclass(frozen=True)
 class _End:
-    """Where an attachment is on a body: on which link by PyBullet's index, and its pose in the link's URDF frame."""
+    """One end of an attachment: a body, PyBullet's index of a link, and the end's pose in the link's URDF frame."""
 
     body: Body
     link: int
@@ -48,7 +48,7 @@ class _End:
 
 @dataclass(frozen=True)
 class _Attachment:
-    """An attachment that holds."""
+    """An attachment in force."""
 
     config: AttachmentConfig
     constraint: int
@@ -59,10 +59,10 @@ class _Attachment:
         return self.parent, self.child
 
     def force_and_torque(self, pb: Client) -> tuple[Vector, Vector]:
-        """Returns what the parent felt in the last step [N, N m], in the axes of the world."""
+        """Returns the force and torque on the parent in the last step [N, N m], in the axes of the world."""
         state = pb.getConstraintState(self.constraint)
         force: Vector = state[:3]
-        if len(state) == 3:  # a ball; PyBullet returns what the child felt
+        if len(state) == 3:  # a ball; PyBullet returns the force on the child
             return scaled(-1.0, force), (0.0, 0.0, 0.0)
         return force, rotated((self.parent.link_pose() @ self.parent.pose).quat_xyzw, state[3:])
 
@@ -73,7 +73,7 @@ class Attachments:
     Attributes:
         limited: Whether one of them breaks beyond a force, so that forces must be checked.
         changes: Number of times one was added or removed.
-        last_change: The last of it, in a sentence.
+        last_change: The last of these changes, as a sentence.
     """
 
     def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
@@ -85,7 +85,7 @@ class Attachments:
 
     @property
     def configs(self) -> tuple[AttachmentConfig, ...]:
-        """Those that hold now."""
+        """Configurations of the present attachments."""
         return tuple(each.config for each in self._holding.values())
 
     def add(self, config: AttachmentConfig) -> None:
@@ -117,7 +117,7 @@ class Attachments:
         self._change(_Attachment(config, self._constrain(config, parent, child), parent, child), "holds")
 
     def remove(self, name: str) -> None:
-        """Detaches.
+        """Removes an attachment.
 
         Raises:
             UnknownNameError: If there is no attachment of that name.
@@ -127,18 +127,18 @@ class Attachments:
         self._release(self._holding[name], "was detached")
 
     def release_body(self, name: str) -> None:
-        """Ends the attachments of a body that is about to go."""
+        """Removes the attachments of a body that is about to be removed."""
         for each in self._of(name):
             log.info("%s", self._release(each, f"ended, since '{name}' was removed"))
 
     def resume(self) -> None:
-        """Has all hold in a client into which the bodies have moved."""
+        """Creates all attachments again in the client into which the bodies have moved."""
         for name, each in self._holding.items():
             constraint = self._constrain(each.config, each.parent, each.child)
             self._holding[name] = replace(each, constraint=constraint)
 
     def refuse_moving(self, name: str) -> None:
-        """Refuses to put a body elsewhere that would be pulled back at once.
+        """Refuses to move a body that its attachments would pull back at once.
 
         Raises:
             ValueError: If it is attached to something.
@@ -148,14 +148,14 @@ class Attachments:
             raise ValueError(f"'{name}' is held by attachment {names}, which would pull it back; detach it first")
 
     def break_overloaded(self, tick: int) -> None:
-        """Breaks those whose force in the last step was beyond what they hold."""
+        """Breaks attachments whose force in the last step exceeded `max_force`."""
         for each in list(self._holding.values()):
             limit = each.config.max_force
             if limit is not None and (force := math.hypot(*each.force_and_torque(self._pb)[0])) > limit:
                 log.warning("%s", self._release(each, f"broke at tick {tick}: {force:.4g} N, it holds {limit:g} N"))
 
     def loads_on(self, name: str) -> Iterator[LinkWrench]:
-        """Yields what a body's links felt of attachments in the last step."""
+        """Yields the wrenches of attachments on a body's links in the last step."""
         for each in self._of(name):
             force, torque = each.force_and_torque(self._pb)
             for end, sign in zip(each.ends(), (1.0, -1.0)):
@@ -164,7 +164,7 @@ class Attachments:
                     yield LinkWrench(end.link, scaled(sign, force), scaled(sign, torque), point)
 
     def clear(self) -> None:
-        """Ends all, since all bodies are about to go."""
+        """Removes all attachments, since all bodies are about to be removed."""
         for each in self._holding.values():
             self._pb.removeConstraint(each.constraint)
         if self._holding:
@@ -177,7 +177,7 @@ class Attachments:
         return [each for each in self._holding.values() if name in (each.parent.body.name, each.child.body.name)]
 
     def _end(self, key: str, name: str) -> _End:
-        """Returns what NAME or NAME/LINK stands for.
+        """Returns the end on the body NAME, or on the link NAME/LINK.
 
         Raises:
             UnknownNameError: If there is no such body or link.
@@ -219,7 +219,7 @@ class Attachments:
         self._note(attachment, what)
 
     def _release(self, attachment: _Attachment, what: str) -> str:
-        """Ends an attachment, and returns its message."""
+        """Removes an attachment, and returns the sentence about it."""
         self._pb.removeConstraint(attachment.constraint)
         del self._holding[attachment.config.name]
         return self._note(attachment, what)

@@ -57,9 +57,9 @@ def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ..
 
 
 def _make(body: Body, config: Any) -> Sensor:
-    found: Any = SENSOR_TYPES.find(config.type)
-    with plugin_errors(found, f"making '{body.name}/{config.name}'"):
-        return found(body, config)
+    sensor_type: Any = SENSOR_TYPES.find(config.type)
+    with plugin_errors(sensor_type, f"making '{body.name}/{config.name}'"):
+        return sensor_type(body, config)
 
 
 class WorldContents:
@@ -90,9 +90,9 @@ class WorldContents:
         self.log: list[LogEntry] = []
         self._config = WorldConfig()
         self._filled_entries = 0
-        """Number of entries of the log from filling it."""
+        """Number of log entries made by `fill` or `rebuild`."""
         self._changed: set[str] = set()
-        """Names of bodies that came or went before these entries."""
+        """Names of bodies that had been added or removed before `rebuild`."""
 
     def body(self, name: str) -> Body:
         """Returns the body of a name.
@@ -128,7 +128,7 @@ class WorldContents:
         taken = {camera.topic_name for camera in self.cameras.values()}
         topic_name = config.name if FIRST_TOPIC_NAME in taken else FIRST_TOPIC_NAME
         if topic_name in taken:
-            message = f"'{topic_name}' is what the topics of the first camera are called; use another name"
+            message = f"topics of the first camera are named '{topic_name}'; use another name"
             raise ConfigError([Problem(file or config.name, "name", message)])
         camera = RgbdSensor(config, self.bodies, self._clock, topic_name)
         self._insert_camera(camera)
@@ -147,18 +147,18 @@ class WorldContents:
             self._append(LogEntry(name, "remove"))
             self.stepping[:] = [each for each in self.stepping if each.name != name]
         self.sensors.remove(name)
-        self.inputs = {slot: taken for slot, taken in self.inputs.items() if slot.split("/")[0] != name}
+        self.inputs = {slot: each for slot, each in self.inputs.items() if slot.split("/")[0] != name}
 
     def change_dynamics(self, name: str, link: str, change: ChangeDynamics) -> None:
-        """Changes how a link behaves, the root if its name is empty; see `World.change_dynamics`."""
+        """Changes the dynamics of a link, the root link if the name is empty; see `World.change_dynamics`."""
         self._append(LogEntry(name, "dynamics", (link, change)))
 
     def change_physics(self, change: PhysicsChange) -> None:
-        """Changes gravity or how contacts and joints are solved; see `World.change_physics`."""
+        """Changes gravity, or the solver of contacts and joints; see `World.change_physics`."""
         self._append(LogEntry("", "physics", change))
 
     def clear(self) -> None:
-        """Removes everything but the cameras and the inputs, which wait for `fill`."""
+        """Removes everything but cameras and inputs, which `fill` or `rebuild` replaces."""
         self.attachments.clear()
         for body in self.bodies.values():
             body.remove()
@@ -169,10 +169,10 @@ class WorldContents:
         self.contacts.invalidate()
 
     def fill(self, loaded: LoadedWorld) -> None:
-        """Puts in what is configured; cameras that are there already stay, with the pose that they have.
+        """Adds everything that is configured; cameras that exist already stay, with their present poses.
 
         Raises:
-            ConfigError: If something cannot be loaded; then all of the rest is there.
+            ConfigError: If something cannot be loaded; everything else is added.
         """
         inputs_before = self.inputs
         self._config = loaded.config
@@ -188,30 +188,30 @@ class WorldContents:
         problems += self._fill_in_attachments(loaded)
         problems += self._fill_in_cameras(loaded)
         self._filled_entries, self._changed = len(self.log), set()
-        # Those that were there before stay till their like has come, for who puts into them meanwhile
-        self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
+        # Former inputs stay until here, since other threads may put values into them meanwhile
+        self.inputs = {slot: each for slot, each in self.inputs.items() if each is not inputs_before.get(slot)}
         if problems:
             raise ConfigError(problems)
 
     def moved_cameras(self) -> Iterator[tuple[str, Pose]]:
-        """Yields slots and poses of the cameras that are not where the configuration has them."""
+        """Yields slot and pose of each camera whose pose is not the configured one."""
         for name, camera in self.cameras.items():
             if camera.pose is not None and camera.pose != self._configured_pose(camera):
                 yield f"{name}/pose", camera.pose
 
     def move_cameras_back(self) -> None:
-        """Has all cameras forget their poses, but for those of the configuration."""
+        """Sets all cameras to their configured poses, those without one to none."""
         for camera in self.cameras.values():
             camera.pose = self._configured_pose(camera)
 
     def rebuild(self, recipe: Recipe, changed: Iterable[str]) -> None:
-        """Replaces all by what a recipe builds, bodies in a fresh client unless that has a window.
+        """Replaces all contents by those of a recipe; without a window, the bodies are built in a fresh client.
 
         Args:
-            changed: Names of bodies that came or went since it was filled.
+            changed: Names of bodies that were added or removed since `fill`.
 
         Raises:
-            ConfigError: If something cannot be loaded; then the rest is missing.
+            ConfigError: If something cannot be loaded; then everything after it is missing.
             InterfaceError: If PyBullet refuses.
         """
         inputs_before, cameras_before = self.inputs, self.cameras
@@ -231,10 +231,10 @@ class WorldContents:
             else:
                 self.add_camera(config)
         self._changed, self._filled_entries = set(changed), len(self.log)
-        self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
+        self.inputs = {slot: each for slot, each in self.inputs.items() if each is not inputs_before.get(slot)}
 
     def changed_names(self) -> set[str]:
-        """Returns the names of all bodies that came or went since it was filled."""
+        """Returns the names of all bodies that were added or removed since `fill`."""
         new = (entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove"))
         return {*self._changed, *new}
 

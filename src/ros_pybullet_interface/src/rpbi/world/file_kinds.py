@@ -1,4 +1,4 @@
-"""Recognises kinds of files by their keys, for errors about a file in the place of another kind."""
+"""Recognises the kind of a file by its keys, to report a file that is named where another kind belongs."""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -101,7 +101,7 @@ def check_is_listed_right(data: Mapping[str, Any], file: str, section: str, know
 
 
 def _section_of(data: Mapping[str, Any]) -> str:
-    """Returns the list for which a file is, by its keys; empty if they do not say."""
+    """Returns the list in which a file belongs by its keys; empty if they do not decide it."""
     if "loadURDF" in data:
         return "robots" if any(key in data for key in _OF_ROBOTS) else "urdfs"
     for key, section in (

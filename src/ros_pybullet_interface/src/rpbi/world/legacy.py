@@ -21,7 +21,7 @@ LEGACY_KEYS: dict[str, dict[str, str]] = {
         "setJointMotorControlArrayParameters": "setJointMotorControlArray",
     },
 }
-"""By section: an old spelling and the key that it means."""
+"""By section: present keys by their old spellings."""
 
 FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
 """Lists of objects that may follow a TF frame; without `tf_id` they stay where they are, as in the release."""
@@ -37,7 +37,7 @@ _OBJECT_TF = {
     "object_tf.broadcast_tf": "the frame that it follows is on TF already",
     "object_tf.tf_frame_id": "the frame that it follows is on TF already",
 }
-"""Keys before `tf_id`; the last release no longer reads them."""
+"""Keys from before `tf_id`; the last release no longer reads them."""
 
 NO_EFFECT: dict[str, dict[str, str]] = {
     MAIN: {
@@ -55,11 +55,11 @@ NO_EFFECT: dict[str, dict[str, str]] = {
     **dict.fromkeys(FOLLOWERS[1:], _OBJECT_TF),
     "dynamic_objects": {"object_tf": "physics moves it; write basePosition and baseOrientation"},
 }
-"""By section: a key that older worlds carry and that does nothing here, and what to do instead."""
+"""By section: keys of older worlds that have no effect here, and what to do instead."""
 
 
 def old_keys(section: str) -> dict[str, str]:
-    """Returns what to do about each key of older worlds, by key; `object_tf.offset` is inside of a mapping."""
+    """Returns advice on each key of older worlds, by key; `object_tf.offset` is a key of the mapping `object_tf`."""
     spellings = {old: f"Old spelling: write {new}." for old, new in LEGACY_KEYS.get(section, {}).items()}
     return {**spellings, **{key: f"No effect: {advice}." for key, advice in NO_EFFECT.get(section, {}).items()}}
 

@@ -1,4 +1,4 @@
-"""The log of all that came into a world, and its replay."""
+"""The load log of a world: all changes of its contents, from which it can be rebuilt."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,9 +19,9 @@ from rpbi.plugins import plugin_errors, raise_plugin_error
 
 
 def refuse_non_finite(body: Body) -> None:
-    """Refuses a rigid body with numbers that are not finite, which would spread to all that it touches.
+    """Refuses a rigid body with numbers that are not finite, which would spread to all bodies that it touches.
 
-    They come from URDFs with `nan` in them, which PyBullet loads without a word, and from sizes that are too large.
+    They come from URDFs with `nan`, which PyBullet loads without a warning, and from sizes that are too large.
 
     Raises:
         PhysicsError: If there is one; it names the link.
@@ -56,17 +56,17 @@ def _are_finite(numbers: Iterable[float]) -> bool:
 _SAME_EVERY_TIME: dict[str, Any] = {
     "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
     "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; one global of the process that outlives its client
-    "numSubSteps": 0,  # the default, too; it outlives a reset
-    "enableFileCaching": 1,  # the same
+    "numSubSteps": 0,  # also the default; it outlives a reset
+    "enableFileCaching": 1,  # likewise
 }
 
 
 class LogEntry(NamedTuple):
-    """One thing that was done to a world; picklable.
+    """A change of the contents of a world; picklable.
 
     Attributes:
-        name: The body it was done to, empty for the world itself.
-        what: `world` (set it up), `physics` (change them), `add`, `dynamics` (change them) or `remove`.
+        name: The body that is changed, empty for the world itself.
+        what: The kind of change: `world` (set-up), `physics`, `add`, `dynamics` or `remove`.
         arguments: The WorldConfig of `world`; the PhysicsChange of `physics`; type and configuration of a body for
             `add`; link (empty for the root) and ChangeDynamics for `dynamics`; None for `remove`.
     """
@@ -77,10 +77,10 @@ class LogEntry(NamedTuple):
 
 
 class LoadLogReader:
-    """Reads a load log bit by bit.
+    """Reads a load log incrementally.
 
     Args:
-        log: The log, which may grow at any time, and begins anew when its world is reset.
+        log: The log, which may grow at any time, and starts again when its world is reset.
     """
 
     def __init__(self, log: Sequence[LogEntry]) -> None:
@@ -174,8 +174,8 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
 def change_physics(pb: Client, bodies: Iterable[Body], change: PhysicsChange) -> None:
     """Changes gravity, or parameters of the engine.
 
-    Sleeping bodies would not notice gravity, so they wake up; but in maximal coordinates PyBullet would let them sleep
-    thereafter even if they may not.
+    Sleeping bodies would not notice a change of gravity, so they are woken. Those in maximal coordinates are not:
+    PyBullet would let them sleep afterwards, even where sleep is disabled.
     """
     arguments = change.kwargs()
     if isinstance(change, SetGravity):

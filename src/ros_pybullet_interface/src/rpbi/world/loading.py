@@ -53,11 +53,11 @@ class CameraConfig(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadedWorld:
-    """A world that has been read and found valid; picklable.
+    """The validated configuration of a world; picklable.
 
     Attributes:
         config: Keys of the main file.
-        objects: The objects, in the order in which they are loaded.
+        objects: The objects, in the order of loading.
         cameras: The cameras, the first one first.
         file: The main file, `"~config"` if it came from the parameter server.
     """
@@ -86,7 +86,7 @@ def load_world(
 
 
 def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:
-    """Does the same as `load_world` with a main file that has been read already; its content is not changed.
+    """Does the same as `load_world` with the content of a main file, which is not changed.
 
     A file of the name `"~config"`, which has no folder, came from the parameter server.
     """
@@ -106,12 +106,12 @@ def robots_description(path: str, names: Sequence[str]) -> str:
     """
     configs = (each.config for each in load_world(path).objects)
     bases = {each.name: each.loadURDF for each in configs if isinstance(each, RobotConfig)}
-    here, robots = Pose(), {}
+    origin, robots = Pose(), {}
     for name in names:
         if name not in bases:
             raise UnknownNameError("robot", name, bases)
         base = bases[name]
-        pose = Pose(base.basePosition or here.position, base.baseOrientation or here.quat_xyzw)
+        pose = Pose(base.basePosition or origin.position, base.baseOrientation or origin.quat_xyzw)
         robots[name] = base.fileName, pose
     return joined_for_ros(robots)
 
@@ -130,7 +130,11 @@ class _Reader:
         """Parts of objects that may name files, with the file that they are in."""
 
     def read(self) -> LoadedWorld:
-        """Returns the world, or raise a ConfigError with all problems."""
+        """Returns the world.
+
+        Raises:
+            ConfigError: With all problems.
+        """
         if isinstance(self._data, Mapping):
             check_is_world(self._data, self._file)
         try:
@@ -139,17 +143,17 @@ class _Reader:
         except ConfigError as error:
             self._problems += error.problems
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
-        further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
+        further_cameras = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
-            # Else the world finds these itself, when it is built
+            # Without problems so far, these are reported when the world is built
             for file, parts in self._parts:
                 self._problems += [Problem(file, key, message) for key, message in file_problems(parts)]
             raise ConfigError(self._problems)
         config = WorldConfig.from_main_file(content)
-        first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
+        first_camera = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
         if config.step_pybullet_manually:
             log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)
-        return LoadedWorld(config, objects, self._file, first + further)
+        return LoadedWorld(config, objects, self._file, first_camera + further_cameras)
 
     def _objects(self) -> Iterator[ObjectConfig]:
         for section in object_sections():
@@ -164,7 +168,7 @@ class _Reader:
         is_first = self._data.get("rgbd_sensor") is None
         for data, file, _ in self._files(CAMERAS):
             if not is_first and name_in(data) == FIRST_TOPIC_NAME:
-                message = f"'{FIRST_TOPIC_NAME}' is what the topics of the first camera are called; use another name"
+                message = f"topics of the first camera are named '{FIRST_TOPIC_NAME}'; use another name"
                 self._problems.append(Problem(file, "name", message))
             is_first = False
             with self._noting_problems(file):
@@ -195,7 +199,7 @@ class _Reader:
             self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
-        """Notes the name of an object, so that no other has it."""
+        """Notes the name of an object; reports a name that another object has."""
         name = name_in(data)
         if name in self._owner_of:
             message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
@@ -206,11 +210,11 @@ class _Reader:
     def _search_paths(self) -> tuple[str, ...]:
         """Returns the search paths that exist, also when something else in the main file is wrong."""
         given = self._data.get("setAdditionalSearchPath")
-        found: list[str] = []
+        folders: list[str] = []
         for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
-            with contextlib.suppress(ValueError):  # it is reported with the main file
-                found += [find_folder(name, self._path)] if isinstance(name, str) and name else []
-        return tuple(found)
+            with contextlib.suppress(ValueError):  # reported with the main file
+                folders += [find_folder(name, self._path)] if isinstance(name, str) and name else []
+        return tuple(folders)
 
 
 def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:

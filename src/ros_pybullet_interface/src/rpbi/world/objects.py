@@ -16,7 +16,7 @@ from .legacy import modernise
 _Model = TypeVar("_Model", bound=ConfigModel)
 
 RESERVED_NAME = "world"
-"""No object may have it: `rpbi/world` is the frame that all poses are in."""
+"""No object may have this name: `rpbi/world` is the frame of all poses."""
 OWN_TYPES = Body.section
 """List of the main file for objects whose files name their type."""
 TYPE = "type"
@@ -25,13 +25,13 @@ TYPE = "type"
 
 @dataclass(frozen=True)
 class ObjectConfig:
-    """One object to be put into a world.
+    """One object of a world.
 
     Attributes:
         type: Key of its class in the table of body types, or `module:Class`.
         config: Its validated configuration.
         file: The file it came from, as the user wrote it.
-        path: Where that file is; empty if there is none.
+        path: Path of that file; empty if there is none.
     """
 
     type: str
@@ -54,7 +54,8 @@ def type_of(section: str, data: Any) -> str:
 
     Args:
         section: The list, such as `robots`.
-        data: Content of the object's file; if it is no mapping, any type of the list, whose check then fails.
+        data: Content of the object's file. If it is not a mapping, some type of the list is returned; its check then
+            fails.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:
@@ -98,8 +99,8 @@ def _section_and_model(kind: str, file: str) -> tuple[str, type[BodyConfig]]:
         message = f"unknown object type '{kind}'{hint(kind, BODY_TYPES)}" if kind else known
         raise ConfigError([Problem(file, TYPE, message)])
     try:
-        found = BODY_TYPES.find(kind)
-        return found.section, config_of(found, BodyConfig)
+        body_type = BODY_TYPES.find(kind)
+        return body_type.section, config_of(body_type, BodyConfig)
     except ValueError as error:
         raise ConfigError([Problem(file, TYPE, str(error))]) from None
 

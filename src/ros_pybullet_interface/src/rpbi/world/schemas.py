@@ -24,16 +24,16 @@ WORLD = "world"
 """Name of the main file among the kinds of YAML files."""
 _FILE_NAME = {"type": "string", "minLength": 1}
 _ENTRY = "entry"
-"""Name of the definition of what a list of the main file has."""
+"""Name of the definition of an entry of a list in the main file."""
 
 
 def sections() -> dict[str, type[ConfigModel]]:
-    """Returns the models of the files that the lists of the main file name, by list."""
+    """Returns the model of the files in each list of the main file, by list."""
     return {**object_sections(), CAMERAS: RgbdSensorConfig}
 
 
 def kind_of(section: str) -> str:
-    """Returns what a file of a list is called, such as `robot` for `robots`."""
+    """Returns the kind of the files in a list, such as `robot` for `robots`."""
     return section.removesuffix("s")
 
 
@@ -75,7 +75,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _of_any_type(schema: Schema) -> Schema:
-    """Returns the schema of files that name their type, and with it their further keys."""
+    """Returns the schema of files that name their own type, which may have further keys."""
     known = {"type": "string", "enum": list(BODY_TYPES)}
     own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     kind = {"description": "Its class, as `module:Class`, or the name of a type.", "anyOf": [own, known]}
@@ -109,7 +109,7 @@ def _with_entry(schema: Schema) -> Schema:
 
 
 def _optional(schema: Schema, root: Schema) -> Schema:
-    """Returns a schema of the same keys of which none is required, nor any in mappings inside of them but for lists."""
+    """Returns a schema of the same keys, all optional, also in nested mappings, except in lists."""
     result = {key: value for key, value in schema.items() if key != "required"}
     if "properties" in schema:
         result["properties"] = {key: _optional(value, root) for key, value in schema["properties"].items()}
@@ -122,7 +122,7 @@ def _optional(schema: Schema, root: Schema) -> Schema:
 
 
 def _required(schema: Schema, root: Schema) -> Schema:
-    """Returns the required keys of a schema of mappings, without the rest."""
+    """Returns the part of a mapping's schema that makes keys required."""
     mapping = mapping_in(schema, root) if "items" not in schema else None
     if mapping is None:
         return {}

@@ -25,7 +25,7 @@ class _Scheduled:
         self.schedule_from(tick, dt_ns)
 
     def schedule_from(self, tick: int, dt_ns: int) -> None:
-        """Has it due by the sensor's rate after a tick; one that is off stays with the old times."""
+        """Schedules the sensor by its rate after a tick; a sensor that is off keeps its schedule."""
         if self.sensor.hz:
             self.schedule = Schedule(self.sensor.hz, dt_ns)
             self.next_tick = self.schedule.next_due(tick)
@@ -55,10 +55,10 @@ class SensorSchedule:
         self.watching: list[Sensor] = []
         """Sensors that act at every tick."""
         self._queue: list[tuple[int, int, _Scheduled]] = []
-        """A heap of when each sensor is due, in which order it came, and the sensor."""
+        """A heap with the tick at which each sensor is due, the order in which it was added, and the sensor."""
         self._count = 0
         self._warned: set[tuple[str, float]] = set()
-        """Names and rates of sensors that were warned of; a reset is no reason to do so again."""
+        """Names and rates of sensors in warnings so far; a reset does not repeat them."""
 
     def __contains__(self, name: str) -> bool:
         """Whether a body or camera of that name was added, with sensors or without."""
@@ -91,7 +91,7 @@ class SensorSchedule:
         self._rebuild()
 
     def remove(self, name: str) -> None:
-        """Forgets the sensors of a body."""
+        """Removes the sensors of a body."""
         del self._scheduled[name]
         self._rebuild()
 
@@ -101,13 +101,13 @@ class SensorSchedule:
         return any(each.sensor.keeps_state for each in self._all())
 
     def restart(self) -> None:
-        """Has all due as in the beginning, at tick 0."""
+        """Schedules all sensors as at tick 0."""
         for each in self._all():
             each.read_tick = -1
         self.reschedule()
 
     def reschedule(self) -> None:
-        """Has all due by their rates from the present tick on, whatever else a file has set.
+        """Schedules all sensors by their rates from the present tick on, whatever a file has set.
 
         Raises:
             ValueError: If a rate is not finite, or negative.
@@ -119,7 +119,7 @@ class SensorSchedule:
         self._rebuild()
 
     def clear(self) -> None:
-        """Forgets all."""
+        """Removes all sensors."""
         self._scheduled.clear()
         self._rebuild()
 
@@ -166,7 +166,7 @@ class SensorSchedule:
         return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        """Returns the samples that would have been due between two ticks if the world had not been stopped."""
         now = self._clock.tick
         return _present(each.read(now) for each in self._rated() if each.schedule.is_due(tick, since))
 
@@ -180,7 +180,7 @@ class SensorSchedule:
             yield from scheduled
 
     def _rated(self) -> Iterator[_Scheduled]:
-        """Yields the sensors that are to be read now and then."""
+        """Yields the sensors that have a rate and are wanted."""
         return (each for each in self._all() if each.sensor.hz and each.sensor.wanted)
 
 

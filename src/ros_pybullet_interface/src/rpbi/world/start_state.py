@@ -1,4 +1,4 @@
-"""The start of a world, which it goes back to without loading its bodies again."""
+"""The start of a world, to which it returns without loading its bodies again."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .contents import WorldContents
 from .saved.command_log import MAX_KEPT, CommandLog, WorldCommand
 
 MAX_LOGGED = 1_000
-"""Number of entries of the load log beyond which the world is built anew, so that the log does not grow for ever."""
+"""Number of entries of the load log beyond which the world is built again, so that the log stays short."""
 MAX_FREE = 1
-"""Number of free bodies beyond which the world is built anew."""
+"""Number of free bodies beyond which the world is built again."""
 APART_M = 1_000.0
 """Distance of two bodies without contacts, from base to base [m]."""
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 UNDONE = ("halt", "pause", "move", "stop_motion", "set_joint_state")
-"""Commands that the saved state undoes, whatever their value."""
+"""Commands that restoring the state undoes, whatever their value."""
 _SLEEPING = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 _FIELDS = {to_camel(field): field for field in LinkDynamics._fields}
 
@@ -41,13 +41,13 @@ class DynamicsChange(NamedTuple):
 class StartState:
     """The state that a world starts in, before its first tick.
 
-    PyBullet's `restoreState` leads back to it to the last bit: there are no contacts yet whose history it would lose.
-    It knows neither set points of motors, which robots restart, nor dynamics, which are changed back. Whatever else
-    happened to a world makes it unreachable in this way.
+    PyBullet's `restoreState` restores it to the last bit, since there are no contacts yet whose history it would lose.
+    It restores neither set points of motors, which robots restart, nor dynamics, which are changed back. After any
+    other change the world has to be built again.
 
-    Two things of PyBullet are out of reach: sleep, and the order of pairs in its search for contacts, by which it
-    solves them. The order shows with several free bodies: one of 164 random heaps moved in another way. Such worlds do
-    not suit.
+    Two states of PyBullet cannot be restored: sleep, and the order of pairs in its search for contacts, in which it
+    solves them. The order matters with several free bodies: one of 164 random heaps moved differently. Such worlds are
+    not suitable.
 
     Args:
         pb: The client.
@@ -64,7 +64,7 @@ class StartState:
 
     @staticmethod
     def suits(contents: WorldContents) -> bool:
-        """Returns whether a world has nothing that keeps a state which PyBullet does not know."""
+        """Returns whether a world is suitable: nothing in it has a state that cannot be restored."""
         bodies = contents.bodies.values()
         others = (is_foreign(each) or each.is_soft or _is_rigid(each) or _may_sleep(each) for each in bodies)
         if any(others) or contents.attachments.configs or contents.sensors.keep_state:
@@ -72,13 +72,13 @@ class StartState:
         return sum(map(_is_free, bodies)) <= MAX_FREE
 
     def restore(self, commands: CommandLog) -> bool:
-        """Goes back to the start.
+        """Returns the world to its start.
 
         Args:
             commands: All commands since then.
 
         Returns:
-            Whether it could; otherwise the world has to be built anew.
+            Whether that succeeded; otherwise the world has to be built again.
         """
         if len(self._contents.log) - self._logged > MAX_LOGGED or commands.count > MAX_KEPT:
             return False
@@ -93,11 +93,11 @@ class StartState:
         return all([body.restart() for body in self._contents.bodies.values()])
 
     def close(self) -> None:
-        """Has PyBullet forget the state."""
+        """Removes the state from PyBullet."""
         self._pb.removeState(self._state_id)
 
     def _end_contacts(self) -> None:
-        """Takes all bodies apart, so that PyBullet forgets their contacts, which `restoreState` would leave."""
+        """Moves all bodies apart, so that PyBullet drops their contacts, which `restoreState` would keep."""
         for index, body in enumerate(self._contents.bodies.values()):
             self._pb.resetBasePositionAndOrientation(body.body_id, (0.0, 0.0, APART_M * (index + 1)), NO_TURN)
         self._pb.performCollisionDetection()
@@ -105,7 +105,7 @@ class StartState:
     def _undoing(self, commands: CommandLog) -> Iterator[DynamicsChange | None]:
         """Yields the changes of dynamics that undo those of commands, None for a command that cannot be undone."""
         for command in commands.since(0)[1]:
-            if command.what == "dynamics" and not command.tick:  # later ones may have had contacts made anew
+            if command.what == "dynamics" and not command.tick:  # a later change may have renewed contacts
                 yield self._undo_dynamics(command.name, command.value)
             elif not self._is_undone(command):
                 yield None

@@ -16,11 +16,10 @@ import pybullet
 from custom_ros_tools.errors import InterfaceError, UnknownNameError, shortened
 from rpbi.bodies import Body, BodyConfig
 from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
-from rpbi.config.attachments import AttachmentConfig
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import RgbdSensorConfig
-from rpbi.config.world import WORLD_FRAME
+from rpbi.config.world import WORLD_FRAME, AttachmentConfig
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input
@@ -34,12 +33,11 @@ from .actions import ACTIONS, MOVES_AT_ONCE
 from .contents import WorldContents, state_hash
 from .forks.prediction import Candidate, Cost, Prediction, PredictionJob
 from .forks.shadow import Fork, Shadow
-from .keyframes.building import FreshClient
 from .keyframes.keyframe import Keyframe, difference, move, refuse
 from .loading import LoadedWorld, load_object, load_world
 from .saved.command_log import CommandLog, WorldCommand
 from .saved.description import WorldDescription, describe
-from .saved.recipe import Recipe
+from .saved.recipe import FreshClient, Recipe
 from .saved.state import MAX_TICKS, WorldState
 from .saved.values import trusting
 from .start_state import StartState
@@ -49,7 +47,7 @@ log = logging.getLogger(__name__)
 IDLE_ROW_S = 0.0004
 """Wall time that idle ticks in a row are to take [s] before the world looks for inputs again."""
 MAX_IDLE_ROW = 20
-"""Largest number of them, since the coming ones may take much longer than the last."""
+"""Largest number of idle ticks in a row, since the next ones may take much longer than the last."""
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -58,7 +56,7 @@ _Result = TypeVar("_Result")
 def _recorded(
     method: Callable[Concatenate[World, _Arguments], _Result],
 ) -> Callable[Concatenate[World, _Arguments], _Result]:
-    """Marks a method whose effect on PyBullet the commands repeat; see `ChangeWatch`."""
+    """Marks a method whose changes of PyBullet are repeated by recorded commands; see `ChangeWatch`."""
 
     @wraps(method)
     def call(world: World, *arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
@@ -79,7 +77,7 @@ class World:
     other threads reach it.
 
     Args:
-        loaded: The validated configuration of the world and of all that is in it at the start.
+        loaded: The validated configuration of the world and of its contents at the start.
         simulated_time: Whether stamps are simulated time, else wall time.
         connection_mode: PyBullet's connection mode; by default that of the configuration.
 
@@ -131,7 +129,7 @@ class World:
         """Hash of the state when it was built, or was reset the last time."""
         self._description = self._built_from = ""
         self._start: StartState | None = None
-        """Its start, once a reset without rebuilding was asked for."""
+        """Its start, since the first reset without rebuilding."""
         self._keyframe, self._keyframe_tick = "", 0
         """Its last keyframe since it was built or reset, and its tick."""
 
@@ -150,7 +148,7 @@ class World:
 
         Args:
             description: The description.
-            trust: Packages that it may import, beside `rpbi` and those that this program's configurations have used,
+            trust: Packages that it may import, besides `rpbi` and those that this program's configurations have used,
                 for types of the user's own. None: any package, for a recording that this program made.
 
         Raises:
@@ -163,7 +161,7 @@ class World:
     def from_state(
         cls, state: WorldState | str | Path, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS
     ) -> World:
-        """Builds a world, without a window, and brings it to a saved state.
+        """Builds a world, without a window, and restores a saved state in it.
 
         Args:
             state: The state, or a file that `WorldState.write` wrote.
@@ -172,7 +170,7 @@ class World:
 
         Raises:
             ConfigError: If the file cannot be read, or the world cannot be built here.
-            InterfaceError: If the state is too old, or the world does not come to the same state here, for instance
+            InterfaceError: If the state is too old, or the world does not reach the same state here, for instance
                 with another PyBullet.
         """
         state = state if isinstance(state, WorldState) else WorldState.read(state)
@@ -241,12 +239,12 @@ class World:
         """
         self._contents.remove(name)
         self._pushed.pop(name, None)
-        self.clock.bump_stamp()  # another object of its name, perhaps elsewhere, may come within this tick
+        self.clock.bump_stamp()  # another object of that name may be added within this tick, perhaps elsewhere
         self._note(name, "remove", None)
-        self.apply_inputs()  # what still waits for it must not meet a later body of the same name
+        self.apply_inputs()  # waiting inputs must not reach a later body of the same name
 
     def dynamics(self, object_name: str) -> LinkDynamics:
-        """Returns how an object or a link behaves in contact and motion.
+        """Returns the dynamics of an object or a link.
 
         Args:
             object_name: `NAME`, or `NAME/LINK` for one of its links.
@@ -373,8 +371,8 @@ class World:
         inputs = self.inputs
         if slot not in inputs:
             raise UnknownNameError("input", slot, list(inputs))
-        taken = inputs[slot]
-        self.mailbox.put(slot, taken.check(value), taken.merge, generation)
+        receiver = inputs[slot]
+        self.mailbox.put(slot, receiver.check(value), receiver.merge, generation)
 
     @property
     def inputs(self) -> dict[str, Input]:
@@ -398,13 +396,13 @@ class World:
 
     @property
     def is_connected(self) -> bool:
-        """Whether PyBullet is still there: its window may have been closed, or its server have ended."""
+        """Whether PyBullet is still connected: its window may have been closed, or its server may have ended."""
         return bool(self.pb.isConnected())
 
     def apply_inputs(self) -> None:
-        """Acts on what came since the last time, unless it was meant for a body that has gone.
+        """Applies the inputs that came since the last call, except those for bodies that were removed meanwhile.
 
-        Every step does so first; a world that stands still needs it for the poses that come from TF.
+        Every step begins with it; a stopped world needs it for poses from TF.
         """
         for slot, value in self.mailbox.drain().items():
             if slot in self.inputs:
@@ -412,7 +410,7 @@ class World:
 
     @_recorded
     def apply_input(self, slot: str, value: Any) -> None:
-        """Acts on a value that was checked, and notes it."""
+        """Applies a checked value, and logs it as a command."""
         body = self.bodies.get(slot.split("/")[0])
         with plugin_errors(body or self, f"applying '{slot}' at tick {self.clock.tick}"):
             self.inputs[slot].apply(value)
@@ -464,7 +462,7 @@ class World:
     def run_idle(self, ticks: float, end_s: float) -> int:
         """Advances by ticks at which physics alone acts: no input, body, wrench, attachment or sensor.
 
-        It is what as many calls of `step` do, at less expense. An input that comes meanwhile acts after a few ticks.
+        It does the same as that many calls of `step`, in less time. A new input acts after a few ticks.
 
         Args:
             ticks: Largest number of ticks.
@@ -499,37 +497,37 @@ class World:
         return self._sensors.read_rest()
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        """Returns the samples that would have been due between two ticks if the world had not been stopped."""
         return self._sensors.read_idle(tick, since)
 
     @_recorded
     def halt(self, reason: str) -> None:
-        """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
+        """Aborts what bodies do over several ticks, such as timed motions."""
         for body in self.bodies.values():
             body.halt(reason)
         self._note("", "halt", reason)
 
     @_recorded
     def pause(self, reason: str) -> None:
-        """Breaks off what cannot wait until the world, which is stopped, runs again."""
+        """Aborts what cannot wait until the stopped world runs again."""
         for body in self.bodies.values():
             body.pause(reason)
         self._note("", "pause", reason)
 
     def reset(self, rebuild: bool = True) -> None:
-        """Makes the world what it was when it was built, to the last bit; stamps go on.
+        """Restores the world as it was built, to the last bit; stamps continue.
 
-        Objects that came later go, those that were removed come back. Motions end with a reason; inputs that wait are
-        dropped. Cameras stay, with the pose that they have. Bodies and their sensors are new objects; gravity, the
+        Objects that were added later are removed, those that were removed are added again. Motions end with a reason;
+        waiting inputs are dropped. Cameras keep their poses. Bodies and their sensors are new objects; gravity, the
         engine's parameters and rates are those of the configuration.
 
         Args:
             rebuild: Whether everything is loaded again in any case. Otherwise bodies stay the same objects where that
-                is exact: if robots without controllers followed targets, and bodies were moved or changed in their
-                dynamics, and nothing else. That takes less than a millisecond.
+                is exact: if nothing happened since the start, except that robots without controllers followed targets,
+                and that bodies were moved or changed in their dynamics. That takes less than a millisecond.
 
         Raises:
-            ConfigError: If something cannot be loaded any more, for instance because its file has gone; then the
+            ConfigError: If something cannot be loaded any more, for instance because its file is missing; then the
                 world lacks it.
         """
         self._end_shadow()
@@ -553,7 +551,7 @@ class World:
             self._start = StartState(self.pb, self._contents)
 
     def _rewind(self) -> bool:
-        """Goes back to the start without loading anything, and returns whether it is the same."""
+        """Returns to the start without loading anything; returns whether the start was reached exactly."""
         if self._start is None or self.pb.changes.unrecorded or not self._start.restore(self.commands):
             return False
         self.clock.restart()
@@ -564,7 +562,7 @@ class World:
         return self.state_hash() == self.start_hash
 
     def _forget_commands(self) -> None:
-        """Begins a life: without commands, but for the poses that cameras keep, and without inputs that wait."""
+        """Clears commands and waiting inputs; the poses that cameras keep become the first commands."""
         self.commands.clear()
         self.pb.changes.unrecorded = ""
         self.mailbox.drop()
@@ -578,10 +576,10 @@ class World:
         return self._description
 
     def keyframe(self, recorded: str = "") -> None:
-        """Moves the world into a fresh client of PyBullet, such that what follows depends on the present state alone.
+        """Moves the world into a fresh client of PyBullet, so that the future depends on the present state alone.
 
         Commands before it are dropped: `save`, `restore`, `fork` and `predict` start from here. Bodies and sensors stay
-        the same objects. When it raises, nothing has changed, unless it is for a difference.
+        the same objects. When it raises, nothing has changed, except if it differs from the recorded one.
 
         Args:
             recorded: A keyframe of the same world at the same tick, which this one is compared with.
@@ -589,18 +587,18 @@ class World:
         Raises:
             InterfaceError: If the world has a window, a soft body, a body of another package, an object with a state
                 that cannot be written, or a change that was not recorded; or if it differs from the recorded keyframe.
-            ConfigError: If a body cannot be loaded any more, for instance because its file has gone.
+            ConfigError: If a body cannot be loaded any more, for instance because its file is missing.
         """
         for _ in self.keyframe_in_parts():
             pass
-        if recorded and (found := difference(self._keyframe, recorded)):
-            raise InterfaceError(f"the keyframe at tick {self.clock.tick} is not the recorded one: '{found}' differs")
+        if recorded and (part := difference(self._keyframe, recorded)):
+            raise InterfaceError(f"the keyframe at tick {self.clock.tick} is not the recorded one: '{part}' differs")
 
     def keyframe_in_parts(self) -> Iterator[None]:
-        """Does the same as `keyframe` in parts, one for each item, between which the world may step.
+        """Does the same as `keyframe` in parts, one for each item; the world may step between them.
 
-        The fresh client is built beside the running one, a body in each part, and built again if bodies come, go or
-        change meanwhile. The world moves in the last part.
+        Each part builds one body in the fresh client. All are built again if bodies are added, removed or changed
+        meanwhile. The world moves in the last part.
         """
         while True:
             refuse(self)
@@ -626,7 +624,7 @@ class World:
     def _move(self, fresh: FreshClient) -> None:
         self._keyframe = move(self, self._contents, self._pushed, fresh)
         self._keyframe_tick = self.clock.tick
-        self._start = None  # PyBullet had it in the other client
+        self._start = None  # it was in the former client
         self._note("", "keyframe", self._keyframe)
         self.commands.forget()
 
@@ -655,14 +653,14 @@ class World:
         self._keyframe, self._keyframe_tick = keyframe, read.tick
 
     def save(self, file: str | Path | None = None, *, keyframe: bool = False) -> WorldState:
-        """Returns the present state, from which the same world goes on to the last bit.
+        """Returns the present state, from which the same world continues to the last bit.
 
-        Inputs that wait act first, as they would before the next step. The state holds all commands since the world was
-        built or reset, or since its last keyframe. The time that `restore` takes is therefore that of simulating again
-        from there.
+        Waiting inputs are applied first, as before the next step. The state holds all commands since the world was
+        built or reset, or since its last keyframe. To restore it therefore takes as long as simulating again from
+        there.
 
         Args:
-            file: File that it is written to, too.
+            file: File to which it is written, too.
             keyframe: Whether a keyframe is made first, see `keyframe`; then the state holds no commands.
 
         Raises:
@@ -684,7 +682,7 @@ class World:
         return state
 
     def restore(self, state: WorldState, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS) -> None:
-        """Makes the world what it was when a state was saved; stamps go on.
+        """Restores a saved state of the world; stamps continue.
 
         Args:
             state: The state.
@@ -692,7 +690,7 @@ class World:
             max_ticks: Age of a state beyond which it is refused.
 
         Raises:
-            InterfaceError: If the state is of another world or too old; or if the world does not come to the same state
+            InterfaceError: If the state is of another world or too old; or if the world does not reach the same state
                 again, then it is reset.
         """
         self.require_own(state)
@@ -701,7 +699,7 @@ class World:
             pass
 
     def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Generator[int, None, None]:
-        """Does the same in steps, of a state that was checked; yields each tick on the way.
+        """Does the same as `restore` in steps, for a state that was checked; yields each tick on the way.
 
         If the generator is closed before its end, the world is reset.
         """
@@ -752,13 +750,13 @@ class World:
             self._shadow = Shadow.of(self, self.save())
 
     def fork(self, count: int = 1) -> list[Fork]:
-        """Returns worlds in processes of their own that go on from the present state, to the last bit.
+        """Returns worlds in processes of their own that continue from the present state, to the last bit.
 
         They are forked from a process that follows this world's commands. It is a copy of this one if this has only one
         thread; otherwise the first call takes as long as simulating again from the last reset.
 
         Raises:
-            InterfaceError: If the state cannot be saved, or does not come to be the same there.
+            InterfaceError: If the state cannot be saved, or is not the same there.
         """
         with self._followed() as shadow:
             return shadow.fork(count)
@@ -773,10 +771,10 @@ class World:
         cost: Cost | str | None = None,
         jobs: int | None = None,
     ) -> list[Prediction]:
-        """Returns what would happen from the present state with each of some sequences of inputs.
+        """Predicts what would happen from the present state, for each of several sequences of inputs.
 
         Args:
-            candidates: For each the inputs by tick from now on; those that are under way go on.
+            candidates: The sequences: inputs by tick from now on. Motions under way continue.
             ticks: Number of ticks.
             watch: Bodies whose motion is returned; all by default.
             every: Number of ticks between two rows of it.
@@ -785,7 +783,7 @@ class World:
             jobs: Number of processes at a time; the number of processors by default.
 
         Raises:
-            InterfaceError: If the state cannot be saved, or does not come to be the same in another process.
+            InterfaceError: If the state cannot be saved, or is not the same in another process.
             UnknownNameError: If a watched body is unknown.
             ValueError: If a number is not positive.
         """
@@ -808,7 +806,7 @@ class World:
             new = self.commands.records(self._shadow.commands)
             self._shadow.follow(new, self.clock.tick, self.state_hash())
             yield self._shadow
-        except BaseException:  # an interrupted one would give its answer to the next question
+        except BaseException:  # after an interruption, the next request would get this answer
             self._end_shadow()
             raise
 
@@ -818,7 +816,7 @@ class World:
             self._shadow = None
 
     def changed_names(self) -> set[str]:
-        """Returns the names of all objects that came or went since the world was built or reset."""
+        """Returns the names of all objects that were added or removed since the world was built or reset."""
         return self._contents.changed_names()
 
     def state_hash(self) -> str:
@@ -826,7 +824,7 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Disconnects from PyBullet, closes all bodies and fails the requests that wait."""
+        """Disconnects from PyBullet, closes all bodies and fails the waiting requests."""
         self.mailbox.close()
         self._end_shadow()
         try:

@@ -11,8 +11,7 @@ from std_msgs.msg import String
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.replay.session import Checkpoint, Recording
 from rpbi.world.keyframes.keyframe import renamed
-from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import KEYFRAME
+from rpbi.world.saved.command_log import KEYFRAME, RecordedCommand
 from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.values import from_text, to_text
 from rpbi_data.bags.bag_reader import BagReader

@@ -11,8 +11,7 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, body_shapes, followed_frame, link_frame
 from rpbi.world import World
-from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.command_log import RecordedCommand, apply_command
 from rpbi_data.bags.resampling import resample
 
 from .frames import Frames

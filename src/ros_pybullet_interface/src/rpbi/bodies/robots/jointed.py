@@ -191,8 +191,8 @@ class JointedBody(Body):
 
     def _compare_start(self, follower: Joint, position: float) -> None:
         """Warns if the configured start of a mimic joint contradicts that of the joint that it follows."""
-        wanted = self._start_of(follower)
-        if follower.name in self.config.initial_joint_position and abs(wanted - position) > START_TOLERANCE:
+        configured = self._start_of(follower)
+        if follower.name in self.config.initial_joint_position and abs(configured - position) > START_TOLERANCE:
             leader = self.model.joints[self.model.couplings[follower.index].leader].name
             log.warning(
                 "%s: initial_joint_position.%s: has no effect: it follows '%s' and starts at %.6g %s",

@@ -14,7 +14,6 @@ from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.control.controllers.controller import ControlledRobot, RobotState
 from rpbi.control.controllers.impedance import JointImpedance
 from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, controller_problems
-from rpbi.control.couplings import couple
 from rpbi.control.joint_command import JointCommand
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.motors import QUANTITIES, LimitReports, Motors, ResolvedCommand, coalesce
@@ -30,6 +29,7 @@ from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.trajectory_state import TrajectoryStateSensor
+from rpbi.urdf.joints import couple
 
 from .jointed import JointedBody
 from .robot_config import RobotConfig
@@ -103,7 +103,7 @@ class Robot(JointedBody):
         return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Joint states, force-torque sensors, the follower's state and contacts, beside link poses."""
+        """Joint states, force-torque sensors, the follower's state and contacts, besides link poses."""
         hz = self.config.joint_state_publisher_hz
         joint_states = (JointStateSensor(self, hz),) if hz else ()
         trajectory = () if self.follower is None else (TrajectoryStateSensor(self.drive, self.follower),)
@@ -116,7 +116,7 @@ class Robot(JointedBody):
         return (*joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `target` beside the pose of its base.
+        """Returns `target` besides the pose of its base.
 
         It is a JointCommand, or a mapping of joints to numbers in the quantity of the control mode.
         """

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal, Union
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
 from custom_ros_tools.schema import (
     ConfigModel,
@@ -22,10 +22,10 @@ from robot_model.urdf.elements import Mimic
 from rpbi.bodies.body_config import BodyConfig
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
-from rpbi.control.controllers.entry import ControllerEntry
+from rpbi.control.controllers import CONTROLLERS, ControllerConfig
 from rpbi.control.controllers.impedance import JointSprings
+from rpbi.control.jitter_buffer import BUFFER_S
 from rpbi.control.planar_base import PlanarBaseConfig
-from rpbi.control.streams.jitter_buffer import BUFFER_S
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
 
 _NOT_VISUAL = {
@@ -34,6 +34,25 @@ _NOT_VISUAL = {
     "contacts": "a visual robot has no contacts",
     "planar_base": "a visual robot has no physics; its base follows object_tf",
 }
+
+
+def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
+    """Returns the configuration of a controller, by the model of its class."""
+    expected = f"a mapping with 'type', one of {', '.join(CONTROLLERS)}, or module:Class"
+    return CONTROLLERS.parse_entry(entry, info, ControllerConfig, expected)
+
+
+class OwnControllerConfig(ControllerConfig):
+    """An entry with a class of another package, which may have more keys."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})
+
+    type: Annotated[Text, WithJsonSchema({"type": "string", "pattern": ":"})] = Field(description="`module:Class`.")
+
+
+_Entry: Any = Union[(*CONTROLLERS.configs().values(), OwnControllerConfig)]  # noqa: UP007 (known at run time only)
+ControllerEntry = Annotated[Any, PlainValidator(controller_config, json_schema_input_type=_Entry)]
+"""A controller: `{type: KEY or module:Class, KEY: VALUE, ...}`."""
 
 
 class CoupledJoint(ConfigModel):

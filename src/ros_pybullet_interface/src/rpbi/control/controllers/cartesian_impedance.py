@@ -11,8 +11,8 @@ from pydantic import Field, WithJsonSchema
 from custom_ros_tools.schema import NonNegative, Text, Unit
 from robot_model.geometry import minus, plus
 from robot_model.linear_algebra import inverse
-from rpbi.control.streams.jitter_buffer import BUFFER_S, JitterBuffer
-from rpbi.control.streams.target_stream import TargetStream
+from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
+from rpbi.control.target_stream import TargetStream
 from rpbi.engine.inputs import check_pose
 from rpbi.geometry import Pose, rotated
 

@@ -59,7 +59,7 @@ class JointSprings(ConfigModel):
 
 
 class Disturbance:
-    """Estimates the acceleration of n joints by what is not modelled, from the error of predicted positions.
+    """Estimates the acceleration of n joints by unmodelled effects, from the error of predicted positions.
 
     Args:
         count: Number of joints.

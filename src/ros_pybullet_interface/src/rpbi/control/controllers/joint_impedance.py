@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import Text
+from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
 from rpbi.control.joint_command import JointCommand
-from rpbi.control.streams.jitter_buffer import BUFFER_S, JitterBuffer
-from rpbi.control.streams.target_stream import TargetStream
+from rpbi.control.target_stream import TargetStream
 
 from .controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
 from .impedance import JointImpedance, JointSprings

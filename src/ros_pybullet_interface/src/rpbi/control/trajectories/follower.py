@@ -12,8 +12,14 @@ from rpbi.engine.clock import NS_PER_S, Clock, Schedule
 from .config import JointTrajectoryControllerConfig
 from .joint_trajectory import JointTrajectory, validate_trajectory
 from .motion import TrajectoryMotion, stopping
-from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
-from .tolerances import Tolerances, resolved_tolerances
+from .request import (
+    ErrorCode,
+    GoalTolerances,
+    Tolerances,
+    TrajectoryRefusedError,
+    TrajectoryRequest,
+    resolved_tolerances,
+)
 from .trajectory import DesiredState, Knot, Trajectory, TrajectoryStateSample
 
 
@@ -32,7 +38,7 @@ class CheckedRequest(NamedTuple):
 
 
 class TrajectoryFollower:
-    """Has a robot follow trajectories, one after the other or spliced into each other.
+    """Makes a robot follow trajectories, one after another or spliced into each other.
 
     Attributes:
         joint_names: The joints that it drives.

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 from rpbi.control.motion import JointMotion, Motion
 from rpbi.urdf.joints import Joint
 
-from .request import ErrorCode, JointTolerance
-from .tolerances import Tolerances
+from .request import ErrorCode, JointTolerance, Tolerances
 from .trajectory import DesiredState, Knot, Trajectory
 
 
@@ -134,9 +133,9 @@ class TrajectoryMotion(Motion):
             joint, desired, late_s = self._joints[index], self.desired[index], self._time_s - self.end_s
             when = f"{late_s:.3g} s after the end" if late_s >= 0.0 else f"{-late_s:.3g} s before the end"
             limits = zip(measured[index], (desired.position[0], desired.velocity[0]), tolerance)
-            for (value, wanted, limit), (unit, of) in zip(limits, (("", ""), ("/s", "the velocity of "))):
-                if abs(value - wanted) > limit:
-                    off = f"{abs(value - wanted):.6g} {joint.unit}{unit} off {of}{what}"
+            for (value, goal, limit), (unit, of) in zip(limits, (("", ""), ("/s", "the velocity of "))):
+                if abs(value - goal) > limit:
+                    off = f"{abs(value - goal):.6g} {joint.unit}{unit} off {of}{what}"
                     return f"joint '{joint.name}' is {off}, {when}; allowed are {limit:g}"
         return ""
 

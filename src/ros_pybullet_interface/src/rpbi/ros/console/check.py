@@ -15,7 +15,7 @@ from rpbi.images import drawing_times
 from rpbi.ros.interface_table import Endpoint, endpoints
 from rpbi.world import World
 from rpbi.world.loading import load_world
-from rpbi.world_warnings import world_warnings
+from rpbi.world.world_warnings import world_warnings
 
 
 def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:

@@ -61,7 +61,7 @@ from rpbi.ros.headers import to_ros_time
 from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
-from rpbi.world.keyframes.building import KeyframeMaker
+from rpbi.world.keyframes.maker import KeyframeMaker
 from rpbi.world.loading import load_object, type_of
 
 from .object_lifecycle import ObjectLifecycle

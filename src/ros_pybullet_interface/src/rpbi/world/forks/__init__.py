@@ -1,1 +1,1 @@
-"""Forks of a world: processes in which it goes on another way."""
+"""Forks of a world: processes in which it continues independently."""

@@ -1,4 +1,4 @@
-"""The process that follows a world, and forks itself, from its own point of view."""
+"""The process that follows a world: it repeats the world's commands, and forks itself for forks and predictions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from multiprocessing.reduction import recv_handle
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.world.saved.command_log import RecordedCommand
-from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.command_log import RecordedCommand, apply_command
 from rpbi.world.saved.state import WorldState
 
 from .prediction import Candidate, Prediction, PredictionJob, predict
@@ -25,7 +24,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def end_with(parent: int) -> None:
-    """Has this process, a fork, end as soon as its parent does."""
+    """Makes this process, a fork, end as soon as its parent ends."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it ended before
         os._exit(0)
@@ -39,7 +38,7 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
         build: Returns the `World`; the first request gets its errors.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that it follows
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that forks are no zombies
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that forks leave no zombies
     world: Any = None
     fault: Exception | None = None
     try:
@@ -51,9 +50,9 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
         if fault is not None:
             raise fault
         _advance(world, commands, tick)
-        if (found := world.state_hash()) != state_hash:
+        if (reached := world.state_hash()) != state_hash:
             raise InterfaceError(
-                f"tick {tick}: expected the state {state_hash}, got {found}; something not recorded acts"
+                f"tick {tick}: expected the state {state_hash}, got {reached}; something not recorded acts"
             )
 
     def restore(state: WorldState) -> None:
@@ -82,14 +81,14 @@ def _advance(world: Any, commands: Sequence[RecordedCommand], tick: int) -> None
     waiting = list(commands)
     while True:
         while waiting and waiting[0].tick <= world.clock.tick:
-            apply_command(world, waiting.pop(0), trust=None)  # the world that it follows has applied it
+            apply_command(world, waiting.pop(0), trust=None)  # the followed world has applied it
         if world.clock.tick >= tick:
             return
         world.step()
 
 
 def _requests_of(world: Any) -> dict[str, Callable[..., Any]]:
-    """Returns what a fork answers."""
+    """Returns the requests that a fork answers, by name."""
     return {
         "put": world.put,
         "act": lambda *arguments: world.act(*arguments) and None,
@@ -112,7 +111,7 @@ def _answer(connection: Connection, requests: dict[str, Callable[..., Any]]) -> 
             answer = pickle.dumps((False, _words(error)))
         try:
             connection.send_bytes(answer)
-        except OSError:  # nobody waits for it any more
+        except OSError:  # nobody waits for the answer any more
             return
 
 

@@ -1,4 +1,4 @@
-"""What would happen: sequences of inputs, and the motion that they lead to."""
+"""Predictions: sequences of inputs, and the motion to which they lead."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Cost = Callable[[Any], float]
 
 
 class PredictionJob(NamedTuple):
-    """What is predicted, and what is noted meanwhile.
+    """Extent of a prediction, and the motion to note.
 
     Attributes:
         ticks: Number of ticks.
@@ -50,7 +50,7 @@ class PredictionJob(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """What happens with a candidate.
+    """The predicted result of a candidate.
 
     Attributes:
         cost: Sum of the cost over all ticks; inf if it could not be predicted.
@@ -72,7 +72,7 @@ class Prediction(NamedTuple):
 
 
 def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
-    """Steps a `World` with the inputs of a candidate, and returns what happens.
+    """Steps a `World` with the inputs of a candidate, and returns the result.
 
     Raises:
         InterfaceError: If an input is refused, or its tick is not one of the job's.
@@ -93,9 +93,9 @@ def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
             world.put(planned.slot, planned.value)
         world.step()
         if cost is not None:
-            total += (found := float(cost(world)))
-            if not math.isfinite(found):
-                raise ValueError(f"cost: expected a finite number at tick {tick + 1}, got {found}")
+            total += (cost_now := float(cost(world)))
+            if not math.isfinite(cost_now):
+                raise ValueError(f"cost: expected a finite number at tick {tick + 1}, got {cost_now}")
         if (tick + 1) % job.every == 0:
             notes.take(tick + 1)
     assert world.clock.tick == start + job.ticks

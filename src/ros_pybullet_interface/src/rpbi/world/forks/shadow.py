@@ -1,4 +1,4 @@
-"""A process that follows a world and forks itself, from the world's point of view."""
+"""The world's side of the process that follows it, and of forks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .prediction import Candidate, Prediction, PredictionJob
 
 _STDERR = 2
 MAX_COPIED_MB = 200.0
-"""Largest memory of a process that is copied [MB]: a fork of a copy takes 0.04 ms for each, a new program has 60."""
+"""Largest memory of a process that is copied [MB]: forking a copy takes 0.04 ms per MB, and a new program has 60 MB."""
 
 
 class Remote:
@@ -89,7 +89,7 @@ class Remote:
 
 
 class Fork(Remote):
-    """A world in a process of its own, which goes on from where another one was; as a context it ends with it."""
+    """A world in a process of its own, which continues from the state of another one; `with` ends it."""
 
     def put(self, slot: str, value: Any) -> None:
         """Passes a value to a body before its next tick, see `World.put`."""
@@ -123,8 +123,8 @@ class _Copy:
 
     Args:
         call: The function.
-        keep: File descriptor that the copy keeps. All others lead nowhere there, so that what waits for the end of a
-            pipe or a file that this process closes does not wait for the copy, too.
+        keep: File descriptor that the copy keeps. All others lead to /dev/null there, so that a reader of a pipe that
+            this process closes does not wait for the copy, too.
     """
 
     stdin = None
@@ -147,7 +147,7 @@ class _Copy:
             os._exit(0)
 
     def kill(self) -> None:
-        """Ends it."""
+        """Ends the copy."""
         with suppress(ProcessLookupError):
             os.kill(self._pid, signal.SIGKILL)
 
@@ -158,9 +158,9 @@ class _Copy:
 
 
 class Shadow:
-    """The process; it has neither ROS nor a window nor a second thread, and may therefore fork.
+    """The process that follows a world; it has neither ROS nor a window nor a second thread, and may therefore fork.
 
-    It starts while this one goes on; the first call waits until it has come to the state.
+    It starts while this process continues; the first call waits until it has reached the state.
 
     Args:
         connection: Connection to it.
@@ -175,14 +175,14 @@ class Shadow:
 
     @classmethod
     def of(cls, world: Any, state: WorldState) -> Shadow:
-        """Returns one of a `World` of this process, at its present state: a copy of this process if that can be."""
+        """Returns one for a `World` at its present state: a copy of this process if possible, else a new program."""
         return cls.copied(world) or cls.started(state, world.commands.count)
 
     @classmethod
     def copied(cls, world: Any) -> Shadow | None:
-        """Returns one that is a copy of this process, or None if this is large, has other threads or a window.
+        """Returns one that is a copy of this process; None if this process is large, has other threads or a window.
 
-        A copy has none of the threads, and would wait for ever for what they had locked.
+        A copy has none of the threads, and would wait for ever for the locks that they held.
         """
         if world.pb.has_window or threading.active_count() > 1 or _memory_mb() > MAX_COPIED_MB:
             return None
@@ -198,12 +198,12 @@ class Shadow:
 
     @classmethod
     def started(cls, state: WorldState, commands: int, niceness: int = 0) -> Shadow:
-        """Returns one that is a new program, which simulates again until it comes to the state.
+        """Returns one that is a new program, which simulates again until it reaches the state.
 
         Args:
             state: Present state of the world.
             commands: Number of commands of the world so far.
-            niceness: How much less of the processors it gets than this process, from 0 to 19.
+            niceness: Niceness above that of this process, from 0 to 19; more means less processor time.
         """
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -220,7 +220,7 @@ class Shadow:
         return cls(ours, process, commands)
 
     def restore(self, state: WorldState, commands: int) -> None:
-        """Has it go to a later keyframe, and on to the state, as commands on the way were dropped; does not wait.
+        """Sends it to a later keyframe and on to the state, since commands on the way were dropped; does not wait.
 
         Args:
             state: Present state of the world.
@@ -234,7 +234,7 @@ class Shadow:
 
     @property
     def is_copy(self) -> bool:
-        """Whether it is a copy of this process, of which another one is made faster than it restores a state."""
+        """Whether it is a copy of this process; another copy is made faster than it restores a state."""
         return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
@@ -258,7 +258,7 @@ class Shadow:
         return forks
 
     def predict(self, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
-        """Returns what happens with each candidate."""
+        """Returns the prediction of each candidate."""
         return list(self._remote.ask("predict", [list(each) for each in candidates], job, jobs))
 
     def kill(self) -> None:
@@ -266,7 +266,7 @@ class Shadow:
         self._process.kill()
 
     def close(self) -> None:
-        """Ends it; forks go on until they are closed."""
+        """Ends it; forks continue until they are closed."""
         self._remote.close()
         self._process.kill()
         self._process.wait()

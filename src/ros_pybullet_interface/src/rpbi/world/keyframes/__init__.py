@@ -1,1 +1,1 @@
-"""Keyframes: states of a world from which it goes on without what was before."""
+"""Keyframes: states of a world from which it continues without former commands."""

@@ -1,9 +1,9 @@
 """Objects as plain values, and plain values put back into objects of the same structure.
 
 The state of a world in Python is the attributes of its bodies, sensors, controllers and streams. They are written as a
-graph: an object that is met again is a reference, and anchors, such as bodies, have names. Reading fills the objects
-that are there already and makes those that came later. No code is in the text: classes are named, and only those of
-trusted packages are made.
+graph: an object that occurs again is a reference, and anchors, such as bodies, have names. Reading fills the objects
+that exist already and makes those that were created later. The text contains no code: classes are named, and only
+those of trusted packages are made.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from rpbi.plugins import is_foreign
 from rpbi.samples import ContactsSample
 
 _MADE = ("rpbi.bodies.", "rpbi.control.", "rpbi.engine.clock", "rpbi.samples", "rpbi.sensors.", "rpbi.world.")
-"""Starts of the modules of this package whose objects come and go while a world runs."""
+"""Beginnings of the names of modules whose objects are created and removed while a world runs."""
 _CALLED = ("rpbi.bodies.", "rpbi.control.", "rpbi.sensors.")
-"""Starts of the modules of this package whose objects have methods that a state refers to."""
+"""Beginnings of the names of modules whose objects have methods to which a state may refer."""
 _KEPT = (FunctionType, BuiltinFunctionType, partial, type)
-"""Code that objects hold, which stays as it is."""
+"""Types of code that objects hold; reading leaves it as it is."""
 _NUMBERS = "fiub"
 """Kinds of arrays."""
 NOTHING: Any = object()
-"""In place of an object that is not there."""
+"""Stands for a missing object."""
 
 
 class GraphWriter:
@@ -84,7 +84,7 @@ class GraphWriter:
         return [*self._content(value, where), number]
 
     def _content(self, value: Any, where: str) -> list[Any]:
-        """Returns the kind of a value, and what it holds."""
+        """Returns the kind and the content of a value."""
         if isinstance(value, self._fixed):
             return ["fixed"]
         if isinstance(value, ConfigModel):
@@ -153,7 +153,7 @@ def _attributes_of(value: Any) -> Iterator[tuple[str, Any]]:
 
 
 class GraphReader:
-    """Reads what a GraphWriter wrote, into objects that are there already where it can.
+    """Reads what a GraphWriter wrote, where possible into existing objects.
 
     Args:
         fixed: As that of the writer.
@@ -164,7 +164,7 @@ class GraphReader:
         self._fixed, self._anchors = fixed, anchors
         self._read: dict[int, Any] = {}
         self._filled: set[int] = set()
-        """The `id` of all objects that were filled: a second one that shares them before is made anew."""
+        """The `id` of all objects that were filled: another one that shared such an object is made anew."""
         self._kinds: dict[str, Callable[..., Any]] = {
             "array": self._array,
             "config": self._config,
@@ -186,7 +186,7 @@ class GraphReader:
             here: The object in its place.
 
         Raises:
-            ValueError: If the text is none that a GraphWriter writes, or a class is not there or not trusted.
+            ValueError: If a GraphWriter does not write such a text, or a class is missing or not trusted.
             ConfigError: If a configuration in it is not valid here.
         """
         with _one_error():
@@ -313,10 +313,10 @@ def _class_of(name: str, base: type) -> Any:
     """Returns a class of a trusted package.
 
     Raises:
-        ValueError: If it is not there, not trusted, or of another kind.
+        ValueError: If it is missing, not trusted, or of another kind.
     """
     check_trusted(name)
-    found = find(name)
-    if not isinstance(found, type) or not issubclass(found, base):
+    kind = find(name)
+    if not isinstance(kind, type) or not issubclass(kind, base):
         raise ValueError(f"'{name}' is no {base.__name__}")
-    return found
+    return kind

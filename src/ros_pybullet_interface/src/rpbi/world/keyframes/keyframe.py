@@ -1,4 +1,4 @@
-"""A keyframe: the state of a world as text, from which it goes on in a fresh client."""
+"""Keyframes: states of a world as text, from which it continues in a fresh client."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from rpbi.plugins import is_foreign
 from rpbi.sensors.contacts.contacts import ContactReader
 from rpbi.urdf.joints import Joint, JointModel
 from rpbi.world.contents import WorldContents
+from rpbi.world.saved.recipe import FreshClient
+from rpbi.world.saved.values import with_present_names
 
-from .building import FreshClient
 from .graph import GraphReader, GraphWriter
 from .motion import BodyMotion, asleep, put_to_sleep
 
@@ -33,7 +34,7 @@ MAX_BYTES = 1 << 26
 MAX_VALUES = 5_000_000
 """Largest number of values in it."""
 _FIXED = (Client, Clock, ContactReader, Joint, JointModel, Kinematics, RobotDynamics)
-"""Types of objects that a world has in the same way whenever it is built."""
+"""Types of objects that are the same whenever a world is built."""
 _SENSORS = "sensors"
 _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 """A text in JSON."""
@@ -45,14 +46,14 @@ class Keyframe:
     Attributes:
         tick: The tick.
         recipe: How its bodies are built.
-        changed: Names of objects that came or went since the world was built or reset.
+        changed: Names of objects that were added or removed since the world was built or reset.
     """
 
     def __init__(self, text: str) -> None:
         """Reads a text.
 
         Raises:
-            ValueError: If the text is no keyframe, or one of another version of this package.
+            ValueError: If the text is no keyframe, or is one of another version of this package.
             ConfigError: If it is no JSON or too large, or a configuration in it is not valid here.
         """
         try:
@@ -67,14 +68,14 @@ class Keyframe:
             raise ValueError(f"expected a keyframe: {shortened(repr(error))}") from None
 
     def enter(self, world: Any, contents: WorldContents) -> dict[str, Body]:
-        """Puts a `World` that was just built by the recipe into the state.
+        """Brings a `World` that was just built by the recipe to this state.
 
         Returns:
             The bodies that external wrenches act on.
 
         Raises:
             ValueError: If the text does not fit the world.
-            InterfaceError: If the world has a state that is not in the text: it would not go on as the saved one.
+            InterfaceError: If the world has a state that is not in the text: it would not continue as the saved one.
         """
         for name, body in contents.bodies.items():
             self._motions[name].check(body)
@@ -89,7 +90,7 @@ class Keyframe:
 
 
 def _anchors(contents: WorldContents) -> dict[str, Any]:
-    """Returns the objects that have a name, bodies before sensors, whose state no motion depends on."""
+    """Returns the objects with names; sensors, whose state influences no motion, come after bodies."""
     return {
         "bodies": contents.bodies,
         **{f"bodies/{name}": body for name, body in contents.bodies.items()},
@@ -116,7 +117,10 @@ def _objects(world: Any, contents: WorldContents) -> dict[str, Any]:
 
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
-    """Returns the text of a keyframe with other names of files, by their own.
+    """Returns the text of a keyframe with other names of files.
+
+    Args:
+        names: New names by present names.
 
     Raises:
         ValueError: If the text is no keyframe.
@@ -126,7 +130,7 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 
 
 def difference(first: str, second: str) -> str:
-    """Returns what differs between two keyframes, beside sensors, which depend on their receivers; empty if nothing."""
+    """Returns the first part that differs between two keyframes, empty if none; sensors depend on their receivers."""
     contents = (load_foreign_json(_unpacked(text), "keyframe", MAX_BYTES, MAX_VALUES) for text in (first, second))
     one, other = ({**each["objects"], "bodies": each["bodies"], "tick": each["tick"]} for each in contents)
     names = (name for name in {**one, **other} if not name.startswith(_SENSORS))
@@ -134,7 +138,7 @@ def difference(first: str, second: str) -> str:
 
 
 def _enter(motions: Mapping[str, BodyMotion], sleepers: tuple[str, ...], contents: WorldContents) -> None:
-    """Puts bodies in a fresh client where they were, and sets attachments, motors and sleep there."""
+    """Restores the motion of bodies in a fresh client, and their attachments, motors and sleep."""
     for name, body in contents.bodies.items():
         motions[name].put(body)
     contents.attachments.resume()
@@ -171,7 +175,7 @@ def move(world: Any, contents: WorldContents, pushed: Iterable[str], fresh: Fres
 
 
 def refuse(world: Any) -> None:
-    """Refuses a world in which PyBullet may keep what a keyframe does not know.
+    """Refuses a world in which PyBullet may have a state that keyframes do not contain.
 
     Raises:
         InterfaceError: If there is a window, a soft body, or a body of another package.
@@ -186,7 +190,7 @@ def refuse(world: Any) -> None:
         if is_foreign(body):
             kind = type(body).__name__
             raise InterfaceError(
-                f"'{name}' is a {kind} of another package, which may keep in PyBullet what is not known"
+                f"'{name}' is a {kind} of another package, which may have a state in PyBullet that is not known"
             )
 
 
@@ -195,6 +199,7 @@ def _packed(text: str) -> str:
 
 
 def _unpacked(text: str) -> str:
+    """Returns the JSON of a keyframe, with the present names of its classes."""
     try:
         unpacking = zlib.decompressobj()
         data = unpacking.decompress(base64.b64decode(text, validate=True), MAX_BYTES)
@@ -202,4 +207,4 @@ def _unpacked(text: str) -> str:
         raise ValueError(f"expected a keyframe: {error}") from None
     if not unpacking.eof:
         raise ValueError(f"expected a keyframe of at most {MAX_BYTES} bytes")
-    return data.decode()
+    return with_present_names(data.decode())

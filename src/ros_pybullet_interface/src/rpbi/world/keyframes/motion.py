@@ -14,11 +14,11 @@ from rpbi.bodies import Body
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 
 _UNUSUAL_GRAVITY = (1.0, 2.0, 30.0)
-"""Gravity that moves all that does not sleep [m/s^2]."""
+"""Gravity that moves all bodies that do not sleep [m/s^2]."""
 
 
 class BodyMotion(NamedTuple):
-    """Where a body is and how it moves.
+    """Pose, joint positions and velocities of a body.
 
     Attributes:
         position: Position of its centre of mass [m].
@@ -50,10 +50,10 @@ class BodyMotion(NamedTuple):
         return cls(position, quat_xyzw, linear, angular, joints, positions, velocities)
 
     def check(self, body: Body) -> None:
-        """Checks that it is one of a body; PyBullet ends the process for some that are not.
+        """Checks that it fits a body; PyBullet ends the process for some motions that do not.
 
         Raises:
-            ValueError: If it is not, or a number is not finite.
+            ValueError: If it does not, or a number is not finite.
         """
         own = BodyMotion.of(body)
         numbers = [*chain(*self[:4], *self.positions, *self.velocities)]
@@ -63,7 +63,7 @@ class BodyMotion(NamedTuple):
             raise ValueError(f"'{body.name}': expected a motion of finite numbers, got {str(self):.200}")
 
     def put(self, body: Body) -> None:
-        """Puts a body where it was, as fast as it was."""
+        """Sets the pose, joint positions and velocities of a body."""
         pb, body_id = body.pb, body.body_id
         pb.resetBasePositionAndOrientation(body_id, self.position, self.quat_xyzw)
         pb.resetBaseVelocity(body_id, self.linear, self.angular)
@@ -77,7 +77,7 @@ def _shape(values: Any) -> Any:
 
 
 def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
-    """Returns the bodies that sleep: they do not notice another gravity. It ends the world of a client."""
+    """Returns the bodies that sleep: another gravity does not move them. The client cannot be used afterwards."""
     movable = {name: body for name, body in bodies.items() if _can_move(body)}
     before = {name: body.motion_state() for name, body in movable.items()}
     pb.setGravity(*_UNUSUAL_GRAVITY)
@@ -86,7 +86,7 @@ def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
 
 
 def put_to_sleep(bodies: Mapping[str, Body], names: tuple[str, ...]) -> None:
-    """Has some bodies sleep, and wakes those that were loaded asleep."""
+    """Puts some bodies to sleep, and wakes others that were loaded asleep."""
     for name, body in bodies.items():
         if name in names:
             body.pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_SLEEP)

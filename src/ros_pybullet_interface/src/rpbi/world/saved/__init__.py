@@ -1,1 +1,1 @@
-"""Worlds as text and files: what they were built from, what entered them, and where they are."""
+"""Saved worlds as text and files: descriptions, commands and states."""

@@ -1,26 +1,28 @@
-"""Commands that entered a world after its start, by tick."""
+"""Commands that entered a world after its start, by tick: their log, and how they are applied again."""
 
 from __future__ import annotations
 
 import json
 import zlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import islice
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 
-from .values import to_text
+from .values import from_text, to_text, trusting
 
 MAX_KEPT = 5_000
 """Number of commands that are kept as they are, some megabytes at most; older ones are packed."""
 MAX_PACKED_BYTES = 1 << 28
-"""Largest size of the packed ones [bytes]: some millions."""
+"""Largest size of the packed commands [bytes]; these are some millions."""
+KEYFRAME = "keyframe"
+"""Kind of the command whose value is the text of a keyframe."""
 
 
 class WorldCommand(NamedTuple):
-    """Something that entered a world.
+    """A change that entered a world from outside.
 
     Attributes:
         tick: The world's tick: it entered after that tick's physics, before the next.
@@ -67,7 +69,7 @@ class CommandLog:
         self.clear()
 
     def note(self, command: WorldCommand) -> None:
-        """Appends one; if there are many, the oldest is packed."""
+        """Appends a command; if there are many, the oldest is packed."""
         if len(self._kept) == MAX_KEPT:
             self._pack(self._kept.popleft())
         self._kept.append(command)
@@ -98,7 +100,7 @@ class CommandLog:
             raise InterfaceError(f"a command cannot be recorded: {error}") from None
 
     def clear(self) -> None:
-        """Begins afresh."""
+        """Removes all commands."""
         self._kept: deque[WorldCommand] = deque()
         self.count = 0
         self.forget()
@@ -121,3 +123,51 @@ class CommandLog:
         if len(self._packed) > MAX_PACKED_BYTES:
             self._fault = f"the first of {self.count} commands are forgotten; reset the world"
             self._packed.clear()
+
+
+_CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
+    "input": lambda world, slot, value: world.apply_input(slot, value),
+    "add": lambda world, _, arguments: world.add(*arguments),
+    "add_camera": lambda world, _, config: world.add_camera(config),
+    "remove": lambda world, name, _: world.remove(name),
+    "dynamics": lambda world, name, change: world.change_dynamics(name, change),
+    "attach": lambda world, _, config: world.attach(config),
+    "detach": lambda world, name, _: world.detach(name),
+    "physics": lambda world, _, change: world.change_physics(change),
+    "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
+    "halt": lambda world, _, reason: world.halt(reason),
+    "pause": lambda world, _, reason: world.pause(reason),
+    KEYFRAME: lambda world, _, recorded: world.keyframe(recorded),
+}
+"""Commands to a world other than actions on its bodies."""
+
+
+def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] | None = ()) -> None:
+    """Applies a recorded command to a `World`.
+
+    Args:
+        world: The world.
+        command: The command.
+        trust: Packages that it may import, see `trusting`.
+
+    Raises:
+        InterfaceError: If the world refuses.
+        ValueError: If the command cannot be read, or is unknown.
+    """
+    name, what = command.name, command.what
+    with trusting(trust):
+        value = from_text(command.data)
+        try:
+            apply(world, name, what, value)
+        except InterfaceError:
+            raise
+        except Exception as error:  # the value fits neither the command nor the world, in whatever way
+            raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error
+
+
+def apply(world: Any, name: str, what: str, value: Any) -> None:
+    """Applies a command, with the fields of a WorldCommand, to a `World`."""
+    if what in _CHANGES:
+        _CHANGES[what](world, name, value)
+    else:
+        world.act(name, what, value)

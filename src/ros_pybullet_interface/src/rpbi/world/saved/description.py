@@ -1,4 +1,4 @@
-"""All that a world was built from, as text by which another process can build the same."""
+"""Descriptions: all that a world was built from, as text from which another process can build the same world."""
 
 import hashlib
 import json
@@ -28,7 +28,7 @@ FORMAT = 1
 MAX_COMPARED_BYTES = 1 << 30
 """Size of the files of a description that are compared with those of the recording [bytes]; others are not."""
 _WRITTEN = re.compile(r'(?<=")/[^"\\]*/robot_description-[0-9a-f]{12}\.urdf(?=")')
-"""Text that is the path of a file of `write_description`, in JSON."""
+"""Path of a file of `write_description` in JSON."""
 
 
 def describe(loaded: LoadedWorld, start_hash: str) -> str:
@@ -116,7 +116,7 @@ class WorldDescription:
     @cached_property
     def warnings(self) -> list[str]:
         """Differences of this machine from the recording one."""
-        read, left, found = self._read, MAX_COMPARED_BYTES, []
+        read, left, differences = self._read, MAX_COMPARED_BYTES, []
         for path, digest in read.files.items():
             if path in read.descriptions:
                 continue
@@ -126,10 +126,12 @@ class WorldDescription:
                 continue
             left -= len(data)
             if hashlib.sha256(data).hexdigest() != digest:
-                found.append(f"{printable(path)}: is another file than when the world was recorded")
+                differences.append(f"{printable(path)}: is another file than when the world was recorded")
         if read.pybullet != version("pybullet"):
-            found.append(f"recorded with PyBullet {printable(read.pybullet, 50)}, replayed with {version('pybullet')}")
-        return found
+            differences.append(
+                f"recorded with PyBullet {printable(read.pybullet, 50)}, replayed with {version('pybullet')}"
+            )
+        return differences
 
     def load(self, trust: Collection[str] | None = ()) -> LoadedWorld:
         """Returns the configuration of the world.

@@ -1,4 +1,4 @@
-"""Recipes: the bodies of a world are built in a fresh client, in the same way each time."""
+"""Recipes, by which the bodies of a world are built again in a fresh client, always in the same way."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from rpbi.config.pybullet_world_models import PhysicsChange, SetGravity
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.config.world import WorldConfig
 from rpbi.engine.client import Client
-from rpbi.world.load_log import LogEntry
+from rpbi.world.load_log import LogEntry, apply
 
 MAX_BODY_ID = 100_000
-"""Largest of PyBullet's body ids; those below that no body has are taken and given back while bodies are made."""
+"""Largest body id; unused ids below the largest one are taken and freed while bodies are made."""
 _MOMENTARY = pybullet.ACTIVATION_STATE_WAKE_UP | pybullet.ACTIVATION_STATE_SLEEP
 """Flags of `activationState` that act once; others last."""
 _PAIRS = (
@@ -45,7 +45,7 @@ class BodyRecipe(NamedTuple):
 
 
 class Recipe(NamedTuple):
-    """Bodies of a world, in the order in which they are loaded, what has changed since, and cameras.
+    """Bodies of a world in the order of loading, later changes, and cameras.
 
     Attributes:
         bodies: The bodies.
@@ -61,7 +61,7 @@ class Recipe(NamedTuple):
 
     @classmethod
     def of(cls, contents: Any) -> Recipe:
-        """Returns the shortest one that leads to what the `WorldContents` hold now."""
+        """Returns the shortest recipe for the present `WorldContents`."""
         bodies: Mapping[str, Body] = contents.bodies
         added: dict[str, LogEntry] = {}
         changed: dict[tuple[str, str], dict[str, Any]] = {}
@@ -91,10 +91,10 @@ class Recipe(NamedTuple):
         )
 
     def entries(self, pb: Client, config: WorldConfig) -> Iterator[LogEntry]:
-        """Yields the entries that build the world in a fresh client; each is applied before the next is asked for.
+        """Yields the entries that build the world in a fresh client; each must be applied before the next is taken.
 
         Raises:
-            InterfaceError: If the ids of bodies are none that PyBullet has.
+            InterfaceError: If PyBullet cannot give the bodies these ids.
         """
         yield LogEntry("", "world", config)
         self._reserve_ids(pb)
@@ -116,7 +116,7 @@ class Recipe(NamedTuple):
                 raise InterfaceError(f"'{name}': expected PyBullet's id {body_id}, got {bodies[name].body_id}")
 
     def _reserve_ids(self, pb: Client) -> None:
-        """Has PyBullet give the coming bodies the ids that they had; it takes the id that was given back last."""
+        """Makes PyBullet give the next bodies the ids that they had: it reuses the id that was freed last."""
         ids = [body.body_id for body in self.bodies]
         if ids == list(range(len(ids))):
             return
@@ -125,6 +125,41 @@ class Recipe(NamedTuple):
         taken = [pb.createMultiBody() for _ in range(max(ids) + 1)]
         for body_id in (*sorted({*taken} - {*ids}, reverse=True), *reversed(ids)):
             pb.removeBody(body_id)
+
+
+class FreshClient:
+    """A copy of the bodies of a world, in a client that has not stepped yet.
+
+    Args:
+        recipe: How they are built.
+        config: Configuration of the world.
+    """
+
+    def __init__(self, recipe: Recipe, config: WorldConfig) -> None:
+        self.recipe = recipe
+        self.pb = Client()
+        self._config = config
+        self._bodies: dict[str, Body] = {}
+
+    def build(self) -> Iterator[None]:
+        """Builds body by body, one for each item.
+
+        Raises:
+            ConfigError: If one cannot be loaded any more.
+            InterfaceError: If PyBullet refuses.
+        """
+        for entry in self.recipe.entries(self.pb, self._config):
+            apply(self.pb, self._bodies, entry)
+            yield
+        self.recipe.check_ids(self._bodies)
+        for body in self._bodies.values():
+            body.close()
+
+    def close(self) -> None:
+        """Discards the copy."""
+        for body in self._bodies.values():
+            body.close()
+        self.pb.disconnect()
 
 
 def _kind_and_config(added: LogEntry) -> tuple[str, BodyConfig]:

@@ -19,8 +19,7 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, shorte
 from custom_ros_tools.files import atomic_file
 from custom_ros_tools.foreign import load_foreign_json, printable
 
-from .command_log import RecordedCommand
-from .commands import apply_command
+from .command_log import RecordedCommand, apply_command
 
 FORMAT = 2
 """Version of the file's layout: a header, a line for each command, and the SHA-256 of all lines before."""
@@ -35,7 +34,7 @@ _BEGINNING = b'{"format": '
 
 
 class WorldState(NamedTuple):
-    """A state of a world: what the world was built from, and all that entered it since.
+    """A state of a world: what the world was built from, and all commands since.
 
     Attributes:
         description: Text of `describe`.
@@ -84,7 +83,7 @@ class WorldState(NamedTuple):
         """Returns the state of a file.
 
         Raises:
-            ConfigError: If there is no such file, it is none of `write`, too large, or of another version.
+            ConfigError: If there is no such file, or it is not one of `write`, too large or of another version.
         """
         try:
             packed = read_file(path, MAX_BYTES)
@@ -99,7 +98,7 @@ class WorldState(NamedTuple):
 
     @classmethod
     def _of(cls, file: gzip.GzipFile) -> WorldState:
-        """Reads an unpacked file line by line, so that neither its size nor a line can take the memory."""
+        """Reads an unpacked file line by line, so that neither a large file nor a long line can exhaust the memory."""
         seal = hashlib.sha256()
 
         def next_line() -> Any:
@@ -138,10 +137,10 @@ class WorldState(NamedTuple):
         return False
 
     def require_short(self, max_ticks: int) -> None:
-        """Checks that it is not older than that: a forged tick would be simulated for days.
+        """Checks the age of the state: a forged tick would be simulated for days.
 
         Raises:
-            InterfaceError: If it is.
+            InterfaceError: If it is older than `max_ticks`.
         """
         ticks = self.tick - self.start
         if ticks > max_ticks:
@@ -179,9 +178,9 @@ class WorldState(NamedTuple):
             except Exception as error:  # a command that makes no sense, at once or in the step after it
                 raise InterfaceError(f"tick {world.clock.tick}: {printable(str(error) or repr(error))}") from error
             yield world.clock.tick
-        if (found := world.state_hash()) != self.state_hash:
+        if (now := world.state_hash()) != self.state_hash:
             raise InterfaceError(
-                f"the state at tick {self.tick} is not the saved one: its hash was {self.state_hash}, now it is {found}"
+                f"the state at tick {self.tick} is not the saved one: its hash was {self.state_hash}, now it is {now}"
             )
 
 

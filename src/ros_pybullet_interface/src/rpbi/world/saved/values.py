@@ -1,6 +1,7 @@
-"""Values that enter a world as text that reads back exactly."""
+"""Values of recorded commands and configurations, as text that reads back exactly."""
 
 import json
+import re
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
@@ -11,13 +12,13 @@ from custom_ros_tools.plugins import UntrustedError, check_trusted, find, trusti
 from custom_ros_tools.schema import ConfigModel
 
 PAIRS = "pairs"
-"""Key of a mapping whose keys are no texts, as a list of pairs."""
+"""Key for the content of a mapping, as a list of pairs, since its keys need not be texts."""
 QUOTED = 60
-"""Characters of a text that cannot be read that a message has."""
+"""Number of characters that a message quotes from a text that cannot be read."""
 
 
 def trusting(packages: Collection[str] | None) -> AbstractContextManager[None]:
-    """Returns a context in which the classes that a recording names are those of `rpbi` and of these packages.
+    """Returns a context in which a recording may name only classes of `rpbi` and of these packages.
 
     Args:
         packages: Further packages that it may import. None: any package, for a recording that this program made.
@@ -43,7 +44,7 @@ def from_text(text: str) -> Any:
     """Returns the value of a text of `to_text`, with tuples for lists.
 
     Raises:
-        ValueError: If the text is none that `to_text` writes, or names a class that is not there or not trusted.
+        ValueError: If `to_text` does not write such a text, or it names a class that is missing or not trusted.
         ConfigError: If a configuration in it is not valid here, for instance because a file is missing.
     """
     try:
@@ -64,7 +65,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return float(value)
     if isinstance(value, ConfigModel):
-        # Only what was written: what PyBullet is told depends on that, defaults or not.
+        # Only keys that were given, since only those are passed to PyBullet.
         return {_class_name(value): value.model_dump(mode="json", exclude_unset=True)}
     if isinstance(value, Mapping):
         return {PAIRS: [[_plain(key), _plain(item)] for key, item in value.items()]}
@@ -91,8 +92,18 @@ def _value(plain: Any) -> Any:
     return made(*map(_value, content))
 
 
+FORMER_MODULES = {
+    "rpbi.config.attachments": "rpbi.config.world",
+    "rpbi.control.streams.bounded_motion": "rpbi.control.stream_motion",
+    "rpbi.control.streams.jitter_buffer": "rpbi.control.jitter_buffer",
+    "rpbi.control.streams.segment": "rpbi.control.stream_motion",
+    "rpbi.control.streams.sender_clock": "rpbi.control.sender_clock",
+    "rpbi.control.streams.target_stream": "rpbi.control.target_stream",
+    "rpbi.control.trajectories.tolerances": "rpbi.control.trajectories.request",
+}
+"""Modules in older recordings and keyframes, and the present modules of their classes."""
 FORMER_NAMES = {
-    "rpbi.constraints.attachment_config:AttachmentConfig": "rpbi.config.attachments:AttachmentConfig",
+    "rpbi.constraints.attachment_config:AttachmentConfig": "rpbi.config.world:AttachmentConfig",
     "rpbi.control.controllers.force:ForceConfig": "rpbi.control.controllers.force:ForceControllerConfig",
     "rpbi.control.controllers.manager:NewGains": "rpbi.control.controllers.manager:ControllerUpdate",
     "rpbi.control.motors:Command": "rpbi.control.motors:ResolvedCommand",
@@ -100,7 +111,18 @@ FORMER_NAMES = {
     "rpbi.engine.actions:TimedGoal": "rpbi.world.actions:TimedGoal",
     "rpbi.urdf.joints:JointTarget": "rpbi.control.joint_command:JointCommand",
 }
-"""Names of classes in older recordings, and their present ones."""
+"""Names of single classes in older recordings, and their present names."""
+_NAME_IN_JSON = re.compile(r'(?<=")rpbi[\w.]+:[\w.]+(?=")')
+
+
+def with_present_names(text: str) -> str:
+    """Returns JSON in which former names of classes are replaced by their present names."""
+    return _NAME_IN_JSON.sub(lambda match: _present_name(match[0]), text)
+
+
+def _present_name(name: str) -> str:
+    module, _, attribute = name.partition(":")
+    return FORMER_NAMES.get(name) or f"{FORMER_MODULES.get(module, module)}:{attribute}"
 
 
 def _class_name(value: Any) -> str:
@@ -108,16 +130,16 @@ def _class_name(value: Any) -> str:
 
 
 def _class_of(name: str) -> type:
-    """Returns a class of values; no other can be named, so that a file cannot have just anything called."""
+    """Returns a class of values. Others are refused, so that a file cannot have arbitrary code called."""
     try:
         check_trusted(name)
-        found = find(FORMER_NAMES.get(name, name))
+        kind = find(_present_name(name))
     except UntrustedError:
         raise
     except ValueError as error:
         raise ValueError(f"'{name}' is not known here: {error}") from None
-    if isinstance(found, type) and (
-        issubclass(found, ConfigModel) or (issubclass(found, tuple) and hasattr(found, "_fields"))
+    if isinstance(kind, type) and (
+        issubclass(kind, ConfigModel) or (issubclass(kind, tuple) and hasattr(kind, "_fields"))
     ):
-        return found
+        return kind
     raise ValueError(f"'{name}' is neither a named tuple nor a configuration")

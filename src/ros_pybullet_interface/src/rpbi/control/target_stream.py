@@ -17,18 +17,16 @@ import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 
-from rpbi.control.motors import POSITION_MODES, Motors, ResolvedCommand, coalesce
-
-from .bounded_motion import BoundedMotion
 from .jitter_buffer import EVERY_TICK, JitterBuffer
-from .segment import StreamSegment, agree
+from .motors import POSITION_MODES, Motors, ResolvedCommand, coalesce
+from .stream_motion import BoundedMotion, StreamSegment, agree
 
 log = logging.getLogger(__name__)
 
 ADAPTATION_PERIODS = 4.0
 """Time constant with which the window of the moving average follows the period [periods]."""
 SHORT_SEGMENT = 0.5
-"""Share of the time between targets below which the time for a way says nothing of the velocity to come."""
+"""Length of a segment, as a share of the time between targets, below which its velocity is not extrapolated."""
 SAME_TIME = 1e-9
 """Difference of times that is an error of rounding [ticks]."""
 QUIET_S = 60.0
@@ -62,7 +60,7 @@ class TargetStream:
         self._window = self._lagging_window = self._wanted_window = 0.0
         self._motion = BoundedMotion(held, buffer.dt_s, buffer.has_delay, self._limited)
         self.set_points = held
-        """Where the joints are to be now."""
+        """Present set points by joint index [rad or m]."""
         self.gap = 0.0
         """Time for which the motion had stopped before the newest target, which came too late [ticks]."""
         self.rests = True

@@ -1,4 +1,4 @@
-"""The bodies of a world in a fresh client, built in parts between the ticks of the world."""
+"""Makes keyframes of a running world, in parts between its ticks."""
 
 from __future__ import annotations
 
@@ -10,55 +10,15 @@ from concurrent.futures import Future
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.bodies import Body
-from rpbi.config.world import WorldConfig
-from rpbi.engine.client import Client
-from rpbi.world.load_log import apply
-from rpbi.world.saved.recipe import Recipe
 from rpbi.world.saved.state import WorldState
 
 log = logging.getLogger(__name__)
 
 
-class FreshClient:
-    """The bodies of a world once more, in a client that has not stepped yet.
-
-    Args:
-        recipe: How they are built.
-        config: Configuration of the world.
-    """
-
-    def __init__(self, recipe: Recipe, config: WorldConfig) -> None:
-        self.recipe = recipe
-        self.pb = Client()
-        self._config = config
-        self._bodies: dict[str, Body] = {}
-
-    def build(self) -> Iterator[None]:
-        """Builds body by body, each when the next item is asked for.
-
-        Raises:
-            ConfigError: If one cannot be loaded any more.
-            InterfaceError: If PyBullet refuses.
-        """
-        for entry in self.recipe.entries(self.pb, self._config):
-            apply(self.pb, self._bodies, entry)
-            yield
-        self.recipe.check_ids(self._bodies)
-        for body in self._bodies.values():
-            body.close()
-
-    def close(self) -> None:
-        """Gives it up."""
-        for body in self._bodies.values():
-            body.close()
-        self.pb.disconnect()
-
-
 class KeyframeMaker:
-    """Makes keyframes of a running `World`, a part at each call of `poll`: at a period, and when somebody asks.
+    """Makes keyframes of a running `World`, periodically and on request, one part at each call of `poll`.
 
-    A keyframe of the period that is refused is reported once; there is no other one until the world is reset.
+    If a periodic keyframe is refused, that is reported once, and no other is tried until the world is reset.
 
     Args:
         world: The world.

@@ -1,4 +1,4 @@
-"""Warnings of values in YAML files and URDFs that are probably not meant."""
+"""Warnings of probable mistakes in a world that can be built; those about values in YAML files and URDFs."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,23 +13,28 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.meshes.triangles import volumes
 from rpbi.urdf.joints import Joint
-from rpbi.world import World
-from rpbi.world.objects import ObjectConfig
 
-from .parts import file_of, is_still, some
+from .objects import ObjectConfig
+from .place_warnings import file_of, is_still, place_warnings, some
+from .world import World
 
 CONCAVE_SHARE = 0.05
 """Share of a mesh's volume that its convex hull may add without a warning."""
 HALF_TURN, FULL_TURN = 3.2, 6.4
-"""Largest angles [rad] that are written for a half turn and for a full one."""
+"""Largest angles [rad] that may be meant as a half turn and as a full turn."""
 ROUND = 0.01
 """Largest distance from a whole multiple of 15 degrees, as a share of it."""
 FRACTIONS = 3
-"""Number of fractions among the angles of a robot, none beyond a half turn, that make them radians."""
+"""Number of fractions among a robot's angles, none beyond a half turn, from which they are taken for radians."""
 LARGEST_LIMIT, LARGEST_DEG = 12.6, 360.0
-"""Limits of joints that turn are within the first [rad], or beyond the second if they are to be none."""
+"""Limits of revolute joints are within the first [rad]; beyond the second, they mean no limit."""
 ARM_JOINTS = 4
-"""Number of joints, one after the other, from which a robot with one chain at its base is an arm."""
+"""Number of joints in a row from which a robot with a single chain counts as an arm."""
+
+
+def world_warnings(world: World) -> list[Problem]:
+    """Returns probable mistakes in a world that has made no step yet."""
+    return [*place_warnings(world), *value_warnings(world)]
 
 
 def value_warnings(world: World) -> Iterator[Problem]:
@@ -102,9 +107,9 @@ def _hulls(world: World) -> Iterator[Problem]:
         if shape is None or shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
             continue
         is_exact = bool((shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH)
-        if is_exact or getattr(item.config, "convexDecomposition", None) or not (found := volumes(shape.fileName)):
+        if is_exact or getattr(item.config, "convexDecomposition", None) or not (volumes_m3 := volumes(shape.fileName)):
             continue
-        mesh_m3, hull_m3 = (abs(math.prod(shape.meshScale or (1.0,))) * volume for volume in found)
+        mesh_m3, hull_m3 = (abs(math.prod(shape.meshScale or (1.0,))) * volume for volume in volumes_m3)
         if hull_m3 - mesh_m3 > CONCAVE_SHARE * mesh_m3:
             added = f"which adds {hull_m3 - mesh_m3:.2g} m^3 to its {mesh_m3:.2g} m^3"
             message = f"the concave mesh collides as its convex hull, {added}; see convexDecomposition"
@@ -133,7 +138,7 @@ def _topics(world: World) -> Iterator[Problem]:
 
 
 def _efforts(world: World, item: ObjectConfig, config: RobotConfig) -> Iterator[Problem]:
-    """Yields a warning for motors whose effort in the URDF is 0, which means none to most writers of URDFs."""
+    """Yields a warning for motors whose effort in the URDF is 0, by which most authors mean no effort."""
     document = UrdfDocument(config.loadURDF.fileName)
     joints = Joint.all_of(world.pb, world.bodies[config.name].body_id)
     free = {joint.name for joint in joints if joint.is_driven and joint.max_effort == math.inf}

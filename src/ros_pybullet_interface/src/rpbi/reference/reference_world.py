@@ -1,4 +1,4 @@
-"""A world of one body of each type, with all of its ROS interfaces, for the reference pages."""
+"""A world with one body of each type and all of their interfaces, for the reference pages."""
 
 import pybullet
 

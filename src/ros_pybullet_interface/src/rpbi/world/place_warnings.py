@@ -1,4 +1,4 @@
-"""Warnings of where bodies and TF frames are: far away, in each other, on planes, on floors where they roll on."""
+"""Warnings about the places of bodies and TF frames: bodies that are far away, overlap, rest on planes or roll away."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,25 +15,28 @@ from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.client import MAXIMAL_COORDINATES
 from rpbi.engine.inputs import PoseInput
 from rpbi.sensors.link_pose import LinkPoseSensor
-from rpbi.world import World
 
-from .parts import file_of, is_still, some
+from .world import World
 
+MAX_NAMES = 3
+"""Bodies or links that a warning names; it counts the others."""
 FAR_M = 100.0
-"""Distance from the origin, along an axis, from which a position is probably in millimetres."""
+"""Distance from the origin, along an axis, beyond which a position is probably in millimetres."""
 TOUCHING_M = 1e-3
 """Bodies that overlap by less only touch: PyBullet has margins around meshes."""
 HANGING_M = 0.02
-"""Height above what is below from which a body of mass 0 hangs in the air."""
+"""Gap below a body of mass 0 beyond which it hangs in the air."""
 MAX_FALL_M = 100.0
 """Height above a plane from which a body is expected to fall onto it."""
 LEVEL = 0.9999
-"""Cosine of the largest slope that is level."""
+"""Cosine of the largest slope that counts as level."""
 PLANE_ADVICE = (
     "planes lose contact points of what slides on them, and forces chatter; use a box, such as {shapeType: GEOM_BOX, "
     "halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
 )
 ROLLING_ADVICE = "changeDynamics: {rollingFriction: 0.001} stops it, rollingFriction: 0 states that it may roll"
+_FLAT = ({pybullet.GEOM_PLANE}, {pybullet.GEOM_BOX})
+_ROUND = {pybullet.GEOM_SPHERE, pybullet.GEOM_CAPSULE}
 
 
 def place_warnings(world: World) -> Iterator[Problem]:
@@ -97,15 +100,11 @@ def _hanging(world: World) -> Iterator[Problem]:
                 yield Problem(item.file, "loadURDF.fileName", f"{message}; useFixedBase: true states that it is fixed")
 
 
-_FLAT = ({pybullet.GEOM_PLANE}, {pybullet.GEOM_BOX})
-_ROUND = {pybullet.GEOM_SPHERE, pybullet.GEOM_CAPSULE}
-
-
 def _overlaps(world: World) -> Iterator[Problem]:
-    """Yields a warning for each pair of bodies that are in each other, unless nothing can push them apart."""
+    """Yields a warning for each pair of bodies that penetrate each other, unless nothing can push them apart."""
     for one, other in _neighbours([body for body in world.bodies.values() if _has_place(world, body)]):
-        found = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
-        depths = {(point[3], point[4]): -point[8] for point in sorted(found, key=lambda point: -point[8])}
+        points = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
+        depths = {(point[3], point[4]): -point[8] for point in sorted(points, key=lambda point: -point[8])}
         depths = {links: depth for links, depth in depths.items() if not _are_still(one, other, *links)}
         if depths and (deepest := max(depths.items(), key=lambda item: item[1]))[1] > TOUCHING_M:
             (link, other_link), depth = deepest
@@ -145,7 +144,7 @@ def _shape_kinds(body: Body) -> set[int]:
 
 
 def _needs_points(body: Body) -> bool:
-    """Returns whether a body can fall and slide and stands on more than one contact point, as all but a ball do."""
+    """Returns whether a body can fall and slide, and rests on more than one contact point, as all but balls do."""
     return not is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
 
 
@@ -155,10 +154,10 @@ def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool
     Args:
         level: Least cosine of the slope.
     """
-    found = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
-    if not found:
+    points = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
+    if not points:
         return False
-    nearest = min(found, key=lambda point: point[8])
+    nearest = min(points, key=lambda point: point[8])
     lowest, below, normal, gap = nearest[5:9]
     if dot(normal, world.pb.gravity) >= -level * math.hypot(*world.pb.gravity):
         return False
@@ -169,7 +168,7 @@ def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool
 
 
 def _has_place(world: World, body: Body) -> bool:
-    """Returns whether a body has collisions and is at its place, which another node's frame will not change."""
+    """Returns whether a body has collisions, and its place does not depend on a TF frame of another node."""
     is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
     return body.has_physics and not body.is_soft and is_placed
 
@@ -191,7 +190,7 @@ class _Frames:
         self._followed = {slot: each for slot, each in world.inputs.items() if isinstance(each, PoseInput)}
 
     def warnings(self) -> Iterator[Problem]:
-        """Yields a warning for each frame that somebody needs and nobody publishes, or two do."""
+        """Yields a warning for each frame that is needed but not published, or is published twice."""
         main = self._world.loaded.file
         for index, each in enumerate(self._world.config.poses):
             key = f"poses[{index}]"
@@ -207,7 +206,7 @@ class _Frames:
                 yield Problem(file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
-        """Returns the body whose frame it is by its name, if that can publish any."""
+        """Returns the body to which a frame belongs by its name, if that body can publish frames."""
         parts = frame.split("/")
         body = self._world.bodies.get(parts[1]) if len(parts) > 1 and parts[0] == "rpbi" else None
         can_publish = isinstance(body, JointedBody) or hasattr(getattr(body, "config", None), "broadcast_hz")
@@ -224,7 +223,7 @@ class _Frames:
         return frames
 
     def _missing(self, tf_id: str) -> str | None:
-        """Returns what is wrong with a frame that is needed, None if it is published."""
+        """Returns the problem of a frame that is needed, None if it is published."""
         frame = self._world.config.without_prefix(tf_id)
         missing = f"nothing here publishes the TF frame '{tf_id}'"
         if frame in self._published:
@@ -239,3 +238,30 @@ class _Frames:
             return None
         key = "broadcast_link_states: true" if isinstance(body, JointedBody) else "broadcast_hz"
         return missing + (hint(frame, frames) if frames else f"; '{body.name}' does with {key}")
+
+
+def file_of(world: World, name: str) -> str:
+    """Returns the file of a body or camera."""
+    files = {item.config.name: item.file for item in world.loaded.objects}
+    return {**files, **{camera.config.name: camera.file for camera in world.loaded.cameras}}[name]
+
+
+def some(names: Sequence[str]) -> str:
+    """Returns the first names as text, with the number of the others."""
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return ", ".join(names[:MAX_NAMES]) + more
+
+
+def is_still(body: Body, link: int) -> bool:
+    """Returns whether a link is static: a fixed base, and all links fixed to it."""
+    if body.is_soft:
+        return False
+    if not body.has_physics:
+        return True
+    while link >= 0:
+        info = body.pb.getJointInfo(body.body_id, link)
+        if info[2] != pybullet.JOINT_FIXED:
+            return False
+        link = info[16]
+    load = getattr(getattr(body, "config", None), "loadURDF", None)
+    return bool(load is not None and load.useFixedBase) or body.dynamics_info(-1)[0] == 0.0

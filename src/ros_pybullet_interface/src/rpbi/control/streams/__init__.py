@@ -1,1 +1,0 @@
-"""Streams of joint targets: their playout delay, and the motion between targets."""

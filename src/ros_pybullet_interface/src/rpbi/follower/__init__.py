@@ -1,1 +1,0 @@
-"""The process that follows a world, and forks itself."""
