@@ -71,7 +71,7 @@ def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
 
 
 def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
-    """Returns where others touch a body, and their forces."""
+    """Returns the contact points of a body, and their forces."""
     points = [
         ContactPoint(
             link=point.link,
@@ -92,7 +92,7 @@ def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
 
 
 def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
-    """Returns arrows in place of those before."""
+    """Returns arrows that replace the previous ones."""
     header = _header(stamp_ns)
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     for number, (start, end) in enumerate(sample.arrows):
@@ -225,7 +225,7 @@ TRAJECTORY_STATE = Topic(
     f"rpbi/{{name}}/{CONTROLLER}/state",
     JointTrajectoryControllerState,
     state_message,
-    "Where joints are to be on the trajectory, and where they are; `state_publish_rate`.",
+    "Desired and measured states of the joints on the trajectory; `state_publish_rate`.",
 )
 VICON = Topic(
     "vicon/{name}",

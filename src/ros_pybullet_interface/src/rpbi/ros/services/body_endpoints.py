@@ -1,4 +1,4 @@
-"""All that a body has in ROS beside its samples and inputs: tables, and how it is opened and closed."""
+"""Services, topics and other parts of a body in ROS, besides its samples and inputs."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -170,7 +170,7 @@ class BodyEndpoints:
         self._open: dict[str, ExitStack] = {}
 
     def open(self, body: Body) -> None:
-        """Opens all that a body has; when it raises, nothing is left open."""
+        """Opens all parts of a body; if one fails, none stays open."""
 
         def contexts(owners: Sequence[str]) -> list[BodyContext]:
             return [BodyContext(body.name, owner, self._simulation, self._ask) for owner in owners]
@@ -190,7 +190,7 @@ class BodyEndpoints:
             self._open[body.name] = stack.pop_all()
 
     def close(self, name: str) -> None:
-        """Closes all that a body had."""
+        """Closes all parts of a body."""
         stack = self._open.pop(name, None)
         if stack is not None:
             stack.close()

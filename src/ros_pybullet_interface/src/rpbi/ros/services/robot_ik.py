@@ -26,7 +26,7 @@ _warn = ThrottledWarning()
 
 
 def moved_by_ik(body: Body) -> tuple[str, ...]:
-    """Returns the owner of the topic: a robot that is to have it."""
+    """Returns the owner of the topic, for a robot that has it."""
     return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
@@ -39,7 +39,7 @@ def inverse_kinematics(
     success unless the robot is `strict`.
 
     Raises:
-        InterfaceError: If the robot has no such link or has gone.
+        InterfaceError: If the robot has no such link or was removed.
         ValueError: If a field of the problem does not make sense.
     """
     solution = solve_for_robot(context, request.problem)
@@ -54,10 +54,10 @@ def inverse_kinematics(
 
 
 def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:
-    """Hands the solution to the robot as target of the joints that move the link; the others keep theirs.
+    """Makes the solution the target of the joints that move the link; other joints keep theirs.
 
     Raises:
-        InterfaceError: If the robot has no such link or has gone.
+        InterfaceError: If the robot has no such link or was removed.
         ValueError: If a field of the problem does not make sense, or the target is out of reach of a robot that is
             `strict`: then nothing moves.
     """
@@ -78,7 +78,7 @@ def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) ->
     """Returns whether the link of a problem is now near the problem's target in the world, and in words how far off.
 
     Raises:
-        InterfaceError: If the robot has gone.
+        InterfaceError: If the robot was removed.
     """
     robot: JointedBody = context.body
     base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()))
@@ -95,10 +95,10 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
     """Solves a problem with a target in the world, for the present state of the robot.
 
     The search starts at the message's `currentPosition`, or else where the robot's joints are. Any thread but that of
-    the simulation may call it; the simulation goes on meanwhile.
+    the simulation may call it; the simulation continues meanwhile.
 
     Raises:
-        InterfaceError: If the robot has no such link or has gone.
+        InterfaceError: If the robot has no such link or was removed.
         ValueError: If a field of the problem does not make sense.
     """
     robot: JointedBody = context.body

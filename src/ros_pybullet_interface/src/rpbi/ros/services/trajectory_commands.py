@@ -15,12 +15,12 @@ from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
-    """Returns the owner of what every robot with a follower of trajectories has."""
+    """Returns the owner of the topics and services of a robot that follows trajectories."""
     return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
 
 
 def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
-    """Returns the request of a message; efforts beside positions are ignored."""
+    """Returns the request of a message; efforts are ignored."""
     points = tuple(
         TrajectoryPoint(
             point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
@@ -31,7 +31,7 @@ def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
 
 
 def goal_tolerances(goal: Any) -> GoalTolerances:
-    """Returns the tolerances of a control_msgs/FollowJointTrajectoryGoal; accelerations are not looked at."""
+    """Returns the tolerances of a control_msgs/FollowJointTrajectoryGoal; accelerations are ignored."""
     return GoalTolerances(
         _tolerances(goal.path_tolerance), _tolerances(goal.goal_tolerance), goal.goal_time_tolerance.to_sec()
     )

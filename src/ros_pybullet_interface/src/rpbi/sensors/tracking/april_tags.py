@@ -1,4 +1,4 @@
-"""AprilTags as a detector reports them that looks at a camera's images."""
+"""AprilTags as a detector reports them from a camera's images."""
 
 from __future__ import annotations
 
