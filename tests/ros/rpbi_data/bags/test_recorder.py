@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,9 @@ from std_msgs.msg import Float64, Int64
 
 from custom_ros_tools.ros.lifecycle.timed_master import allow_large_integers
 from rpbi_data import Recorder, bag_to_dataframes
+from rpbi_data.bags import bag_writer_node
 from rpbi_data.bags import recorded_topics as recorder_module
+from rpbi_data.bags.bag_writer_node import BagWriter
 from rpbi_data.bags.connected_topics import count_received
 from rpbi_data.bags.errors import RecordingError
 
@@ -324,6 +327,26 @@ def test_start_and_stop_out_of_order_are_refused(ros: Any, tmp_path: Path) -> No
     with pytest.raises(RecordingError, match="going on already"):
         recorder.start()
     assert recorder.stop() == tmp_path / "a.bag"
+
+
+def test_a_signal_late_in_a_poll_ends_the_writer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine, a process goes on late after a signal: when the timeout of its queue is over."""
+    monkeypatch.setattr(rospy, "get_param", lambda _, default: default)
+    writer = BagWriter(tmp_path / "a.bag", 1.0)
+
+    def end(*_: Any) -> None:
+        writer.end()
+        time.sleep(2.0 * bag_writer_node._POLL_S)
+
+    before = signal.signal(signal.SIGUSR1, end)
+    sender = threading.Timer(1.5 * bag_writer_node._POLL_S, os.kill, [os.getpid(), signal.SIGUSR1])
+    sender.start()
+    try:
+        writer.run([])
+    finally:
+        sender.join()
+        signal.signal(signal.SIGUSR1, before)
+    assert (tmp_path / "a.bag").exists()
 
 
 def test_simulated_time_without_a_clock_is_named(ros: Any, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ import queue
 import shutil
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -55,15 +54,20 @@ class BagWriter:
 
     def __init__(self, path: Path, min_space_mb: float) -> None:
         self._path, self._min_space_mb = path, min_space_mb
-        self._arrivals: queue.SimpleQueue[_Arrival] = queue.SimpleQueue()
+        self._arrivals: queue.SimpleQueue[_Arrival | None] = queue.SimpleQueue()
         self._connections: dict[tuple[str, ...], Any] = {}
-        self._is_ended = threading.Event()
+        self._is_ended = False
         self._is_time_simulated = False
         self._simulated_time = genpy.Time()
 
     def end(self) -> None:
-        """Makes `run` write the received messages, close the bag, and return."""
-        self._is_ended.set()
+        """Makes `run` write the received messages, close the bag, and return.
+
+        Signal handlers may call it: it takes no lock. `SimpleQueue.get` of Python 3.11 may wait for ever if a signal
+        interrupts it shortly before its timeout, so it is sent an item.
+        """
+        self._is_ended = True
+        self._arrivals.put(None)
 
     def run(self, topics: Sequence[str]) -> None:
         """Writes topics until `end`.
@@ -79,8 +83,9 @@ class BagWriter:
         for topic, callback in callbacks.items():
             rospy.Subscriber(topic, rospy.AnyMsg, callback, queue_size=None, tcp_nodelay=True)
         while not self._now():
-            if self._is_ended.wait(_POLL_S):
+            if self._is_ended:
                 return
+            time.sleep(_POLL_S)
         active = self._path.with_name(f"{self._path.name}.active")
         with rosbag.Bag(str(active), "w", compression="lz4") as bag:
             self._write_all(bag)
@@ -89,16 +94,17 @@ class BagWriter:
     def _write_all(self, bag: rosbag.Bag) -> None:
         flushed_s = time.monotonic()
         untimed: list[_Arrival] = []  # received before the first /clock: they get the time of the next message
-        while not (self._is_ended.is_set() and self._arrivals.empty()):
+        while not (self._is_ended and self._arrivals.empty()):
             try:
                 arrival = self._arrivals.get(timeout=_POLL_S)
+            except queue.Empty:
+                arrival = None
+            if arrival is not None:
                 untimed.append(arrival)
                 if arrival.time:
                     for each in untimed:
                         self._write(bag, each, arrival.time)
                     untimed.clear()
-            except queue.Empty:
-                pass
             if (now_s := time.monotonic()) - flushed_s > _FLUSH_S:
                 flushed_s = now_s
                 bag.flush()

@@ -69,7 +69,7 @@ class LfdNode:
         self._demonstration: Run | None = None
         self._skill: PushSkill | None = None
         self._quiet_s = math.inf
-        self._wanted: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._wanted: queue.Queue[str] = queue.Queue()
         self._actions = {"home": self._home, "demonstrate": self._demonstrate, "learn": self._learn_or_execute}
         self._name = "start"
         self._state = rospy.Publisher("lfd/state", String, queue_size=1, latch=True)
