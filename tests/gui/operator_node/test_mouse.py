@@ -93,6 +93,17 @@ def test_drag_is_measured_from_its_start_in_half_windows(screen, reader):
     reader.until(lambda: reader.is_at_rest, "it is let go")
 
 
+def test_a_drag_before_the_first_reading_counts(screen):
+    """On a busy machine, the window may be shown and pressed before the device is first read."""
+    reader = Reader("mouse", DEVICES.make("mouse", {}))
+    with contextlib.closing(reader.feed):
+        reader.feed.step(0.0)
+        place = window(screen)
+        at = [str(place.x + 60), str(place.y + 80)]
+        screen.run("xdotool", "mousemove", *at, "mousedown", "1", "mousemove", str(place.x + 160), str(place.y + 80))
+        reader.until(lambda: reader.axis("x") > 0.4, "it is dragged")
+
+
 def test_notches_of_the_wheel_add_up(screen, open_mouse):
     reader = open_mouse(wheel_return_s=600.0)
     place = window(screen)

@@ -58,12 +58,14 @@ class Mouse(Device):
         window.bind("<Motion>", self._move)
         window.bind("<Unmap>", lambda _: self._reset())
         window.bind("<Configure>", lambda _: self._draw())
+        window.show()
         self._draw()
 
     def read(self, timeout_s: float) -> Reading | None:
         if self._window is None:
             raise DeviceError("mouse", "it is not open")
-        self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
+        if not self._is_new:  # else it was just opened: the first reading is at rest, whatever has been pressed since
+            self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
         if not self._is_new and time.monotonic() >= self._wheel_over_s:  # each motion of the wheel is reported first
             self._wheel, self._wheel_over_s, self._is_new = 0.0, math.inf, True
         if not self._is_new:

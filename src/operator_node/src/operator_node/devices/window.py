@@ -43,6 +43,10 @@ class DeviceWindow:
         """Binds a function to events, by their tkinter names, anywhere in the window."""
         self._root.bind(sequence, callback)
 
+    def show(self) -> None:
+        """Shows the window; events of the user are kept for `wait`, which shows it otherwise."""
+        self._root.update_idletasks()
+
     def focus(self) -> None:
         """Requests the keyboard focus."""
         self._root.focus_force()
