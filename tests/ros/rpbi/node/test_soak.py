@@ -7,12 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-BENCHMARKS = Path(__file__).resolve().parents[4] / "dev/benchmarks"
-RUN = """
-import json, soak
 import pytest
 
 pytestmark = pytest.mark.thorough
+
+BENCHMARKS = Path(__file__).resolve().parents[4] / "dev/benchmarks"
+RUN = """
+import json, soak
 soak.CAMERA["intrinsics"].update(width=320, height=240)
 print('results:', json.dumps({one.figure: one.value for one in soak.run(True, 6.0)}))
 """
