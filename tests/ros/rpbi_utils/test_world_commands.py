@@ -33,7 +33,8 @@ def ros(ros_master, tmp_path_factory):
     system = RosSystem(folder)
     try:
         robots = (iiwa("arm"), mobile_base(folder, loadURDF={"basePosition": [-1.0, 0.0, 0.0]}))
-        system.simulator(main_config(folder, collision=(FLOOR,), robots=robots), namespace="/lab/")
+        world = main_config(folder, timeStep=0.004, collision=(FLOOR,), robots=robots)
+        system.simulator(world, namespace="/lab/")
         yield system
     finally:
         system.close()

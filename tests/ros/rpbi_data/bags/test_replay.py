@@ -46,7 +46,8 @@ def _world(folder, **main):
     table = {**box("table"), "object_tf": {"tf_id": "table", "hz": 50}}
     del table["baseMass"]
     base = mobile_base(folder, loadURDF={"basePosition": [-1.0, 0.0, 0.0]})
-    return main_config(folder, collision=(FLOOR, table), dynamic=things, robots=(arm, base), state_hash_hz=20.0, **main)
+    parts = {"collision": (FLOOR, table), "dynamic": things, "robots": (arm, base)}
+    return main_config(folder, **parts, **{"timeStep": 0.002, "state_hash_hz": 20.0, **main})
 
 
 def _session(ros, seconds):
@@ -118,16 +119,16 @@ def bag(ros_master, tmp_path_factory):
         with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
             begin = _reached(states, tick=1)
             target.publish(JointState(name=JOINTS[:1], position=[0.4]))
-            begin = _reached(states, tick=begin + 1000)
+            begin = _reached(states, tick=begin + 500)
         path = folder / "session.bag"
         with Recorder(path, TOPICS):
             begin = states.messages[-1].tick
             _session(ros, 2.5)
-            _reached(states, tick=begin + 2500)
+            _reached(states, tick=begin + 1250)
             assert ros.call("/rpbi/reset", Trigger).success
-            _reached(states, tick=500, resets=1)
+            _reached(states, tick=250, resets=1)
             _session(ros, 1.0)
-            _reached(states, tick=1500, resets=1)
+            _reached(states, tick=750, resets=1)
         yield path
     finally:
         ros.close()
@@ -140,7 +141,7 @@ def test_a_session_is_the_same_in_a_new_process(bag):
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=500)
     assert done.returncode == 0, done.stdout + done.stderr
     agreed, ticks = (int(word) for word in done.stdout.split() if word.isdigit())
-    assert agreed > 60 and ticks > 3000
+    assert agreed > 60 and ticks > 1500
     kinds = set()
     with rosbag.Bag(str(bag)) as opened:
         for _, message, _ in opened.read_messages(["/rpbi/commands"]):
@@ -167,7 +168,7 @@ def test_the_first_differing_tick_is_named(bag, tmp_path):
 
     done = _replay(_changed(bag, tmp_path / "spoilt.bag", spoil))
     assert done.returncode == 1
-    assert "first difference at tick 300 after reset 1, after tick 250" in done.stdout
+    assert "first difference at tick 300 after reset 1, after tick 275" in done.stdout
 
 
 def test_bag_that_begins_too_late_is_reported_with_a_remedy(bag, tmp_path):

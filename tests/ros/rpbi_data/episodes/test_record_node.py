@@ -67,7 +67,8 @@ class _Session:
 
     def __init__(self, ros: Any, tmp_path: Path, command: str = RECORD, **parameters: Any) -> None:
         self.ros, self.folder = ros, EpisodeFolder(tmp_path / "demos")
-        world = main_config(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),), state_hash_hz=20.0)
+        parts = {"collision": (FLOOR,), "dynamic": (box("box"),), "robots": (iiwa(),)}
+        world = main_config(tmp_path, **parts, timeStep=0.004, state_hash_hz=20.0)
         ros.simulator(world, use_sim_time=True)
         parameters = {"disk_reserve_mb": 1.0, "copy_from": [str(tmp_path)], **parameters}
         words = shlex.split(command.replace("$HOME", str(tmp_path)))
@@ -98,7 +99,7 @@ class _Session:
         with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
             target.publish(JointState(name=JOINTS, position=[angle, angle / 2]))
             tick = self.states.messages[-1].tick
-            wait_until(lambda: self.states.messages[-1].tick > tick + 300, "it moves")
+            wait_until(lambda: self.states.messages[-1].tick > tick + 75, "it moves")
 
 
 def _answer(answer: Any) -> str:
