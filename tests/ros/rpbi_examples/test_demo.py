@@ -24,7 +24,7 @@ JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     out = tmp_path_factory.mktemp("demo")
-    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "8", "--out", str(out)]
+    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "5", "--out", str(out)]
     return out, subprocess.run(command, capture_output=True, text=True, timeout=500)
 
 

@@ -16,13 +16,18 @@ from workplace import Port
 from ros_pybullet_interface.msg import SimulationState
 
 LAUNCH = Path(__file__).resolve().parents[3] / "src/rpbi_examples/launch"
-SCENES = ("cup", "dual_arm", "factory", "handover", "talos", "wiping")
 ARGUMENTS = {
-    **{scene: ["real_time_factor:=0"] for scene in SCENES},
     "basic_example_dual_iiwa": [],
+    "basic_example_human_model": [],
+    "basic_example_nextage": [],
     "basic_example_panda": [],
+    "basic_example_talos": [],
     "clutter": [],
+    "cup": [],
+    "dual_arm": [],
+    "factory": [],
     "grasp_example": [],
+    "handover": [],
     "human_interaction": ["device:=scripted", "output:={folder}"],
     "interpolation": [],
     "lfd": ["operator:=joystick", "virtual:=true", "out:={folder}"],
@@ -31,7 +36,9 @@ ARGUMENTS = {
     "pybullet_rgbd_example": [],
     "sampling_mpc": [],
     "soft_body": [],
+    "talos": [],
     "telepresence": ["port:={port}"],
+    "wiping": [],
     "wiping_example": [],
 }
 WITHOUT_ROS = {"/mvn_emulator"}
