@@ -232,7 +232,7 @@ def test_launch_files_of_the_release_get_missing_parameters_named(parameters, ro
     guard, _ = guard_of_parameters()
     guard.start()
     assert guard.decide((0.0, 0.0), CheckContext()).command
-    heard.wait_for(["the robot is assumed to stand at the first target"])
+    heard.wait_for(["the robot is assumed to be at the first target"])
 
 
 def test_stamps_that_go_back_are_warned_of_once_a_minute(parameters, ros):
@@ -249,8 +249,8 @@ def test_stamps_that_go_back_are_warned_of_once_a_minute(parameters, ros):
     rospy.logwarn("all have been published")
     heard.wait_for(["all have been published"])
     assert [log.msg for log in heard.logs("stamp")] == [
-        "/joint_states/target: staleness: the stamp of the target is 0.01 s before that of the target before; give each"
-        " target a later stamp, or none, and let one source publish"
+        "/joint_states/target: staleness: the stamp of the target is 0.01 s earlier than that of the previous target;"
+        " give each target a later stamp, or none, and let only one source publish"
     ]
 
 

@@ -55,13 +55,13 @@ def test_from_inside_the_margin_the_robot_gets_away():
 @pytest.mark.parametrize("is_mended", [True, False])
 def test_hill_climbing_finds_unsafe_braking_only_with_sparse_rows(monkeypatch, is_mended):
     """A wrist that swings its flange through the lowest point is nearest to the table between two sparse rows."""
-    every = Proximity._judged
+    every = Proximity._first_in_rows
 
     def sparse(self, motion, suspects, rows):
         return every(self, motion, suspects, rows[self._sparse(motion.travelled[rows] @ self._furthest)])
 
     if not is_mended:
-        monkeypatch.setattr(Proximity, "_judged", sparse)
+        monkeypatch.setattr(Proximity, "_first_in_rows", sparse)
     climber = Climber(LWR, LWR.guard("limit"), np.random.default_rng(SEED))
     least_m, course = climber.climb(STEPS)
     assert (least_m >= MARGIN_M - TOLERANCE_M) == is_mended, course

@@ -10,7 +10,7 @@ from robot_model.collision.shapes import Obstacle
 from robot_model.geometry import Pose
 from robot_model.model import RobotModel
 from safe_robot.braking import Brake
-from safe_robot.checks.proximity import Proximity, _spread
+from safe_robot.checks.proximity import Proximity, _spread_bounds
 from safe_robot.checks.proximity_check import link_distances
 from safe_robot.motion import CommandedMotion, State
 
@@ -73,5 +73,5 @@ def test_motion_is_safe_exactly_if_each_row_is(distances):
 
 def test_row_without_own_bound_inherits_a_neighbours_minus_the_distance():
     bounds = np.array(((np.inf,), (-np.inf,), (0.5,)))
-    _spread(bounds, np.array((0, 2)), np.array(((0.0,), (0.2,), (0.3,))))
+    _spread_bounds(bounds, np.array((0, 2)), np.array(((0.0,), (0.2,), (0.3,))))
     assert bounds[:, 0] == pytest.approx((np.inf, 0.4, 0.5)), "inf says that a row may be, and nothing of other rows"

@@ -20,7 +20,7 @@ PYBULLET_DATA_PATH = "pybullet_data_path"
 """Value in search paths that selects the folder of PyBullet's data."""
 LONGEST_PATH = 1000
 """Largest length of a path; PyBullet copies it into 1024 bytes."""
-OF_KERNEL = ("/proc/", "/sys/", "/dev/")
+KERNEL_FOLDERS = ("/proc/", "/sys/", "/dev/")
 """Folders with special files: reading one may never end."""
 ASSETS = "example-robot-data"
 """Python package of the robots of the extra `assets`; paths name it like a ROS package,
@@ -48,7 +48,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     candidates = [path] if path.is_absolute() else [Path(folder) / path for folder in folders]
     try:
         candidate = next((each for each in candidates if each.is_file()), None)
-        is_of_kernel = candidate is not None and str(candidate.resolve()).startswith(OF_KERNEL)
+        is_of_kernel = candidate is not None and str(candidate.resolve()).startswith(KERNEL_FOLDERS)
     except OSError as error:
         raise ValueError(f"{shortened(name)}: {(error.strerror or str(error)).lower()}") from None
     if candidate is not None:

@@ -61,7 +61,7 @@ class BackendConformance(ABC):
     """Tests that any library passes; the reference is `robot_model`.
 
     Attributes:
-        robots: URDFs of robots, beside those of this module.
+        robots: URDFs of robots, in addition to those of this module.
         follows_mimics: Whether it moves joints that mimic others.
         tolerance: Largest difference between poses [m and rad].
         step: Step of finite differences [rad or m]; their error grows with its square and with `tolerance / step`.

@@ -65,7 +65,7 @@ def files_named_in(data: bytes) -> Iterator[tuple[bytes, str]]:
             yield line, os.fsdecode(words[1].rstrip())
 
 
-def kept(name: str, make: Callable[[Path], None]) -> Path:
+def cached(name: str, make: Callable[[Path], None]) -> Path:
     """Returns a folder of the cache, which is made if it is missing.
 
     If several processes make it at the same time, the first result is kept.

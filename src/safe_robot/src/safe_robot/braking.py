@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 GROWTH = 1.15
-"""Ratio of each duration of braking to the one before."""
+"""Ratio of each prepared duration of braking to the previous one."""
 INSIDE = 1.0 - 1e-6
-"""Braking keeps this share of the limits, so that rounding does not bring it over them."""
+"""Share of the limits that braking uses, so that rounding does not exceed them."""
 TINY = 1e-300
+"""Added to divisors that may be 0."""
 MAX_PERIODS = 10_000
 """Largest number of periods of a braking; all lengths up to it are prepared."""
 FASTEST = 10.0

@@ -29,7 +29,7 @@ class Violation(NamedTuple):
 
     Attributes:
         check: Name of the check.
-        subject: The joint, the link, the pair of links, or what else it is about.
+        subject: The joint, link, pair of links, or another subject.
         value: Value that the target would cause, in `unit`; NaN, as `limit`, if there is no number.
         limit: Allowed value, in `unit`.
         unit: The unit of both.

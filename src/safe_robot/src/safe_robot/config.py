@@ -17,17 +17,17 @@ class GuardConfig(ConfigModel):
     policy: Literal["reject", "limit"] = Field(
         "reject",
         description="Policy for unsafe targets: reject sends nothing and halts; limit sends a safe command instead,"
-        " and goes on.",
+        " and continues.",
     )
     on_halt: Literal["nothing", "brake"] = Field(
         "nothing",
-        description="Commands after a halt in the middle of a motion: none; or, one each period_s, the braking that"
-        " was found safe with the last command.",
+        description="Commands after a halt during a motion: none; or the braking that was found safe with the last"
+        " command, one command each period_s.",
     )
     period_s: Annotated[Seconds, Field(ge=1e-5, le=10.0)] = Field(
         0.009,
-        description="Time between two commands: none follows another sooner, and each counts as so much time. A few"
-        " percent less than that between two targets, so that late ones can be caught up with.",
+        description="Shortest time between two commands, and the time that each of them counts as. Choose a few percent"
+        " less than the time between two targets, so that the guard can catch up after late ones.",
     )
     joint_names: ListOf[Text] = Field((), description="The joints that are guarded; by default all of the robot.")
     limits: LimitsConfig = Field(LimitsConfig(), description="Limits of the joints.")
@@ -69,8 +69,8 @@ class NodeConfig(ConfigModel):
     )
     silence_s: Seconds = Field(
         0.02,
-        description="Largest age of the newest target when one is sent on; older ones wait for a newer one, and a"
-        " source that died is followed no longer than this.",
+        description="Largest age of the newest target at which waiting targets are sent; beyond it, they wait for a"
+        " newer one. A source that has died is followed for no longer than this.",
     )
     base_frame: Text | None = Field(
         None,
@@ -78,5 +78,5 @@ class NodeConfig(ConfigModel):
         " the bodies of rpbi/markers.",
     )
     left_out: ListOf[Text] = Field(
-        (), description="Bodies of rpbi/markers that are no obstacles: first the robot itself."
+        (), description="Bodies of rpbi/markers that are no obstacles, in particular the robot itself."
     )

@@ -94,7 +94,7 @@ class CheckConformance:
     def test_non_finite_target_is_refused(self) -> None:
         """Comparisons with NaN are false, so a check for values that are too large would accept it."""
         if not self.is_about_motion:
-            pytest.skip(f"'{self.check_name}' does not look at the motion")
+            pytest.skip(f"'{self.check_name}' does not check the motion")
         motion, context = self.safe()
         nowhere = self.motion(motion.start, [math.nan] * len(motion.start.position))
         assert self.make().check(nowhere, context) is not None

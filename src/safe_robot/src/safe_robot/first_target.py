@@ -47,7 +47,7 @@ class FirstTarget:
             last: The last n commanded positions [rad or m]; None if there are none.
             context: Everything else that the decision depends on.
         """
-        there = self._whereabouts(target, last, context)
+        there = self._present_position(target, last, context)
         if there is None:
             return Violation("start", "measured positions", math.inf, 0.0, "s", words=UNKNOWN)
         violation = self._far_from(there, target) or self._far_outside(there)
@@ -63,7 +63,9 @@ class FirstTarget:
             return State.at_rest(there)
         return State.at_rest(last)
 
-    def _whereabouts(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> np.ndarray | None:
+    def _present_position(
+        self, target: np.ndarray, last: np.ndarray | None, context: CheckContext
+    ) -> np.ndarray | None:
         names = self._robot.joint_names
         if all(name in context.measured for name in names):
             return np.array([context.measured[name] for name in names])

@@ -1,4 +1,4 @@
-"""The guard: decides the command to the robot for each target."""
+"""The guard: decides on the command to the robot for each target."""
 
 import logging
 import math
@@ -149,7 +149,7 @@ class Guard:
         """Passes no further targets; with `on_halt: brake`, `next_braking` has the commands that brake the robot."""
         self.is_halted = True
         if self.config.on_halt == "nothing":
-            self._take_as_at_rest()
+            self._assume_rest()
 
     def wait_for_target(self) -> None:
         """Ends the motion because targets are late, as after a halt; with `limit`, the next target is followed."""
@@ -158,21 +158,21 @@ class Guard:
             return
         self._is_late = True
         if self.config.on_halt == "nothing":
-            self._take_as_at_rest()
+            self._assume_rest()
 
     def rest(self) -> None:
         """Halts without braking: the robot is assumed to rest at the last command."""
         self.is_halted = True
-        self._take_as_at_rest()
+        self._assume_rest()
 
-    def _take_as_at_rest(self) -> None:
+    def _assume_rest(self) -> None:
         if self._state is not None:
             self._state = State.at_rest(self._state.position)
         self._stop = BrakingCommands.none(len(self.joint_names))
 
     def next_braking(self) -> tuple[float, ...] | None:
         """Returns the next command of the braking, due a period after the last command; None if the robot rests."""
-        return self._brake_on() if self.is_braking else None
+        return self._continue_braking() if self.is_braking else None
 
     def decide(self, target: Sequence[float], context: CheckContext) -> Decision:
         """Returns the command for a target.
@@ -238,21 +238,21 @@ class Guard:
             wanted = (
                 tuple(self._state.position.tolist())
                 if is_first
-                else self._shaper.shaped(target, self._state, self._way_to_rest)
+                else self._shaper.shaped(target, self._state, self._braking_commands)
             )
         found = self._evaluate(wanted, context, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED_BY_BRAKING:
-            wanted = tuple(self._way_to_rest[0].tolist())
+            wanted = tuple(self._braking_commands[0].tolist())
             found = self._evaluate(wanted, context, self.checks)
         before, self._target = self._target, target
         if isinstance(found, Violation):
             return self._substitute(target, found, context)
-        if violation := self._passes(target, before, found):
+        if violation := self._overshoot(target, before, found):
             return self._substitute(target, violation, context)
         return Decision(self._commit(found), is_shaped=wanted != target)
 
-    def _passes(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
-        """Returns a joint that passes its target although the target does not move; only for the policy `limit`."""
+    def _overshoot(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
+        """Returns the violation of a joint that would pass a target that does not move; only for the policy `limit`."""
         if self.config.policy == "reject" or before is None or not len(safe.stop.position):
             return None
         assert self._state is not None
@@ -265,7 +265,7 @@ class Guard:
         return Violation("braking", f"joint '{self.joint_names[i]}'", float(end[i]), target[i], unit, True, "position")
 
     @property
-    def _way_to_rest(self) -> np.ndarray:
+    def _braking_commands(self) -> np.ndarray:
         """The commands of the braking that was found safe, k x n, k >= 1."""
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
@@ -273,7 +273,7 @@ class Guard:
     def _brake_or_halt(self, violation: Violation) -> Decision:
         if self.config.policy == "reject" or self._is_first:
             return Decision(None, violation, True)
-        return Decision(self._brake_on(), violation)
+        return Decision(self._continue_braking(), violation)
 
     def _input_problem(self, target: tuple[float, ...]) -> Violation | None:
         n = len(self.joint_names)
@@ -319,15 +319,17 @@ class Guard:
 
     def _brake(self, state: State) -> Brake | None:
         """Returns the braking after a command; joints that continue their present braking keep it."""
-        goes_on = np.zeros(len(state.position), dtype=bool)
+        keeps_braking = np.zeros(len(state.position), dtype=bool)
         if len(self._stop.position):
-            goes_on = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
-        if not goes_on.any():
+            keeps_braking = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
+        if not keeps_braking.any():
             return self._braking.plan(state.velocity, state.acceleration)
-        brake = self._braking.plan(np.where(goes_on, 0.0, state.velocity), np.where(goes_on, 0.0, state.acceleration))
+        brake = self._braking.plan(
+            np.where(keeps_braking, 0.0, state.velocity), np.where(keeps_braking, 0.0, state.acceleration)
+        )
         if brake is None:
             return None
-        return brake.with_joints_of(self._stop.after_first().brake_from(state.position), goes_on)
+        return brake.with_joints_of(self._stop.after_first().brake_from(state.position), keeps_braking)
 
     def _cannot_brake(self, state: State) -> Violation:
         share = np.abs(state.acceleration) / self.limits.acceleration
@@ -348,15 +350,15 @@ class Guard:
         safe = self._nearest.find(
             np.array(target),
             self._state,
-            self._way_to_rest,
+            self._braking_commands,
             lambda wanted, checks: self._evaluate(tuple(wanted.tolist()), context, checks, is_trial=True),
         )
-        return Decision(self._brake_on() if safe is None else self._commit(safe), violation)
+        return Decision(self._continue_braking() if safe is None else self._commit(safe), violation)
 
     def _inside(self, q: np.ndarray) -> list[MarginViolation]:
         return [each for check in self.checks for each in check.inside(q)]
 
-    def _brake_on(self) -> tuple[float, ...]:
+    def _continue_braking(self) -> tuple[float, ...]:
         assert self._state is not None
         if len(self._stop.position):
             self._state = self._state.then(self._stop.position[0], self.config.period_s)

@@ -24,8 +24,10 @@ class LimitsConfig(ConfigModel):
     position_factor: Factor = Field(1.0, description="Share of the range that is used, about its middle.")
     velocity: PerJoint | None = Field(None, description="Largest speed [rad/s or m/s]; by default the URDF's.")
     velocity_factor: Factor = Field(0.95, description="Share of the largest speed that is used.")
-    acceleration: PerJoint | None = Field(None, description="Largest acceleration [rad/s^2 or m/s^2]; else any.")
-    jerk: PerJoint | None = Field(None, description="Largest jerk [rad/s^3 or m/s^3]; by default any.")
+    acceleration: PerJoint | None = Field(
+        None, description="Largest acceleration [rad/s^2 or m/s^2]; unlimited by default."
+    )
+    jerk: PerJoint | None = Field(None, description="Largest jerk [rad/s^3 or m/s^3]; unlimited by default.")
 
 
 class MotionLimits(NamedTuple):

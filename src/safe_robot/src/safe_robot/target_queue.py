@@ -1,4 +1,4 @@
-"""Queue of targets for the guard: one at a time, and only while their source is alive."""
+"""Queue that passes targets to the guard one period apart, and only while new ones arrive."""
 
 import threading
 import time
@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 PATIENCE_S = 0.1
-"""Longest time that targets wait for a sign of life of their source [s]."""
+"""Longest time that targets wait for a newer one [s]."""
 WAKE_UP_S = 0.0002
 """Time by which the queue's thread wakes up before a target is due [s]."""
 
@@ -59,7 +59,7 @@ class TargetQueue(Generic[Item]):
             self._alive_s = max(self._alive_s, now_s - max(age_s, 0.0))
             self._waiting.append((item, now_s))
             if self._left_s(now_s) <= 0.0 and self._is_alive(now_s):
-                self._hand_on()
+                self._pass_on()
             if self._waiting:
                 self.lock.notify()
 
@@ -85,7 +85,7 @@ class TargetQueue(Generic[Item]):
     def _is_alive(self, now_s: float) -> bool:
         return now_s - self._alive_s <= self._silence_s
 
-    def _hand_on(self) -> None:
+    def _pass_on(self) -> None:
         item, _ = self._waiting.popleft()
         begin_s = time.monotonic()  # otherwise each period would be longer by the time of a decision
         if self._on_target(item):
@@ -111,7 +111,7 @@ class TargetQueue(Generic[Item]):
                     self._step = None
                 continue
             if self._is_alive(now_s):
-                self._hand_on()
+                self._pass_on()
                 continue
             if (left_s := self._waiting[0][1] + PATIENCE_S - now_s) > 0.0:
                 return left_s

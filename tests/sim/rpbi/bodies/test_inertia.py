@@ -86,7 +86,7 @@ def test_pybullet_guesses_inertia_that_the_urdf_does_not_give(moments_of):
 @pytest.mark.parametrize("impossible", [inertial(0, 0, 0), inertial(0.1, 0.2, 0.9), inertial(-0.1, 0.2, 0.25)])
 def test_impossible_inertia_is_guessed_and_reported(moments_of, caplog, impossible):
     assert moments_of(impossible) == pytest.approx(BOX_MOMENTS)
-    assert "bell: no body has the moments of inertia of lump: guessed from the shape" in caplog.messages
+    assert "bell: moments of inertia of lump are impossible: guessed from the shape" in caplog.messages
 
 
 def own_messages(caplog):

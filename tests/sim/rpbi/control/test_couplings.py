@@ -172,7 +172,7 @@ def test_each_finger_presses_with_its_own_effort(build):
     ("coupled", "message"),
     [
         ({"thumb": {"joint": "left"}}, "coupled_joints.thumb: unknown joint 'thumb'"),
-        ({"right": {"joint": "thumb"}}, "joint 'right' follows 'thumb', which is none that moves"),
+        ({"right": {"joint": "thumb"}}, "joint 'right' follows 'thumb', which is no moving joint"),
         ({"right": {"joint": "left"}, "left": {"joint": "right"}}, "follows itself in the end"),
         ({"right": {"joint": "left", "multiplier": 0.0}}, "coupled_joints.right.multiplier: must not be 0"),
         ({"right": {"joint": "left", "offset": math.inf}}, "coupled_joints.right.offset: "),
@@ -186,5 +186,5 @@ def test_a_coupling_that_makes_no_sense_is_refused(build, coupled, message):
 
 
 def test_urdf_that_mimics_an_unknown_joint_is_refused(build):
-    with pytest.raises(ConfigError, match="loadURDF.fileName: joint 'right' follows 'thumb', which is none that moves"):
+    with pytest.raises(ConfigError, match="loadURDF.fileName: joint 'right' follows 'thumb', which is no moving joint"):
         build(mimic='<mimic joint="thumb"/>')

@@ -150,7 +150,7 @@ def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
 
     The surfaces of both do not touch.
     """
-    if other.surface is None:  # hpp-fcl itself finds what is inside of such a shape
+    if other.surface is None:  # solid in hpp-fcl, which finds pieces inside of it
         return False
     points = np.zeros((1, 3)) if piece.surface is None else piece.surface.points
     return other.surface.holds(points @ pose[:3, :3].T + pose[:3, 3])

@@ -1,4 +1,4 @@
-"""Changed copies of a URDF."""
+"""Changed copies of a URDF for libraries of kinematics."""
 
 import copy
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from .elements import (
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
     """Returns a URDF without shapes, of all or some links and the joints between them.
 
-    It loads in half a millisecond; with meshes it may take some hundred. Every link has unit mass at its own frame, so
+    It loads in 0.5 ms; with meshes, that may take some 100 ms. Every link has unit mass at its own frame, so
     that PyBullet's centre-of-mass frames are the links' frames.
     """
     root = document.root_link()
@@ -49,7 +49,7 @@ def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
     """
     root = copy.deepcopy(document.root)
     if base is not None:
-        _hang_on(root, base)
+        _reroot(root, base)
     for joint in root.findall("joint"):
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
@@ -66,7 +66,7 @@ def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
     return text_of(new_element("robot", *links, *map(joint_element, joints), name="chain"))
 
 
-def _hang_on(robot: Element, base: str) -> None:
+def _reroot(robot: Element, base: str) -> None:
     """Makes a link the root: reverses the joints above it, with extra links such that joint positions keep their
     meaning."""
     above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}

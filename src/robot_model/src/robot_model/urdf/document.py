@@ -214,5 +214,5 @@ def disabled_collisions(path: str) -> set[frozenset[str]]:
     try:
         root = _robot_in(read_file(path, MAX_BYTES))
     except (OSError, expat.ExpatError, RecursionError) as error:
-        raise ConfigError([Problem(path, "", f"expected a SRDF file: {error}")]) from None
+        raise ConfigError([Problem(path, "", f"expected an SRDF file: {error}")]) from None
     return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in root.iter("disable_collisions")}

@@ -8,7 +8,7 @@ from pathlib import Path
 from custom_ros_tools.config import read_file
 from custom_ros_tools.transforms import rpy_of
 from robot_model.geometry import Pose
-from robot_model.mesh_cache import content_hash, files_named_in, kept
+from robot_model.mesh_cache import cached, content_hash, files_named_in
 
 from .document import UrdfDocument
 from .elements import Element, UrdfJoint, joint_element, new_element, text_of
@@ -89,7 +89,7 @@ def _with_existing_textures(mesh: Path) -> Path:
                 if Path(texture).name == texture:
                     shutil.copyfile(mesh.parent / texture, folder / texture)
 
-        return kept(f"for-ros-{content_hash(str(mesh))}", make) / mesh.name
+        return cached(f"for-ros-{content_hash(str(mesh))}", make) / mesh.name
     except OSError:
         return mesh
 

@@ -1,4 +1,4 @@
-"""Faults in the structure of a URDF that PyBullet would accept, or crash on."""
+"""Faults in the structure of a URDF that PyBullet would accept, or that would crash it."""
 
 import math
 import re
@@ -132,13 +132,13 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
         yield f"expected one link that is no joint's child, got {', '.join(roots[:5])}: is a joint missing?"
     reaching: set[str] = {link for link in links if link not in parents}
     for link in document.links:
-        way: dict[str, None] = {}
-        while link not in reaching and link in parents and link not in way:
-            way[link] = None
+        passed: dict[str, None] = {}
+        while link not in reaching and link in parents and link not in passed:
+            passed[link] = None
             link = parents[link]
-        if link in way:
+        if link in passed:
             yield f"link '{shortened(link)}' is its own ancestor"
-        reaching.update(way)
+        reaching.update(passed)
 
 
 def _mimic_problems(document: UrdfDocument) -> Iterator[str]:
@@ -159,17 +159,17 @@ def _mimic_problems(document: UrdfDocument) -> Iterator[str]:
 def _text_problems(document: UrdfDocument) -> Iterator[str]:
     for count, attribute in enumerate(document.attributes()):
         owner, tag, key, text, is_read = attribute
-        what = f"{owner}: {shortened(tag)}.{shortened(key)}"
+        place = f"{owner}: {shortened(tag)}.{shortened(key)}"
         if count == MAX_ATTRIBUTES:
             yield f"expected at most {MAX_ATTRIBUTES} attributes, got more"
             return
         if tag.startswith("xacro:") or "${" in text:
             left = f"<{shortened(tag)}>" if tag.startswith("xacro:") else f"'{shortened(text)}'"
-            yield f"{what}: {left} is unexpanded xacro: expected a URDF, as the program xacro writes it"
+            yield f"{place}: {left} is unexpanded xacro: expected a URDF, as the program xacro writes it"
         elif is_read and (problem := _text_problem(attribute)):
-            yield f"{what}: {problem}"
+            yield f"{place}: {problem}"
         elif (tag, key) in _NUMBERS and (problem := _number_problem(tag, key, text)):
-            yield f"{what}: {problem}, got '{shortened(text)}'"
+            yield f"{place}: {problem}, got '{shortened(text)}'"
 
 
 def _text_problem(attribute: Attribute) -> str:

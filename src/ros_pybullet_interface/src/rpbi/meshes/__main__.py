@@ -21,8 +21,8 @@ from custom_ros_tools.config import read_file
 from .checks import check_obj
 from .trial import MAX_CPU_S, Use, limit_resources
 
-GETS_NOTHING = b"cannot extract anything useful"
-"""Output of PyBullet for a mesh that it leaves out; the only sign for a visual one."""
+FOUND_NOTHING = b"cannot extract anything useful"
+"""Output of PyBullet for a mesh that it leaves out; for a visual one there is no other sign."""
 
 
 def main() -> None:
@@ -35,17 +35,17 @@ def main() -> None:
     pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
     for use, file in zip(meshes[::2], meshes[1::2], strict=True):
         try:
-            _refuse_nonsense(file)
+            _check_numbers(file)
             _USES[Use(use)](file)
             message = ""
         except (pybullet.error, MemoryError) as error:
             message = str(error) or "out of memory"
-        if _says(said, GETS_NOTHING):
+        if _has_printed(said, FOUND_NOTHING):
             message = "it reads nothing from it"
         os.write(int(report), " ".join(message.split()).encode() + b"\n")
 
 
-def _refuse_nonsense(file: str) -> None:
+def _check_numbers(file: str) -> None:
     """Refuses an STL file with non-finite numbers, and an invalid OBJ file.
 
     PyBullet crashes with these only sometimes, so a trial may not show it.
@@ -61,7 +61,7 @@ def _refuse_nonsense(file: str) -> None:
             raise pybullet.error("it has numbers that are not finite")
 
 
-def _says(said: IO[bytes], words: bytes) -> bool:
+def _has_printed(said: IO[bytes], words: bytes) -> bool:
     """Returns whether PyBullet, which prints by C, has printed something since the last call."""
     ctypes.CDLL(None).fflush(None)
     found = words in os.pread(said.fileno(), 1 << 20, 0)
@@ -70,34 +70,34 @@ def _says(said: IO[bytes], words: bytes) -> bool:
     return found
 
 
-def _see(file: str) -> None:
+def _load_visual(file: str) -> None:
     shape = pybullet.createVisualShape(pybullet.GEOM_MESH, fileName=file)
     _remove(pybullet.createMultiBody(baseVisualShapeIndex=shape))
 
 
-def _feel(file: str) -> None:
+def _load_collision(file: str) -> None:
     for flags in (0, pybullet.GEOM_FORCE_CONCAVE_TRIMESH):
         shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=file, flags=flags)
         _remove(pybullet.createMultiBody(baseMass=0 if flags else 1, baseCollisionShapeIndex=shape))
 
 
-def _stand_on(file: str) -> None:
+def _load_height_field(file: str) -> None:
     shape = pybullet.createCollisionShape(pybullet.GEOM_HEIGHTFIELD, fileName=file)
     _remove(pybullet.createMultiBody(baseCollisionShapeIndex=shape))
 
 
-def _bend(file: str) -> None:
+def _load_soft(file: str) -> None:
     _remove(pybullet.loadSoftBody(file, useMassSpring=1))
 
 
-def _see_link(file: str) -> None:
+def _load_urdf_visual(file: str) -> None:
     body_id = _load_link(f"<visual>{_geometry(file)}</visual>", True)
     if not pybullet.getVisualShapeData(body_id):
         raise pybullet.error("PyBullet leaves it out")
     _remove(body_id)
 
 
-def _feel_link(file: str) -> None:
+def _load_urdf_collision(file: str) -> None:
     for concave, is_fixed in (("no", False), ("no", True), ("yes", False), ("yes", True)):
         body_id = _load_link(f"<collision concave='{concave}'>{_geometry(file)}</collision>", is_fixed)
         if not pybullet.getCollisionShapeData(body_id, -1):
@@ -118,18 +118,18 @@ def _load_link(parts: str, is_fixed: bool) -> int:
 
 def _remove(body_id: int) -> None:
     if body_id < 0:
-        raise pybullet.error("PyBullet made nothing of it")
+        raise pybullet.error("PyBullet returns no body")
     pybullet.stepSimulation()
     pybullet.removeBody(body_id)
 
 
 _USES = {
-    Use.VISUAL: _see,
-    Use.COLLISION: _feel,
-    Use.HEIGHT_FIELD: _stand_on,
-    Use.SOFT: _bend,
-    Use.URDF_VISUAL: _see_link,
-    Use.URDF_COLLISION: _feel_link,
+    Use.VISUAL: _load_visual,
+    Use.COLLISION: _load_collision,
+    Use.HEIGHT_FIELD: _load_height_field,
+    Use.SOFT: _load_soft,
+    Use.URDF_VISUAL: _load_urdf_visual,
+    Use.URDF_COLLISION: _load_urdf_collision,
 }
 
 if __name__ == "__main__":

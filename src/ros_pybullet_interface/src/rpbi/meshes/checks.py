@@ -77,14 +77,14 @@ def _soft_mesh_problems(path: str, size: int, changed_ns: int) -> list[str]:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]
     try:
         lines = [line.split() for line in read_file(path).decode().splitlines()]
-        return [] if (_check_vtk if kind == ".vtk" else _check_obj)(lines) else [f"{path} is empty"]
+        return [] if (_check_soft_vtk if kind == ".vtk" else _check_soft_obj)(lines) else [f"{path} is empty"]
     except UnicodeDecodeError:
         return [f"{path} is not text"]
     except (ValueError, IndexError, StopIteration) as error:
         return [f"{path} is no mesh that PyBullet can simulate: {str(error) or 'it ends too early'}"]
 
 
-def _check_obj(lines: list[list[str]]) -> bool:
+def _check_soft_obj(lines: list[list[str]]) -> bool:
     """Returns whether the mesh has faces; raises ValueError if a number is none or names no corner."""
     corners = sum(1 for words in lines if words[:1] == ["v"] and _finite(words[1:4]))
     faces = [words[1:] for words in lines if words[:1] == ["f"]]
@@ -94,7 +94,7 @@ def _check_obj(lines: list[list[str]]) -> bool:
     return bool(faces)
 
 
-def _check_vtk(lines: list[list[str]]) -> bool:
+def _check_soft_vtk(lines: list[list[str]]) -> bool:
     """Returns whether the mesh has tetrahedra; raises ValueError if a number is none or names no corner."""
     rest = iter(lines)
     points = int(_after(rest, "POINTS")[1])

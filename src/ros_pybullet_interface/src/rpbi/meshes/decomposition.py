@@ -14,7 +14,7 @@ from pathlib import Path
 import pybullet
 
 from custom_ros_tools.files import temporary_folder
-from robot_model.mesh_cache import content_hash, kept
+from robot_model.mesh_cache import cached, content_hash
 
 from .trial import limit_resources
 from .triangles import read_triangles
@@ -43,7 +43,7 @@ def convex_parts(mesh: str, parameters: Mapping[str, float]) -> str:
     if name in _without_cache:
         return str(_without_cache[name] / _PARTS)
     try:
-        return str(kept(name, lambda folder: _decompose(mesh, ordered, folder)) / _PARTS)
+        return str(cached(name, lambda folder: _decompose(mesh, ordered, folder)) / _PARTS)
     except OSError:
         folder = Path(temporary_folder("parts").name)
         try:

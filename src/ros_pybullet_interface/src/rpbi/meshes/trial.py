@@ -1,4 +1,4 @@
-"""Meshes that this machine has not loaded before are loaded in a process of their own first.
+"""Trial of meshes: those that this machine has not loaded before are first loaded in a process of their own.
 
 PyBullet's loaders of OBJ, STL and COLLADA do not check files: a broken one may end the process. The hash of each good
 mesh is kept in the user's cache folder, so that every mesh is tried once.
@@ -28,7 +28,7 @@ MAX_CPU_S = 20
 LONGEST_TRIAL_S = 45.0
 """Longest wall time of a trial [s]; beyond it, the mesh is refused."""
 MAX_BATCH = 100
-"""Meshes that one process tries, as long as it lives."""
+"""Largest number of meshes that one process tries."""
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ class Use(enum.Enum):
 
 
 class Mesh(NamedTuple):
-    """A mesh file, and what it is for."""
+    """A mesh file, and its use."""
 
     use: Use
     file: str
@@ -73,7 +73,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
             key = mesh, status.st_size, status.st_mtime_ns
             if key not in _tried:
                 record = cache_folder() / f"{mesh.use.value}-{content_hash(mesh.file, TRIAL)}"
-                if not _is_there(record):
+                if not _exists(record):
                     unknown[mesh] = record
                 _tried.add(key)
         except OSError as error:
@@ -117,7 +117,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
             os.close(writing)
         try:
             process.wait(LONGEST_TRIAL_S)
-            end = _words(process.returncode)
+            end = _reason(process.returncode)
         except subprocess.TimeoutExpired:
             end = f"PyBullet takes more than {LONGEST_TRIAL_S:g} s to load it"
         finally:
@@ -126,10 +126,10 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
             assert process.stdin is not None
             process.stdin.close()
         lines = report.read().decode(errors="replace").splitlines()
-    return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "it could not be tried"
+    return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "the trial could not be run"
 
 
-def _words(returncode: int) -> str:
+def _reason(returncode: int) -> str:
     """Returns the meaning of the process's exit code."""
     if returncode == -signal.SIGXCPU or returncode == -signal.SIGKILL:
         return f"PyBullet takes more than {MAX_CPU_S} s to load it"
@@ -138,7 +138,7 @@ def _words(returncode: int) -> str:
     return f"PyBullet cannot load it (exit code {returncode})" if returncode else ""
 
 
-def _is_there(record: Path) -> bool:
+def _exists(record: Path) -> bool:
     with suppress(OSError):
         return record.exists()
     return False

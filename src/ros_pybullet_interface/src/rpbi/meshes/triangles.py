@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from custom_ros_tools.config import read_file
-from robot_model.mesh_cache import content_hash, kept
+from robot_model.mesh_cache import cached, content_hash
 
 MAX_BYTES = 64_000_000
-"""Longest file that is read; a longer one is an error."""
+"""Largest length of a file [bytes]; a longer one is an error."""
 Triangles = npt.NDArray[np.float64]
 """Corners of triangles [m], shape (n, 3, 3)."""
 
@@ -53,7 +53,7 @@ def _read_obj(text: str) -> list[Triangles]:
         elif kind == "f":
             given = [int(word.split("/")[0]) for word in words]
             if any(number == 0 or abs(number) > len(corners) for number in given):
-                raise ValueError(f"a face names a corner of {len(corners)} that there is not")
+                raise ValueError(f"a face refers to a corner that does not exist; there are {len(corners)}")
             face = [number - 1 if number > 0 else number + len(corners) for number in given]
             parts[-1] += [[face[0], second, third] for second, third in zip(face[1:], face[2:])]
     points = np.array(corners, float).reshape(-1, 3)
@@ -67,7 +67,7 @@ def volumes(path: str) -> tuple[float, float] | None:
     """
     found = "volumes.json"
     try:
-        folder = kept(f"volumes-{content_hash(path)}", lambda made: _write(made / found, _volumes(path)))
+        folder = cached(f"volumes-{content_hash(path)}", lambda made: _write(made / found, _volumes(path)))
         return tuple(json.loads((folder / found).read_text())) or None
     except (OSError, ValueError):
         return _volumes(path)

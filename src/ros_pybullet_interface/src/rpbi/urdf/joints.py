@@ -111,7 +111,7 @@ class Joint:
 
 
 class Coupling(NamedTuple):
-    """That a joint follows another: its position is `multiplier` times that of the leader, plus `offset`.
+    """Relation of a joint to the one that it follows: its position is `multiplier` times the leader's, plus `offset`.
 
     Attributes:
         leader: Index of the joint that it follows, which follows no other.
@@ -172,11 +172,13 @@ class JointModel:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
     def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
-        """Returns the joint that a joint follows in the end."""
+        """Returns the coupling of a joint to the joint that it finally follows."""
         leader, multiplier, offset = followed(name, mimics)
         if leader not in self._by_name or not self[leader].is_driven:
             movable = ", ".join(joint.name for joint in self.moving)
-            raise ValueError(f"joint '{name}' follows '{leader}', which is none that moves; there are {movable}")
+            raise ValueError(
+                f"joint '{name}' follows '{leader}', which is no moving joint; moving joints are {movable}"
+            )
         return Coupling(self[leader].index, multiplier, offset)
 
     def effort_limit(self, joint: Joint) -> float:

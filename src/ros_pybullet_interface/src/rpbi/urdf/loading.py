@@ -1,4 +1,4 @@
-"""Loading a URDF into PyBullet, and what is wrong with one that cannot be loaded."""
+"""Loading URDFs into PyBullet, and faults of those that cannot be loaded."""
 
 import logging
 import math
@@ -42,9 +42,9 @@ PLACEHOLDER_FACTOR = 10.0
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Returns a sentence for each reason not to have PyBullet load a URDF file: it would refuse it, or not survive it.
+    """Returns a sentence for each fault of a URDF file that PyBullet would refuse, or that would crash it.
 
-    Its meshes are tried elsewhere, if this machine has not loaded them before.
+    Meshes that this machine has not loaded before are tried in another process.
     """
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
@@ -69,7 +69,7 @@ def urdf_problems(path: str) -> list[str]:
 
 
 def check_joints(file: str, robot: Element) -> None:
-    """Checks that PyBullet can load all joints of a robot, when it merges the fixed ones if need be.
+    """Checks that PyBullet can load all joints of a robot, if necessary with its fixed joints merged.
 
     Raises:
         ConfigError: If there are too many.
@@ -81,7 +81,7 @@ def check_joints(file: str, robot: Element) -> None:
 
 
 def _mesh_problems(document: UrdfDocument) -> list[str]:
-    """Returns a sentence for each mesh that PyBullet would not find, would leave out or would not survive."""
+    """Returns a sentence for each mesh that PyBullet would not find, would leave out, or that would crash it."""
     problems: dict[str, None] = {}
     meshes: dict[Mesh, str] = {}
     for part, use in (("visual", Use.URDF_VISUAL), ("collision", Use.URDF_COLLISION)):
@@ -104,12 +104,12 @@ def _mesh_problems(document: UrdfDocument) -> list[str]:
     return list(problems)
 
 
-class ForPybullet(NamedTuple):
-    """Text that PyBullet gets in the place of a URDF.
+class PreparedUrdf(NamedTuple):
+    """Text that PyBullet loads instead of a URDF file.
 
     Attributes:
-        text: It has what PyBullet reads, and nothing else, so that both understand the same: PyBullet's own reader
-            stops at null characters, cuts long lines and ignores errors.
+        text: Only the parts that PyBullet reads, so that its reader and ours find the same. PyBullet's reader stops at
+            null characters, cuts long lines and ignores errors.
         joints: Number of joints.
         without_inertial: Names of the links without inertial.
     """
@@ -120,15 +120,15 @@ class ForPybullet(NamedTuple):
 
 
 Prepare = Callable[[UrdfDocument, Files], Element]
-"""Returns what PyBullet shall read of a URDF; it depends on the arguments alone."""
+"""Returns the elements of a URDF for PyBullet; they depend on the arguments alone."""
 
 
 def prepared_urdf(
     arguments: Mapping[str, Any], prepare: Prepare = for_pybullet, has_window: bool = False
-) -> ForPybullet:
-    """Returns what PyBullet gets in the place of a URDF file.
+) -> PreparedUrdf:
+    """Returns the text that PyBullet loads instead of a URDF file.
 
-    It is remembered: a thread that has time for a large file may call this before the simulation's loads it.
+    The result is cached, so another thread can prepare a large file before the thread of the simulation loads it.
 
     Args:
         arguments: Those of `loadURDF`.
@@ -144,7 +144,7 @@ def prepared_urdf(
 
 
 @lru_cache(maxsize=32)
-def _prepared(document: UrdfDocument, files: Files, prepare: Prepare, is_fixed: bool, has_window: bool) -> ForPybullet:
+def _prepared(document: UrdfDocument, files: Files, prepare: Prepare, is_fixed: bool, has_window: bool) -> PreparedUrdf:
     robot = prepare(document, files)
     weigh_frames(robot, frame_masses(document, is_fixed))
     check_joints(document.path, robot)
@@ -152,7 +152,7 @@ def _prepared(document: UrdfDocument, files: Files, prepare: Prepare, is_fixed: 
     if has_window:
         put_first_visuals_last(robot)
     without = {link.get("name", "") for link in robot.findall("link") if link.find("inertial") is None}
-    return ForPybullet(text_of(robot), len(robot.findall("joint")), frozenset(without))
+    return PreparedUrdf(text_of(robot), len(robot.findall("joint")), frozenset(without))
 
 
 def load_urdf(
@@ -199,7 +199,7 @@ def load_urdf(
 
 
 def flags_for(joints: int, flags: int) -> int:
-    """Returns flags with which PyBullet can use a URDF: with too many joints, fixed ones are merged.
+    """Returns flags with which PyBullet can use a URDF: fixed joints are merged if there are too many joints.
 
     PyBullet loads more than 127, but then does not report where joints and links are.
     """
@@ -215,7 +215,7 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
         mass, _, moments = pb.getDynamicsInfo(body_id, index)[:3]
         if not mass:
             continue
-        if link in without or 0.0 in moments:  # PyBullet makes 0 of what no body can have
+        if link in without or 0.0 in moments:  # PyBullet sets impossible moments to 0
             pb.changeDynamics(body_id, index, mass=mass)  # with its guess, from the collision shape
             unusable += [] if link in without else [link]
             continue
@@ -225,14 +225,14 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
         if max(moments) > PLACEHOLDER_FACTOR * mass * _largest_radius(pb, body_id, index) ** 2:
             too_large.append(link)
     if unusable:
-        log.warning("%s: no body has the moments of inertia of %s: guessed from the shape", name, ", ".join(unusable))
+        log.warning("%s: moments of inertia of %s are impossible: guessed from the shape", name, ", ".join(unusable))
     if too_large:
         message = "%s: moments of inertia of %s are far too large for their size; inertia_from_urdf: false guesses them"
         log.warning(message, name, ", ".join(too_large))
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m].
+    """Returns an upper bound of the distance of the collision shape from the centre of mass [m].
 
     It is inf without a shape, and in maximal coordinates, where PyBullet reports no shapes.
     """

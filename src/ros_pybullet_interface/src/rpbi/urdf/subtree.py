@@ -1,4 +1,4 @@
-"""All links that hang on one joint: their momentum, their weight and what touches them."""
+"""The links below a joint: their momentum, mass, and forces of contacts."""
 
 from typing import Any, NamedTuple
 
@@ -34,7 +34,7 @@ class Subtree:
     """A link of a jointed body and all links below it.
 
     Args:
-        first_link: PyBullet's index of the link, and of the joint that it hangs on.
+        first_link: PyBullet's index of the link, and of the joint above it.
 
     Attributes:
         links: PyBullet's indices of its links.
@@ -78,17 +78,17 @@ class Subtree:
         return Momentum(origin, quat, origin_velocity, linear, angular, mass_moment)
 
     def contact_wrench(self, origin: Vector) -> tuple[Vector, Vector]:
-        """Returns force [N] and moment about a point [N m], world axes, of contacts with what is not in the subtree.
+        """Returns force [N] and moment about a point [N m], in world axes, of contacts with other links and bodies.
 
-        PyBullet returns normal and sliding friction forces of the last step; those against rolling and spinning, and
-        contacts with soft bodies, it keeps to itself.
+        They are the normal and sliding friction forces of the last step. PyBullet does not report rolling and spinning
+        friction, nor contacts with soft bodies.
         """
         force = moment = (0.0, 0.0, 0.0)
         body_id, links = self._body_id, self.links
         touching = self._pb.getContactPoints(body_id)
         if not any(touch[3] in links or (touch[2] == body_id and touch[4] in links) for touch in touching):
             return force, moment
-        # Asked for one body, PyBullet turns normals towards it but not friction; asked for all, it turns nothing.
+        # For one body, PyBullet turns normals towards it, but not friction; for all bodies, it turns nothing.
         for touch in self._pb.getContactPoints():
             first = touch[1] == body_id and touch[3] in links
             second = touch[2] == body_id and touch[4] in links

@@ -50,11 +50,11 @@ class Environment(ProximityCheck):
         super().__init__(config, robot, limits, file)
         self.distances = link_distances(robot, config.geometry)
         joints = {name for name, joint in robot.document.joints.items() if joint.is_moving}
-        self._still: tuple[Obstacle, ...] = ()
+        self._of_world: tuple[Obstacle, ...] = ()
         if config.world is not None:
             from safe_robot.world_obstacles import obstacles_of_world  # loads the simulator
 
-            self._still = obstacles_of_world(config.world, joints, config.robot)
+            self._of_world = obstacles_of_world(config.world, joints, config.robot)
         self._links = [link for link in self.distances.links if self.distances.reach((link, 0)).any()]
         self._live: tuple[Obstacle, ...] | None = None
         self._obstacles: tuple[Obstacle, ...] = ()
@@ -86,7 +86,7 @@ class Environment(ProximityCheck):
         """Updates the poses of obstacles that have moved."""
         self._live = None  # until all poses are updated
         count = len(self._obstacles)
-        obstacles = (*self._still, *live)
+        obstacles = (*self._of_world, *live)
         for obstacle in live:
             if not np.isfinite((*obstacle.size, *obstacle.pose.position, *obstacle.pose.quat_xyzw)).all():
                 raise ValueError(f"obstacle '{obstacle.name}': expected finite numbers, got {obstacle}")

@@ -14,7 +14,7 @@ class ForceConfig(CheckConfig):
 
     force_n: Positive = Field(50.0, description="Largest force [N].")
     torque_nm: Positive = Field(10.0, description="Largest torque [N m].")
-    timeout_s: Seconds = Field(0.1, description="Oldest measurement.")
+    timeout_s: Seconds = Field(0.1, description="Largest age of the measurement.")
 
 
 class Force(Check):
@@ -29,11 +29,11 @@ class Force(Check):
         config = self.config
         if not context.wrench_age_s <= config.timeout_s:
             return Violation(self.name, "the age of the wrench", context.wrench_age_s, config.timeout_s, "s")
-        for what, values, limit, unit in (
+        for subject, values, limit, unit in (
             ("the force", context.wrench[:3], config.force_n, "N"),
             ("the torque", context.wrench[3:], config.torque_nm, "N m"),
         ):
             size = math.hypot(*values)
             if not size <= limit:
-                return Violation(self.name, what, size, limit, unit)
+                return Violation(self.name, subject, size, limit, unit)
         return None

@@ -1,4 +1,4 @@
-"""Pairs that come too near to each other while a robot moves."""
+"""Search for pairs that come too near to each other while a robot moves."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -52,12 +52,12 @@ class Proximity:
         self._reach = np.array([distances.reach(pair) for pair in pairs])
         self._furthest = self._reach.max(axis=0, initial=0.0)
         self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
-        self._last = -1, 0  # the pair and the row that were too near last: in a similar motion they likely are again
-        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair the ends of a motion
-        self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
+        self._last = -1, 0  # pair and row that were too near last, and likely are in a similar motion
+        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair, both ends of a motion
+        self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of its distance there
 
     def forget(self, indices: Sequence[int]) -> None:
-        """Discards bounds of some pairs, after a motion that was not one of the joints."""
+        """Discards the bounds of pairs whose second member, an obstacle, has moved or changed."""
         self._known_m[:, list(indices)] = -np.inf
         for i in indices:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
@@ -65,7 +65,7 @@ class Proximity:
     def first(self, motion: CommandedMotion) -> TooNear | None:
         """Returns a pair that comes too near in a motion; None if none does in any row.
 
-        If the distance of a pair is d and e at two rows, and it moves by m in between, its distance between them is at
+        If the distances of a pair at two rows are d and e, and it moves by m in between, its distance in between is at
         least (d + e - m) / 2. If that bound is not sufficient, every row is checked.
         """
         if not len(self._pairs):
@@ -84,16 +84,16 @@ class Proximity:
         bounds = self._separation.lower_bounds(motion.waypoint_frames, near)
         self._known_m[:, near], self._known_at[:, near] = bounds[[0, -1]], motion.position[[0, -1], None]
         steps = np.diff(motion.travelled[rows], axis=0) @ reach[near].T
-        between = (bounds[:-1] + bounds[1:] - steps) / 2.0 if len(rows) > 1 else bounds  # no less on the way
-        is_unsure = ~(between > least_m)  # NaN is, too
+        between = (bounds[:-1] + bounds[1:] - steps) / 2.0 if len(rows) > 1 else bounds  # bounds between two waypoints
+        is_unsure = ~(between > least_m)  # also for NaN
         suspects = np.flatnonzero(is_unsure.any(axis=0))
         if not len(suspects):
             return None
         all_rows = np.arange(len(motion.position))
         section = np.clip(np.searchsorted(rows, all_rows, side="right") - 1, 0, len(is_unsure) - 1)
-        return self._judged(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
+        return self._first_in_rows(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
 
-    def _judged(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
+    def _first_in_rows(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
         """Returns one of s pairs that comes too near in some of k rows of a motion; None if none does in any of them.
 
         Rows far from each other are checked first: they reveal an unsafe motion soonest, and their distances bound
@@ -104,22 +104,22 @@ class Proximity:
             suspects: Numbers of the pairs.
             rows: Numbers of the rows.
         """
-        ways = motion.travelled[rows] @ self._reach[suspects].T
-        spare = np.full(ways.shape, -np.inf)
+        moved = motion.travelled[rows] @ self._reach[suspects].T
+        spare = np.full(moved.shape, -np.inf)
         sparse = self._sparse(motion.travelled[rows] @ self._furthest)
-        if found := self._measured(motion, suspects, rows, sparse, ways, spare):
+        if found := self._first_measured(motion, suspects, rows, sparse, moved, spare):
             return found
-        _spread(spare, sparse, ways)
+        _spread_bounds(spare, sparse, moved)
         unsure = np.flatnonzero(~(spare > 0.0).all(axis=1))
-        return self._measured(motion, suspects, rows, unsure, ways, spare) if len(unsure) else None
+        return self._first_measured(motion, suspects, rows, unsure, moved, spare) if len(unsure) else None
 
-    def _measured(
+    def _first_measured(
         self,
         motion: CommandedMotion,
         suspects: np.ndarray,
         rows: np.ndarray,
         chosen: np.ndarray,
-        ways: np.ndarray,
+        moved: np.ndarray,
         spare: np.ndarray,
     ) -> TooNear | None:
         """Returns one of s pairs that comes too near in some of k rows, measured if necessary.
@@ -131,8 +131,8 @@ class Proximity:
             motion: The motion.
             suspects: Numbers of the pairs.
             rows: Numbers of the k rows.
-            chosen: Indices of the rows to judge.
-            ways: Distance that each pair has moved by each row, k x s [m].
+            chosen: Indices of the rows to examine.
+            moved: Distance that each pair has moved by each row, k x s [m].
             spare: Lower bounds of distances less the margin, k x s [m], updated in place; inf where the pair is allowed
                 to be near.
         """
@@ -154,7 +154,7 @@ class Proximity:
                 self._separation.learn(i, contact.directions, frames[at])
                 more = self._separation.lower_bounds(frames, suspects[k : k + 1])[:, 0] - least_m
                 spare[chosen, k] = np.fmax(spare[chosen, k], more)
-            spare[:, k] = np.maximum(spare[:, k], distance - least_m - np.abs(ways[:, k] - ways[chosen[at], k]))
+            spare[:, k] = np.maximum(spare[:, k], distance - least_m - np.abs(moved[:, k] - moved[chosen[at], k]))
             spare[chosen[at], k] = np.inf
         return None
 
@@ -178,8 +178,10 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns a pair if its contact is too near and nearer than at the start; the robot must be placed at the
-        row."""
+        """Returns a pair that is nearer than the margin and nearer than at the start, else None.
+
+        The robot has to be at the row.
+        """
         if contact is None or contact.distance >= self._margin_m:
             return None
         self._distances.place(motion.start.position)
@@ -232,16 +234,16 @@ class Proximity:
                 yield pair, contact
 
 
-def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
+def _spread_bounds(bounds: np.ndarray, rows: np.ndarray, moved: np.ndarray) -> None:
     """Raises lower bounds in k rows from those in some of them: between two rows, a distance changes at most by the
     pair's motion.
 
     Args:
         bounds: k x s [m]; inf of a row bounds no other one.
         rows: Numbers of the rows, in ascending order.
-        ways: Distance that each pair has moved by each row, k x s [m].
+        moved: Distance that each pair has moved by each row, k x s [m].
     """
     known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
     after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)
     for side in (after, np.maximum(after - 1, 0)):
-        np.maximum(bounds, known[side] - np.abs(ways[rows[side]] - ways), out=bounds)
+        np.maximum(bounds, known[side] - np.abs(moved[rows[side]] - moved), out=bounds)

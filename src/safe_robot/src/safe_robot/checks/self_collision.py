@@ -24,8 +24,8 @@ from .proximity_check import GEOMETRY, ProximityCheck, link_distances
 
 SAMPLES = 200
 """Number of random configurations that are used to find pairs that are always near."""
-ALWAYS = 0.95
-"""Pairs that are too near in this share of configurations are left out, since they are near by construction."""
+NEARLY_ALWAYS = 0.95
+"""Share of configurations above which a pair that is too near is left out, since it is near by construction."""
 
 
 class SelfCollisionConfig(CheckConfig):
@@ -33,7 +33,7 @@ class SelfCollisionConfig(CheckConfig):
 
     margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
     geometry: Geometry = Field("hulls", description=GEOMETRY)
-    srdf: Text | None = Field(None, description="A SRDF; pairs for which it disables collisions are left out.")
+    srdf: Text | None = Field(None, description="An SRDF file; pairs for which it disables collisions are left out.")
     pairs_file: Text | None = Field(
         None, description="YAML file of the pairs; it is read if it exists, and written otherwise."
     )
@@ -131,10 +131,10 @@ def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: f
     touching = dict.fromkeys(apart, 0)
     generator = random.Random(0)
     for _ in range(SAMPLES):
-        distances.place(np.array([_anywhere(generator, joint.lower, joint.upper) for joint in robot.joints]))
+        distances.place(np.array([_random_position(generator, joint.lower, joint.upper) for joint in robot.joints]))
         for pair in apart:
             touching[pair] += distances.distance(pair, margin_m, margin_m) < margin_m
-    return [pair for pair in apart if touching[pair] < ALWAYS * SAMPLES]
+    return [pair for pair in apart if touching[pair] < NEARLY_ALWAYS * SAMPLES]
 
 
 def _group(robot: RobotModel, link: str) -> str:
@@ -146,5 +146,5 @@ def _group(robot: RobotModel, link: str) -> str:
     return link
 
 
-def _anywhere(generator: random.Random, lower: float, upper: float) -> float:
+def _random_position(generator: random.Random, lower: float, upper: float) -> float:
     return generator.uniform(max(lower, -math.pi), min(upper, math.pi))

@@ -1,4 +1,4 @@
-"""Targets that come too late, or whose stamps jump."""
+"""Targets that are late, and stamps that decrease."""
 
 from pydantic import Field
 
@@ -10,7 +10,9 @@ from safe_robot.motion import CommandedMotion
 class StalenessConfig(CheckConfig):
     """Largest delays of targets."""
 
-    timeout_s: Seconds = Field(0.1, description="Oldest target; and longest time without one while the robot moves.")
+    timeout_s: Seconds = Field(
+        0.1, description="Largest age of a target, and longest time without one while the robot moves."
+    )
 
 
 class Staleness(Check):
@@ -29,8 +31,8 @@ class Staleness(Check):
         step_s = context.stamp_step_s
         if step_s is not None and not step_s >= 0.0:
             words = (
-                f"the stamp of the target is {-step_s:.3g} s before that of the target before; give each target a later"
-                " stamp, or none, and let one source publish"
+                f"the stamp of the target is {-step_s:.3g} s earlier than that of the previous target; give each target"
+                " a later stamp, or none, and let only one source publish"
             )
             return Violation(self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=words)
         if not motion.start.is_at_rest and not context.since_command_s <= timeout_s:
@@ -44,7 +46,7 @@ class Staleness(Check):
 
 
 def too_old(age_s: float, limit_s: float, key: str) -> Violation:
-    """Returns the violation of a target of an age [s] beyond a limit [s], which a parameter sets."""
+    """Returns the violation of a target whose age [s] is beyond a limit [s]; `key` names the parameter of the limit."""
     if age_s < 0.0:
         words = (
             f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"

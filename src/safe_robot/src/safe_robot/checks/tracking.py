@@ -15,7 +15,7 @@ class TrackingConfig(CheckConfig):
     lag_s: NonNegative = Field(
         0.0, description="Lag of the robot behind commands [s]; speed times this lag is added to the tolerance."
     )
-    timeout_s: Seconds = Field(0.1, description="Oldest measured positions.")
+    timeout_s: Seconds = Field(0.1, description="Largest age of measured positions.")
 
 
 class Tracking(Check):

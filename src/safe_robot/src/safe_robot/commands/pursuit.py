@@ -59,22 +59,22 @@ def pursue(
     low = np.maximum((-speed - state.velocity) / period_s, low)
     high = np.minimum((speed - state.velocity) / period_s, high)
     low, high = np.where(np.isfinite(low), low, exact), np.where(np.isfinite(high), high, exact)
-    way = np.sign(target - state.position)
+    sense = np.sign(target - state.position)
     fastest = np.minimum(np.maximum(exact, low), high)
-    slowest = np.where(way > 0.0, low, high)
+    slowest = np.where(sense > 0.0, low, high)
     at = np.zeros(len(target))  # from 0, slowest, to 1, fastest
     joints = np.arange(len(target))
     for width in (1.0, 1.0 / STEPS):
         shares = np.minimum(at + width * (np.arange(STEPS + 1.0) / STEPS)[:, None], 1.0)
         tried = slowest + shares * (fastest - slowest)
         velocity = state.velocity + period_s * tried
-        way_on, fastest_on = braking.ends(velocity, tried)
-        end = state.position + period_s * velocity + way_on
-        stays = (way * (end - target) <= ROUNDING) & (fastest_on <= speed)
+        braking_distance, braking_speed = braking.ends(velocity, tried)
+        end = state.position + period_s * velocity + braking_distance
+        stays = (sense * (end - target) <= ROUNDING) & (braking_speed <= speed)
         last = np.where(stays.any(axis=0), STEPS - stays[::-1].argmax(axis=0), 0)
         at = shares[last, joints]
         if width == 1.0:
-            goes_on = ~stays.any(axis=0) & (way * (stop[-1] - target) <= ROUNDING)
+            keeps_braking = ~stays.any(axis=0) & (sense * (stop[-1] - target) <= ROUNDING)
     chosen = slowest + at * (fastest - slowest)
     wanted, other = (state.position + period_s * (state.velocity + period_s * each) for each in (chosen, slowest))
-    return Pursuit(np.where(goes_on, stop[0], wanted), other)
+    return Pursuit(np.where(keeps_braking, stop[0], wanted), other)

@@ -1,4 +1,4 @@
-"""Smooths rough targets to a motion within the limits of joints, before they are checked."""
+"""Smoothing of rough targets to a motion within the limits of joints, before the checks."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from safe_robot.motion import State
 
 from .pursuit import pursue
 
-CAUGHT_UP = 0.05
+CAUGHT_UP_SHARE = 0.05
 """A joint has caught up if it needs at most this share of its acceleration and jerk to reach its target."""
 OVERSHOOT = 0.01
 """Targets outside limits by at most this count as at the limit, since motors overshoot by as much [rad or m]."""
@@ -22,7 +22,7 @@ class ShapingConfig(ConfigModel):
     """Options for smoothing targets that joints cannot follow."""
 
     time_s: Annotated[Seconds, Field(ge=1e-4)] = Field(
-        0.03, description="Time constant: smoothed commands are about twice as far behind."
+        0.03, description="Time constant of the filter; smoothed commands lag behind by about twice as much."
     )
     reach: Annotated[Positive, Unit("rad or m")] = Field(
         0.25,
@@ -64,7 +64,7 @@ class Shaper:
         position = asked.clip(self._limits.lower, self._limits.upper)
         if not ((np.abs(asked - state.position) <= self._reach) & (np.abs(asked - position) <= OVERSHOOT)).all():
             return target
-        if self._can_be(position, state):
+        if self._can_command(position, state):
             self._is_behind = False
             return tuple(position.tolist())
         self._is_behind = True
@@ -72,9 +72,9 @@ class Shaper:
         wanted = pursue(position, state, self._limits, self._braking, self._period_s, stop, acceleration).wanted
         return tuple(wanted.tolist())
 
-    def _can_be(self, position: np.ndarray, state: State) -> bool:
+    def _can_command(self, position: np.ndarray, state: State) -> bool:
         """Returns whether positions can be commanded: joints can stop from there, and have caught up."""
-        limits, share = self._limits, CAUGHT_UP if self._is_behind else 1.0
+        limits, share = self._limits, CAUGHT_UP_SHARE if self._is_behind else 1.0
         after = state.then(position, self._period_s)
         jerk = (after.acceleration - state.acceleration) / self._period_s
         way, fastest = self._braking.ends(after.velocity[None], after.acceleration[None])

@@ -1,4 +1,4 @@
-"""Markers for RViz: the points at which things are nearest to each other, and the boxes that links stay in."""
+"""Markers for RViz: the closest points of near pairs, and the boxes that links stay in."""
 
 from collections.abc import Iterator
 from threading import Condition
@@ -19,13 +19,15 @@ from safe_robot.guard import Guard
 HZ = 10.0
 WITHIN_M = 0.15
 """Pairs that are further apart are not shown [m]."""
-ENDLESS_M = 2.0
-"""Where an axis of a box has no limit, it ends here [m]."""
+UNLIMITED_M = 2.0
+"""Coordinate at which a box without a limit is drawn to end [m]."""
 NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.0), ColorRGBA(0.2, 0.5, 1.0, 0.15)
 
 
 class GuardMarkers:
-    """Publishes `robot_safety/markers` while somebody listens, and the boxes alone on `safe_robot/box_limit/marker`.
+    """Publishes `robot_safety/markers`, and the boxes alone on `safe_robot/box_limit/marker`.
+
+    A topic without subscribers gets no messages.
 
     Args:
         guard: The guard.
@@ -57,7 +59,7 @@ class GuardMarkers:
         self._publisher.publish([self._marker("", 0, Marker.CUBE, action=Marker.DELETEALL), *markers, *self._boxes()])
 
     def _lines(self, q: np.ndarray) -> Iterator[Marker]:
-        """Returns a line for each near pair, with its distance."""
+        """Yields a line for each near pair, and its distance as text."""
         for check in self._guard.checks:
             if not isinstance(check, (SelfCollision, Environment)):
                 continue
@@ -97,4 +99,4 @@ def _boxes_of(check: LinkBox) -> list[BoxConfig]:
 
 def _ends(axis: tuple[float | None, float | None]) -> tuple[float, float]:
     low, high = axis
-    return -ENDLESS_M if low is None else low, ENDLESS_M if high is None else high
+    return -UNLIMITED_M if low is None else low, UNLIMITED_M if high is None else high

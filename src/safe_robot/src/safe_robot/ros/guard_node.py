@@ -33,13 +33,13 @@ QUEUE_SIZE = 100
 WATCH_HZ = 100.0
 """Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
-"""Largest excess of the difference of two stamps over the time between their targets [s]; more is a jump."""
+"""Largest excess of the difference of two stamps over the time between the targets [s]; a larger one is a jump."""
 FIRST_STATE_S = 1.0
 """Longest wait for a measured state before the node subscribes to targets [s]."""
 BODIES_TIMEOUT_S = 0.5
 """Largest age of the poses of bodies for checks without `timeout_s` [s]."""
 NEVER_S = float("-inf")
-REPEATED = "the stamp is that of the target before: both are one target, with one command"
+REPEATED = "the stamp equals that of the previous target: both are one target, with one command"
 SWITCH_S = 0.0005
 """Time after which Python switches to a waiting thread, such as one that has just received a target [s]."""
 
@@ -138,7 +138,7 @@ class GuardNode:
             self._brake_for(too_old(age_s, self._silence_s, "silence_s"))
 
     def _lose_master(self) -> None:
-        reason = f"the ROS master at {self._master.uri} has gone, and stop_subscriber could not be found"
+        reason = f"the ROS master at {self._master.uri} has ended, so that nothing can call stop_subscriber"
         with self._queue.lock:
             if not self._guard.is_halted:
                 self._halt(violation_of("master", reason))
@@ -173,7 +173,7 @@ class GuardNode:
         stamp, last = message.header.stamp, self._last_stamp
         age_s, step_s, since_s = 0.0, None, self._sent_s
         if last is not None and not stamp:
-            return self._guard.refuse("expected a stamp, as the targets before had")
+            return self._guard.refuse("expected a stamp, as previous targets had")
         if stamp:
             age_s, now_s = (_now() - stamp).to_sec(), time.monotonic()
             self._last_stamp = stamp, now_s
@@ -235,7 +235,7 @@ class GuardNode:
             if self._guard.is_halted:
                 return
             if self._guard.is_moving and not self._targets.get_num_connections():
-                reason = f"nobody sends {self._target_topic} any more, while the robot moves"
+                reason = f"no node publishes {self._target_topic} any more, while the robot moves"
                 self._halt(violation_of("source", reason))
                 return
             try:
@@ -249,22 +249,22 @@ class GuardNode:
     def _start(self, _: TriggerRequest) -> TriggerResponse:
         with self._queue.lock:
             if not self._guard.is_halted:
-                return TriggerResponse(False, "targets are taken already")
+                return TriggerResponse(False, "targets are already accepted")
             if self._guard.is_braking:
                 return TriggerResponse(False, "the robot still brakes; call again when it rests")
             if not self._master.is_there:
-                return TriggerResponse(False, f"the ROS master at {self._master.uri} has gone")
+                return TriggerResponse(False, f"the ROS master at {self._master.uri} has ended")
             self._last_stamp = None
             self._queue.clear()
             self._guard.start()
-        return TriggerResponse(True, "targets are taken; the first one has to be where the robot is")
+        return TriggerResponse(True, "targets are accepted; the first one has to be near the position of the robot")
 
     def _stop(self, _: TriggerRequest) -> TriggerResponse:
         with self._queue.lock:
             if self._guard.is_halted:
-                return TriggerResponse(False, "no targets are taken already")
+                return TriggerResponse(False, "no targets are accepted already")
             self._halt(None)
-        return TriggerResponse(True, "no targets are taken")
+        return TriggerResponse(True, "no targets are accepted")
 
 
 def _now() -> rospy.Time:

@@ -56,7 +56,7 @@ class Measurements:
         self, joint_names: Sequence[str], base_frame: str | None, left_out: Sequence[str], bodies_timeout_s: float
     ) -> None:
         self._joint_names = tuple(joint_names)
-        self._around = None if base_frame is None else LiveObstacles(base_frame, left_out, bodies_timeout_s)
+        self._live_obstacles = None if base_frame is None else LiveObstacles(base_frame, left_out, bodies_timeout_s)
         self._measured: Mapping[str, tuple[float, float]] = {}
         """Position [rad or m] and time [s] by joint."""
         self._has_measured = threading.Event()
@@ -69,7 +69,7 @@ class Measurements:
     @property
     def obstacles(self) -> tuple[Obstacle, ...] | None:
         """Present bodies of the environment; None without a source."""
-        return None if self._around is None else self._around.obstacles
+        return None if self._live_obstacles is None else self._live_obstacles.obstacles
 
     def wait(self, timeout_s: float) -> None:
         """Waits for the first measured state, at most for a time [s]."""
@@ -133,12 +133,12 @@ class LiveObstacles:
         self.obstacles: tuple[Obstacle, ...] | None = None
         self._base_frame, self._left_out = base_frame, frozenset(left_out)
         self._markers: dict[tuple[str, int], Marker] = {}
-        self._is_told, self._timeout_s = False, timeout_s
+        self._has_markers, self._timeout_s = False, timeout_s
         self._warn = ThrottledWarning()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = TfListener(self._buffer)
         self._subscriber = rospy.Subscriber(MARKERS, MarkerArray, self._on_markers, queue_size=100)
-        self._timer = WallTimer(MARKERS_HZ, self._look)
+        self._timer = WallTimer(MARKERS_HZ, self._update)
 
     def close(self) -> None:
         """Stops reading, and unsubscribes."""
@@ -155,13 +155,13 @@ class LiveObstacles:
                 markers.pop((marker.ns, marker.id), None)
             elif marker.ns not in self._left_out:
                 markers[marker.ns, marker.id] = marker
-        self._markers, self._is_told = markers, True
+        self._markers, self._has_markers = markers, True
 
-    def _look(self) -> None:
-        if not self._is_told:
+    def _update(self) -> None:
+        if not self._has_markers:
             return
         try:
-            found = tuple(self._found())
+            found = tuple(self._shapes())
         except (tf2_ros.TransformException, ValueError) as error:
             self._warn(MARKERS, f"the bodies around the robot are unknown: {error}")
             self.obstacles = None
@@ -169,7 +169,7 @@ class LiveObstacles:
         if self.obstacles is None or _differ(self.obstacles, found):
             self.obstacles = found
 
-    def _found(self) -> Iterator[Obstacle]:
+    def _shapes(self) -> Iterator[Obstacle]:
         for marker in self._markers.values():
             kind = KIND_OF_MARKER.get(marker.type)
             if kind is None:

@@ -16,9 +16,8 @@ from safe_robot.guard import Guard
 
 DESCRIPTION = "robot_description"
 START_FROM_TARGET = (
-    "start_from is 'target': while nothing publishes joint_states/measured, the robot is assumed to stand at the first"
-    " target after each start; if it stands elsewhere, it goes there at a speed that nothing limits, and the way is not"
-    " checked"
+    "start_from is 'target': while nothing publishes joint_states/measured, the robot is assumed to be at the first"
+    " target after each start; if it is elsewhere, it moves there at unlimited speed, along a path that is not checked"
 )
 
 

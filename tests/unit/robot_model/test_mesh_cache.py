@@ -1,4 +1,4 @@
-"""Files made from meshes: whole or not at all, and with nothing in them that is not there."""
+"""The cache of files made from meshes: folders appear complete or not at all, and meshes name no missing texture."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-from robot_model.mesh_cache import cache_folder, kept
+from robot_model.mesh_cache import cache_folder, cached
 from robot_model.urdf.for_ros import description_for_ros
 
 PANDA = f"{pybullet_data.getDataPath()}/franka_panda/panda.urdf"
-"""In the materials of one of its meshes stand paths of a computer that ran Windows."""
+"""The materials of one of its meshes name paths of a Windows computer."""
 
 
 @pytest.fixture(autouse=True)
@@ -52,14 +52,14 @@ def test_original_files_are_used_where_no_cache_can_be_written(tmp_path, monkeyp
 
 WRITES = """
 import sys, time
-from robot_model.mesh_cache import kept
+from robot_model.mesh_cache import cached
 
 def make(folder):
     for number in range(20):
         (folder / str(number)).write_text(sys.argv[1])
         time.sleep(0.002)
 
-print(len(list(kept("shared", make).iterdir())))
+print(len(list(cached("shared", make).iterdir())))
 """
 
 
@@ -79,5 +79,5 @@ def test_a_folder_that_could_not_be_made_is_not_there():
         raise RuntimeError("interrupted")
 
     with pytest.raises(RuntimeError):
-        kept("half", fail)
+        cached("half", fail)
     assert list(cache_folder().iterdir()) == []
