@@ -109,6 +109,7 @@ def _watched(read: Callable[[Path], object], demos: Path) -> None:
     code = 'import pathlib\npathlib.Path(__file__).with_name("canary").write_text("code canary_module")\nclass X: ...\n'
     (inside / "canary_module.py").write_text(code)
     roots = tuple(map(os.path.realpath, (inside, os.environ["XDG_CACHE_HOME"])))
+    sys.dont_write_bytecode = True  # Python's cache is no effect of the folder
     is_noting = False
 
     def note(words: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.message_layout import MessageType
 from rpbi_utils.live_plot.fields import FieldError, FieldReader, split_name
 from rpbi_utils.live_plot.plot import MAX_SAMPLES, Line, LivePlot, thinned, ticks
 

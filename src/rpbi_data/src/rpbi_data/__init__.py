@@ -9,7 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .bags.dataframes import bag_to_dataframe, bag_to_dataframes
+    from rpbi_data.bags.bag_reader import bag_to_dataframe, bag_to_dataframes
+
     from .bags.image_files import bag_to_images, write_images, write_video
     from .bags.recorded_topics import Recorder
     from .bags.resampling import align, resample
@@ -37,8 +38,8 @@ _HOMES = {
     "EpisodeFolder": "rpbi_data.episodes.folder",
     "Recorder": "rpbi_data.bags.recorded_topics",
     "align": "rpbi_data.bags.resampling",
-    "bag_to_dataframe": "rpbi_data.bags.dataframes",
-    "bag_to_dataframes": "rpbi_data.bags.dataframes",
+    "bag_to_dataframe": "rpbi_data.bags.bag_reader",
+    "bag_to_dataframes": "rpbi_data.bags.bag_reader",
     "bag_to_images": "rpbi_data.bags.image_files",
     "episodes_to_dataframes": "rpbi_data.episodes.bags",
     "resample": "rpbi_data.bags.resampling",

@@ -19,7 +19,7 @@ from std_msgs.msg import Float64, Header
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi_data import bag_to_dataframe, bag_to_images, write_images, write_video
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.limits import BagError
 
 WriteBag = Callable[..., Path]
 RANDOM = np.random.default_rng(3)

@@ -15,7 +15,7 @@ from std_msgs.msg import Float64, String
 from rpbi_data import bag_to_dataframes, topic_report
 from rpbi_data.bags import bag_reader
 from rpbi_data.bags import bag_to_table_node as bag_to_table
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.limits import BagError
 
 WriteBag = Callable[..., Path]
 

@@ -28,7 +28,7 @@ from rpbi_data.bags import bag_writer_node
 from rpbi_data.bags import recorded_topics as recorder_module
 from rpbi_data.bags.bag_writer_node import BagWriter
 from rpbi_data.bags.connected_topics import count_received
-from rpbi_data.bags.errors import RecordingError
+from rpbi_data.bags.limits import RecordingError
 
 TALKER = """
 import rospy, sys

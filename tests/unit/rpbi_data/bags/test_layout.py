@@ -6,8 +6,7 @@ import struct
 
 import pytest
 
-from rpbi_data.bags.layout import BYTES, MAX_ARRAY_COLUMNS, Leaf, lay_out
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.message_layout import BYTES, MAX_ARRAY_COLUMNS, Leaf, MessageType, lay_out
 
 MIXED = MessageType.parse("a_msgs/Mixed", "uint8 a\nstring text\nint16[2] pair\nfloat64[] values\ntime stamp\n")
 

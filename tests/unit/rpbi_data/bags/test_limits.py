@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 
 from rpbi_data.bags import limits
-from rpbi_data.bags.errors import BagError
-from rpbi_data.bags.layout import lay_out
-from rpbi_data.bags.limits import Budget, LimitError
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.limits import BagError, Budget, LimitError
+from rpbi_data.bags.message_layout import MessageType, lay_out
 from rpbi_data.bags.row_plan import plan_rows
 from rpbi_data.bags.tables import TableBuilder, file_stems
 
@@ -63,7 +61,7 @@ def test_arrays_of_nothing_take_no_time(length: str) -> None:
 
 
 def test_message_values_and_name_bytes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rpbi_data.bags.layout.MAX_VALUES", 4)
+    monkeypatch.setattr("rpbi_data.bags.message_layout.MAX_VALUES", 4)
     assert len(lay_out(_types("uint8[4] x"), bytes(4)).leaves) == 4
     with pytest.raises(LimitError, match="expected at most 4 values in a message, got more"):
         lay_out(_types("uint8[5] x"), bytes(5))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rpbi_data.bags.message_type import SCALAR, VARIABLE, MessageType
+from rpbi_data.bags.message_layout import SCALAR, VARIABLE, MessageType
 
 LINE = "=" * 80
 POSE = f"""\

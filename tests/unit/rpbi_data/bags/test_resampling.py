@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi_data.bags.nanoseconds import to_seconds
 from rpbi_data.bags.resampling import TIME_ERROR, align, resample, resample_exactly
+from rpbi_data.bags.times import to_seconds
 
 
 def _table(times: list[float], **columns: object) -> pd.DataFrame:

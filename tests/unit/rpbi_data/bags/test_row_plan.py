@@ -5,8 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-from rpbi_data.bags.layout import MAX_ARRAY_COLUMNS
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.message_layout import MAX_ARRAY_COLUMNS, MessageType
 from rpbi_data.bags.row_plan import plan_rows
 
 Pack = Callable[..., bytes]

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from rpbi_data.bags import tables
-from rpbi_data.bags.clock import ClockStep, clock_of
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.message_layout import MessageType
 from rpbi_data.bags.tables import TableBuilder
+from rpbi_data.bags.times import ClockStep, clock_of
 
 Pack = Callable[..., bytes]
 NUMBER = MessageType.parse("std_msgs/Float64", "float64 data")

@@ -13,9 +13,8 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 import roslz4
 
-from .clock import ClockStep, set_back
 from .limits import MAX_CONNECTIONS, LimitError
-from .nanoseconds import PER_SECOND
+from .times import PER_SECOND, ClockStep, set_back
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _FILE_HEADER, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7

@@ -12,8 +12,8 @@ import rospy
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.foreign import printable_lines
 
-from .dataframes import bag_to_dataframes
-from .errors import BagError
+from .bag_reader import bag_to_dataframes
+from .limits import BagError
 from .tables import FORMATS, file_stems, write_table
 
 _NAME = "bag_to_table"

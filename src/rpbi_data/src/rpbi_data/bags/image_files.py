@@ -16,8 +16,8 @@ from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.files import atomic_file
 
 from .bag_reader import BagReader
-from .errors import BagError
 from .images import decode_image
+from .limits import BagError
 from .topic_report import message_time, topic_report
 
 Array = NDArray[Any]

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import Layout, lay_out
-from .message_type import MessageType
+from .message_layout import Layout, MessageType, lay_out
 
 Array = NDArray[Any]
 

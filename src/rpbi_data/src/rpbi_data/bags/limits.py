@@ -1,14 +1,32 @@
-"""Limits on the resources that a bag may use while it is read, to protect readers from hostile bags."""
+"""Errors of bags, and limits on the resources that a bag may use while it is read, against hostile bags."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-from custom_ros_tools.errors import shortened
+from custom_ros_tools.errors import InterfaceError, shortened
 
-from .errors import BagError
+
+@dataclass(eq=False)
+class BagError(InterfaceError):
+    """A bag cannot be read, or its content cannot be written as requested; the message includes a remedy."""
+
+    path: Path
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.message}"
+
+
+class RecordingError(BagError):
+    """A recording of a bag could not be started, or is not complete."""
+
+    def __str__(self) -> str:
+        return f"recording {super().__str__()}"
+
 
 MAX_DEFINITION_BYTES = 2**20
 """Bytes of the definition of one message type, with those of the types it uses; a longer one is refused."""

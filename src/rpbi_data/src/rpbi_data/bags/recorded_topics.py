@@ -21,7 +21,7 @@ from rosgraph.names import get_ros_namespace, resolve_name
 from custom_ros_tools.child_process import start_child
 
 from .connected_topics import count_received, count_sent, find_unconnected
-from .errors import RecordingError
+from .limits import RecordingError
 
 NOT_RECORDING = "not recording: "
 """Beginning of what the recording process prints before it ends with 1."""

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import UnknownNameError
 
-from .nanoseconds import MAX_SECONDS, resolution_ns, row_times, to_nanoseconds, to_seconds
 from .row_plan import INDEX
+from .times import MAX_SECONDS, resolution_ns, row_times, to_nanoseconds, to_seconds
 
 Array = NDArray[Any]
 

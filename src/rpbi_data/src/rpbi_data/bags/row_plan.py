@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 from custom_ros_tools.errors import shortened
 
-from .layout import MAX_ARRAY_COLUMNS, Layout, Leaf, lay_out
 from .limits import MAX_COLUMNS, MAX_NAME_BYTES, LimitError
-from .message_type import MessageType
+from .message_layout import MAX_ARRAY_COLUMNS, Layout, Leaf, MessageType, lay_out
 
 STAMP = "header/stamp"
 INDEX = "time"

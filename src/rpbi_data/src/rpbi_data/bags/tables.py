@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.files import atomic_file
 
-from .clock import clock_of
-from .layout import BYTES, NUMBER_DTYPES, Leaf
 from .limits import MAX_COLUMNS, Budget, LimitError
-from .message_type import MessageType
-from .nanoseconds import PER_SECOND, to_seconds
+from .message_layout import BYTES, NUMBER_DTYPES, Leaf, MessageType
 from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
+from .times import PER_SECOND, clock_of, to_seconds
 
 Array = NDArray[Any]
 _Piece = tuple[int, Array]
@@ -56,7 +54,7 @@ class _Block(NamedTuple):
 class TableBuilder:
     """Collects the serialised messages of one topic and turns them into one table.
 
-    Messages are read in batches, those of one layout (see `rpbi_data.bags.layout`) at once. Strings and numbers are
+    Messages are read in batches, those of one layout (see `message_layout.py`) at once. Strings and numbers are
     unchanged; a value that a message lacks is NaN (None in columns of text).
 
     Args:

@@ -9,8 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .bag_reader import BagMessage, BagReader
-from .clock import ClockStep, set_back
-from .nanoseconds import PER_SECOND, to_seconds
+from .times import PER_SECOND, ClockStep, set_back, to_seconds
 
 Array = NDArray[Any]
 

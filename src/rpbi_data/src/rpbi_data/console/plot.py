@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.files import atomic_file
-from rpbi_data.bags.dataframes import bag_to_dataframes
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.bag_reader import bag_to_dataframes
+from rpbi_data.bags.limits import BagError
 from rpbi_data.bags.plots import plot_tables
 
 

@@ -14,7 +14,7 @@ from custom_ros_tools.foreign import printable_lines
 from custom_ros_tools.plugins import trust_only
 from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Replay, ReplayResult
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.limits import BagError
 from rpbi_data.replay.session_messages import MAX_TICKS, read_recording, require_few_ticks
 
 

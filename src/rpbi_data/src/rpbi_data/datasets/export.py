@@ -29,6 +29,9 @@ from .provenance import remove_episode, write_episode, write_export
 from .signals import RowOptions, Signal
 from .source import SourceEpisode
 
+MAX_KEPT_BYTES = 1_000_000_000
+"""Memory of the tables that are kept from the plan of a data set until it is written; others are read twice [bytes]."""
+
 
 class ExportOptions(NamedTuple):
     """Content of a data set, as the user wants it.
@@ -129,19 +132,22 @@ def export_folder(
 
 def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions, result: Result) -> _Plan:
     """Returns the episodes to export, and the features that most of them have."""
-    sources = []
+    sources: list[SourceEpisode] = []
+    kept_bytes = 0
     for number in folder.numbers():
         try:
             episode = folder.read(number)
             if options.labels and episode.label not in options.labels:
                 continue
             _require_complete(folder, episode)
-            source = SourceEpisode(
-                folder, episode, options.row_options, options.task, options.any_size, options.max_time_error_s
-            )
+            limits = options.any_size, options.max_time_error_s
+            source = SourceEpisode(folder, episode, options.row_options, options.task, *limits, format_.has_rows)
             if format_.has_rows:
-                source.signals, source.cameras  # noqa: B018 (reads the bag)
-                _forget(source)
+                _content(source)
+                kept_bytes += source.table_bytes
+                if kept_bytes > MAX_KEPT_BYTES:
+                    kept_bytes -= source.table_bytes
+                    source.release()
             elif episode.set_back_s:
                 raise EpisodeError(source.bag, f"a clock was set back by {episode.set_back_s:.6g} s")
             else:
@@ -167,7 +173,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions,
 
 
 def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFeature, ...]]:
-    """Returns the features and cameras of an episode."""
+    """Returns the features and cameras of an episode, for which its bag is read."""
     return tuple(signal.feature for signal in source.signals), source.cameras
 
 
@@ -208,7 +214,7 @@ def _add_all(
                 return
             continue
         finally:
-            _forget(source)
+            source.release()
         images = facts.pop("images", {})
         try:
             write_episode(part, index, facts, images)
@@ -251,12 +257,6 @@ def _line(source: SourceEpisode, index: int, facts: dict[str, object]) -> str:
         note += f" (from its last reset on, at {source.cut.stamp_ns / 1e9:.9g} s)"
     size = f"{facts['frames']} frames" if "frames" in facts else "all messages"
     return f"episode {source.episode.number}: {size}, as {index}{note}"
-
-
-def _forget(source: SourceEpisode) -> None:
-    """Frees the tables of an episode."""
-    source.__dict__.pop("_tables", None)
-    source.__dict__.pop("times", None)
 
 
 def _fault(number: int, error: Exception) -> str:

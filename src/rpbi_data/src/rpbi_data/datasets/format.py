@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from custom_ros_tools.schema import ConfigModel
-from rpbi_data.bags.nanoseconds import PER_SECOND
+from rpbi_data.bags.times import PER_SECOND
 from rpbi_data.episodes.errors import EpisodeError
 
 Array = NDArray[Any]

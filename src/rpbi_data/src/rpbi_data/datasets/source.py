@@ -14,13 +14,11 @@ import pandas as pd
 
 from custom_ros_tools.errors import ConfigError
 from robot_model.urdf.document import UrdfDocument
-from rpbi_data.bags.bag_reader import BagMessage, BagReader
-from rpbi_data.bags.clock import MAX_BACK_S, ClockStep, clock_of
-from rpbi_data.bags.dataframes import bag_to_dataframes
+from rpbi_data.bags.bag_reader import BagMessage, BagReader, bag_to_dataframes
 from rpbi_data.bags.images import decode_image
-from rpbi_data.bags.nanoseconds import PER_SECOND, row_times, to_seconds
 from rpbi_data.bags.resampling import TIME_ERROR as RESAMPLING_ERROR
 from rpbi_data.bags.resampling import resample_exactly
+from rpbi_data.bags.times import MAX_BACK_S, PER_SECOND, ClockStep, clock_of, row_times, to_seconds
 from rpbi_data.bags.topic_report import message_time_ns
 from rpbi_data.episodes.files import URDF, stored_path
 from rpbi_data.episodes.folder import BAG, Episode, EpisodeFolder
@@ -66,6 +64,7 @@ class SourceEpisode(ExportedEpisode):
         task: The task in words.
         any_size: Whether its bag may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s].
+        has_rows: Whether its rows are exported; otherwise only its states are read.
     """
 
     def __init__(
@@ -76,16 +75,30 @@ class SourceEpisode(ExportedEpisode):
         task: str,
         any_size: bool = False,
         max_time_error_s: float = np.inf,
+        has_rows: bool = True,
     ) -> None:
         self.folder, self.episode, self.task, self.label = folder, episode, task, episode.label
         self.bag: Path = folder.folder_of(episode.number) / BAG
         self._row_options, self._any_size, self._max_time_error_s = row_options, any_size, max_time_error_s
+        self._has_rows = has_rows
         self._schema = Schema(0, ())
         self._signals: tuple[Signal, ...] = ()
 
     def check(self) -> None:
         """Raises a BagError unless its bag can be read, within the limits."""
         BagReader(self.bag, any_size=self._any_size).__exit__()
+
+    @property
+    def table_bytes(self) -> int:
+        """Memory of its tables [bytes]; 0 if they are not read, or were released."""
+        made = [self.__dict__.get(name, {}) for name in ("_recorded", "_tables")]
+        tables = {id(table): table for each in made for table in each.values()}
+        return sum(int(table.memory_usage().sum()) for table in tables.values())
+
+    def release(self) -> None:
+        """Releases its tables; they are read again when they are used."""
+        for name in ("_recorded", "_tables", "times"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
@@ -104,19 +117,23 @@ class SourceEpisode(ExportedEpisode):
     @cached_property
     def cut(self) -> Cut | None:
         """The last reset of the world within it, where its rows begin; None without one."""
-        topic = self._state_topic
-        if topic not in self._types:
+        states = self._recorded.get(self._state_topic)
+        if states is None:
             return None
-        states = bag_to_dataframes(self.bag, topic, any_size=self._any_size, nanoseconds=True)[topic]
         resets = states["resets"].to_numpy() if "resets" in states else np.empty(0)
         if not len(resets) or resets[0] == resets[-1]:
             return None
         return Cut(int(resets[-1] - resets[0]), int(states.index[np.argmax(resets == resets[-1])]))
 
-    @cached_property
+    @property
     def cameras(self) -> tuple[CameraFeature, ...]:
         """The cameras of 8 bits of its topics; those with another kind of pixels are left out unless they are named."""
-        found = []
+        return tuple(camera for camera, _ in self._cameras.values())
+
+    @cached_property
+    def _cameras(self) -> dict[str, tuple[CameraFeature, int]]:
+        """The cameras by key, and the stamp of the first image of each [ns]."""
+        found = {}
         for key, topic in self._image_topics.items():
             first = next(self._images(topic), None)
             if first is None:
@@ -127,8 +144,8 @@ class SourceEpisode(ExportedEpisode):
                 if self._row_options.images is not None:
                     raise DatasetError(self.bag, f"{topic}: {error}") from error
                 continue
-            found.append(CameraFeature(key, pixels.shape[0], pixels.shape[1]))
-        return tuple(found)
+            found[key] = CameraFeature(key, pixels.shape[0], pixels.shape[1]), first[1]
+        return found
 
     def use(self, schema: Schema, signals: Sequence[Signal]) -> None:
         """Sets the rows that `times`, `frames` and `values` return.
@@ -158,7 +175,7 @@ class SourceEpisode(ExportedEpisode):
         """
         tables = {name: self._tables[name] for name in self._continuous_tables()}
         starts = [table.index[0] for table in tables.values()]
-        starts += [next(self._images(self._image_topics[camera.key]))[1] for camera in self._schema.cameras]
+        starts += [self._cameras[camera.key][1] for camera in self._schema.cameras]
         start, end = max(starts), min(table.index[-1] for table in tables.values())
         times = row_times(int(start), int(end), self._schema.fps) if end > start else np.empty(0, np.int64)
         if len(times) < 2:
@@ -258,9 +275,19 @@ class SourceEpisode(ExportedEpisode):
         return sorted({table for signal in signals for table, _ in signal.columns})
 
     @cached_property
+    def _recorded(self) -> dict[str, pd.DataFrame]:
+        """Tables of all topics that are needed, read at once."""
+        topics = {*self._feature_topics, *({self._state_topic} & self._types.keys())}
+        return bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
+
+    @property
+    def _feature_topics(self) -> list[str]:
+        return wanted_topics(self._types, self._row_options) if self._has_rows else []
+
+    @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
-        topics = wanted_topics(self._types, self._row_options)
-        tables = bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
+        """Tables of features, from the last reset on, those of transforms by frame."""
+        tables = {topic: self._recorded[topic] for topic in self._feature_topics}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
         if (cut := self.cut) is not None:
@@ -316,15 +343,12 @@ class SourceEpisode(ExportedEpisode):
         return f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
 
     def _states(self) -> Iterator[dict[str, Any]]:
-        topic = self._state_topic
-        if topic not in self._types:
-            return
-        table = bag_to_dataframes(self.bag, topic, any_size=self._any_size)[topic]
-        if "state_hash" not in table:
+        table = self._recorded.get(self._state_topic)
+        if table is None or "state_hash" not in table:
             return
         for row in table[table["state_hash"].astype(bool)].itertuples():
             counts = {"resets": int(row.resets), "tick": int(row.tick), "commands": int(row.commands)}
-            yield {"stamp": float(row.Index), **counts, "hash": str(row.state_hash)}
+            yield {"stamp": float(to_seconds(row.Index)), **counts, "hash": str(row.state_hash)}
 
     def _fixed_joints(self) -> set[str]:
         fixed: set[str] = set()

@@ -16,11 +16,9 @@ import pandas as pd
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.foreign import printable
-from rpbi_data.bags.bag_reader import BagReader
-from rpbi_data.bags.clock import MAX_BACK_S
-from rpbi_data.bags.dataframes import bag_to_dataframes
-from rpbi_data.bags.errors import BagError
-from rpbi_data.bags.limits import BASE_TIME_S, TIME_PER_MB_S
+from rpbi_data.bags.bag_reader import BagReader, bag_to_dataframes
+from rpbi_data.bags.limits import BASE_TIME_S, TIME_PER_MB_S, BagError
+from rpbi_data.bags.times import MAX_BACK_S
 from rpbi_data.bags.topic_report import topic_report
 
 from .errors import DISK_FULL, EpisodeError

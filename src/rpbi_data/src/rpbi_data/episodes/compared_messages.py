@@ -20,7 +20,7 @@ from rpbi.ros.publishers.status import STATE
 from rpbi.ros.publishers.transforms import TF
 from rpbi.world import World
 from rpbi_data.bags.bag_reader import BagMessage, BagReader
-from rpbi_data.bags.nanoseconds import PER_SECOND, to_seconds
+from rpbi_data.bags.times import PER_SECOND, to_seconds
 from rpbi_data.bags.topic_report import message_time_ns
 
 from .sample_messages import SampleMessages

@@ -22,8 +22,6 @@ from custom_ros_tools.foreign import MAX_PATH_BYTES, load_foreign_json, path_bel
 from robot_model.asset_files import ASSETS, pybullet_data, resolve_package
 from robot_model.urdf.document import UrdfDocument
 from robot_model.urdf.files import found_mesh, write_description
-from rpbi.config.world import main_file_model
-from rpbi.world.objects import object_sections
 
 from .errors import EpisodeError
 from .facts import MAX_FILES, MAX_LABEL
@@ -192,6 +190,9 @@ def _package_folders() -> tuple[Path, ...]:
 
 def _is_main_file(path: str) -> bool:
     """Returns whether a file has keys of a main file, and no others."""
+    from rpbi.config.world import main_file_model  # these load the simulator, which readers of episodes do not need
+    from rpbi.world.objects import object_sections
+
     try:
         keys = set(load_config(path))
     except ConfigError:

@@ -30,7 +30,7 @@ from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.limits import BagError
 from rpbi_data.bags.recorded_topics import Recorder
 
 from .bags import measure_topics, repair, repair_all

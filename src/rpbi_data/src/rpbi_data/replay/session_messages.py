@@ -15,7 +15,7 @@ from rpbi.world.saved.command_log import KEYFRAME, RecordedCommand
 from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.values import from_text, to_text
 from rpbi_data.bags.bag_reader import BagReader
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.limits import BagError
 
 MAX_TICKS = 20_000_000
 """Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""

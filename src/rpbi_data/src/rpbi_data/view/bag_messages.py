@@ -12,9 +12,8 @@ import pandas as pd
 
 from rpbi.replay.session import Recording
 from rpbi.world import World
-from rpbi_data.bags.bag_reader import BagReader
-from rpbi_data.bags.dataframes import bag_to_dataframes
-from rpbi_data.bags.errors import BagError
+from rpbi_data.bags.bag_reader import BagReader, bag_to_dataframes
+from rpbi_data.bags.limits import BagError
 from rpbi_data.episodes.errors import EpisodeError
 from rpbi_data.episodes.files import with_stored_files
 from rpbi_data.episodes.folder import BAG, EARLIER, EpisodeFolder, file_in

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from custom_ros_tools.errors import InterfaceError, hint, shortened
-from rpbi_data.bags.layout import NUMBER_DTYPES, Leaf, lay_out
-from rpbi_data.bags.message_type import SCALAR, Field, MessageType
+from rpbi_data.bags.message_layout import NUMBER_DTYPES, SCALAR, Field, Leaf, MessageType, lay_out
 from rpbi_data.bags.row_plan import STAMP, plan_rows
 
 MAX_LINES = 16

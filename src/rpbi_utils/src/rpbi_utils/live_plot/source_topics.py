@@ -11,7 +11,7 @@ import rospy
 
 from custom_ros_tools.errors import closest
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
-from rpbi_data.bags.message_type import MessageType
+from rpbi_data.bags.message_layout import MessageType
 
 from .fields import FieldError, FieldReader, split_name
 from .plot import LivePlot
