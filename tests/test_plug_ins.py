@@ -17,7 +17,10 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("custom_ros_tools", "ros_pybullet_interface", "operator_node", "rpbi_utils", "rpbi_examples")
+PACKAGES = (
+    *("custom_ros_tools", "ros_pybullet_interface", "operator_node", "ik_ros"),
+    *("rpbi_data", "rpbi_utils", "rpbi_examples"),
+)
 BODY_FILE = '''
 """A ball."""
 
@@ -122,6 +125,133 @@ class Pedal(Device):
     def close(self) -> None:
         """There is nothing to close."""
 '''
+FORMAT_FILE = '''
+"""Data sets that count episodes."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Count
+from rpbi_data.datasets.format import DatasetFormat, ExportedEpisode, Schema
+
+FILE = "tally.txt"
+
+
+class TallyConfig(ConfigModel):
+    """Options of a tally."""
+
+    first: Count = Field(0, description="Number to which episodes are added.")
+
+
+class Tally(DatasetFormat):
+    """The number of episodes in a file."""
+
+    Config = TallyConfig
+    has_rows = False
+    content = f"{FILE} (tally)"
+
+    def open(self, folder: Path, schema: Schema | None) -> None:
+        self._folder, self._count = folder, self.config.first
+
+    def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
+        self._count += 1
+        return {}
+
+    def close(self) -> None:
+        (self._folder / FILE).write_text(str(self._count))
+
+    @classmethod
+    def recognises(cls, folder: Path) -> bool:
+        return (folder / FILE).exists()
+
+    @classmethod
+    def faults(cls, folder: Path) -> Iterator[str]:
+        if not (folder / FILE).read_text().isdecimal():
+            yield f"{FILE}: expected a number"
+
+    @classmethod
+    def summary(cls, folder: Path) -> str:
+        return f"tally: {(folder / FILE).read_text()} episodes"
+'''
+GYM_TASK_FILE = '''
+"""The task `rest`."""
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from custom_ros_tools.schema import Name
+from rpbi.gym.actions import ActionPart
+from rpbi.gym.task import WorldTask, WorldTaskConfig
+
+
+class RestConfig(WorldTaskConfig):
+    """Options of the task `rest`."""
+
+    object: Name = Field(description="The body that has to be at rest.")
+
+
+class RestTask(WorldTask):
+    """Waits until a body is at rest."""
+
+    Config = RestConfig
+
+    def actions(self) -> Sequence[ActionPart]:
+        return []
+
+    def reward(self) -> float:
+        return 0.0
+
+    def has_succeeded(self) -> bool:
+        return max(map(abs, self.world.bodies[self.config.object].base_velocity().linear)) < 1e-3
+'''
+SCENE_FILE = '''
+"""A robot that does nothing."""
+
+from collections.abc import Iterator
+
+from .scene import Scene, Watched
+
+
+class Siesta(Scene):
+    """A robot rests, which always succeeds."""
+
+    world = "{rpbi_examples}/configs/siesta/config.yaml"
+    watch = Watched(robots=("kuka",))
+
+    def act(self) -> Iterator[None]:
+        yield
+
+    def has_succeeded(self) -> bool:
+        return True
+'''
+SOLVER_FILE = '''
+"""The solver that stays where it is."""
+
+from custom_ros_tools.schema import ConfigModel
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.solver import Solver
+
+
+class LazyConfig(ConfigModel):
+    """Options of the solver `lazy`."""
+
+
+class LazySolver(Solver):
+    """Returns the start of the search."""
+
+    Config = LazyConfig
+    deterministic = True
+
+    def __init__(self, config: LazyConfig) -> None:
+        self.joint_names = ()
+
+    def solve(self, problem: IKProblem) -> IKSolution:
+        return IKSolution(True, "at the start", tuple(problem.start), tuple(problem.start.values()))
+'''
 COMMAND_FILE = '''
 """The command `wave`."""
 
@@ -148,6 +278,8 @@ def wave(
     return f"{hand} hand waves at {name} by {angle:.3f} rad"
 '''
 RPBI, OPERATOR = "src/ros_pybullet_interface/src/rpbi", "src/operator_node/src/operator_node"
+FORMATS, TASKS = "src/rpbi_data/src/rpbi_data/datasets/formats", f"{RPBI}/gym/tasks"
+SCENES, SOLVERS = "src/rpbi_examples/src/rpbi_examples/scenes", "src/ik_ros/src/ik_ros/solvers"
 FILES = {
     "body": {
         f"{RPBI}/bodies/marble.py": BODY_FILE,
@@ -155,9 +287,16 @@ FILES = {
     },
     "sensor": {f"{RPBI}/sensors/height.py": SENSOR_FILE, f"{RPBI}/ros/publishers/height.py": TOPIC_FILE},
     "device": {f"{OPERATOR}/devices/pedal.py": DEVICE_FILE, "docs/devices.md": "| `pedal` | its axis `down` |"},
+    "format": {f"{FORMATS}/tally.py": FORMAT_FILE, "docs/datasets.md": "| `tally` | a number |"},
+    "gym task": {f"{TASKS}/rest.py": GYM_TASK_FILE, "docs/gym.md": "| `rest` | waits |"},
+    "scene": {f"{SCENES}/siesta.py": SCENE_FILE, "docs/examples.md": "| `siesta` | a robot rests |"},
+    "solver": {f"{SOLVERS}/lazy.py": SOLVER_FILE, "docs/ik_solvers.md": "| `lazy` | stays at the start |"},
     "command": {"src/rpbi_utils/src/rpbi_utils/console/wave.py": COMMAND_FILE},
 }
-"""Files written by hand: a class each, and the example of the body, the topic of the sensor, the page of the device."""
+"""Files written by hand: a class each, and the example of the body, the topic of the sensor, the page of all others.
+
+The world, launch file and view of a scene, and the options of a gym task or a solver, are found by its name.
+"""
 LINES = {
     "body": (f"{RPBI}/bodies/__init__.py", '        "dynamic": ', '        "marble": "rpbi.bodies.marble:Marble",\n'),
     "sensor": (
@@ -170,24 +309,40 @@ LINES = {
         '        "spacenav": ',
         '        "pedal": "operator_node.devices.pedal:Pedal",\n',
     ),
+    "format": (
+        f"{FORMATS}/__init__.py",
+        '        "mcap": ',
+        '        "tally": "rpbi_data.datasets.formats.tally:Tally",\n',
+    ),
+    "gym task": (f"{TASKS}/__init__.py", '        "peg": ', '        "rest": "rpbi.gym.tasks.rest:RestTask",\n'),
+    "scene": (
+        f"{SCENES}/__init__.py",
+        '        "wiping": ',
+        '        "siesta": "rpbi_examples.scenes.siesta:Siesta",\n',
+    ),
+    "solver": (f"{SOLVERS}/__init__.py", '        "kdl": ', '        "lazy": "ik_ros.solvers.lazy:LazySolver",\n'),
 }
 """A line of a table, and the line before which it goes."""
-BY_HAND = {"body": 4, "sensor": 4, "device": 4, "command": 2}
+BY_HAND = {"body": 4, "sensor": 4, "device": 4, "format": 4, "gym task": 4, "scene": 4, "solver": 4, "command": 2}
 """Files that are written by hand, with the test."""
 PROGRAM = """
 import json, pathlib, sys
-import operator_node, rpbi, rpbi_utils
+import ik_ros, operator_node, rpbi, rpbi_data, rpbi_examples, rpbi_utils
 root = pathlib.Path.cwd()
-for package in (operator_node, rpbi, rpbi_utils):
+for package in (ik_ros, operator_node, rpbi, rpbi_data, rpbi_examples, rpbi_utils):
     assert pathlib.Path(package.__file__).is_relative_to(root), package.__file__
 from custom_ros_tools.console.docs import console_files
+from ik_ros.schemas import schemas as solver_schemas
+from ik_ros.solvers import SOLVERS
 from operator_node.devices import DEVICES
+from rpbi.gym.schemas import schemas as task_schemas
 from rpbi.world.schemas import file_schemas, schemas
 from rpbi.reference.config_page import config_page
 from rpbi.ros.publishers.sample_topics import sample_topic
 from rpbi.ros.interface_page import interface_page
 from rpbi.reference.reference_world import reference_world
 from rpbi.world import World
+from rpbi_examples.gym import ENVIRONMENTS, SCENE_ENVIRONMENTS
 from rpbi_examples.plugins_page import plugins_page
 from rpbi_utils.console.spawn import kind_in, kinds
 
@@ -208,6 +363,10 @@ print(json.dumps({
     "plugins_page": plugins_page(),
     "spawned": [kind_in({"name": "a", "radius": 1.0}), *kinds()],
     "dead_travel": DEVICES.make("pedal", {"dead_travel": 0.2}).config.dead_travel,
+    "environments": [ENVIRONMENTS.get("rpbi/Rest-v0"), SCENE_ENVIRONMENTS.get("rpbi/Siesta-v0")],
+    "task_schema": task_schemas()["gym_rest"],
+    "solver_schema": solver_schemas()["lazy"],
+    "solver": SOLVERS.make("lazy", {}).deterministic,
     "device_schema": DEVICES.schemas()["pedal"]["properties"],
 }))
 """
@@ -295,6 +454,38 @@ def test_device_is_looked_up_made_and_explained(found: dict[str, Any]) -> None:
     assert found["dead_travel"] == 0.2
     assert found["device_schema"]["dead_travel"]["default"] == 0.1
     assert "| `pedal` | A pedal that is pressed. |" in found["plugins_page"]
+
+
+def test_format_is_listed_and_checks_data_sets(found: dict[str, Any], workspace: Path) -> None:
+    assert "| `tally` | The number of episodes in a file. |" in found["plugins_page"]
+    assert "robomimic, tally or mcap, or module:Class" in run(workspace, "./rpbi", "export", "--help").stdout
+    assert "tally" in completed(workspace, "export", "--to")
+    folder = workspace / "set"
+    folder.mkdir()
+    console = [sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"), "check_dataset", "set"]
+    assert "tally.txt (tally)" in run(workspace, *console).stderr
+    (folder / "tally.txt").write_text("3")
+    assert run(workspace, *console).stdout.startswith("tally: 3 episodes: no fault")
+
+
+def test_gym_task_is_an_environment_with_a_schema(found: dict[str, Any]) -> None:
+    assert "| `rest` | Waits until a body is at rest. |" in found["plugins_page"]
+    assert found["environments"][0] == "rest"
+    assert found["task_schema"]["properties"]["type"]["enum"] == ["rest"]
+    assert "object" in found["task_schema"]["required"]
+
+
+def test_scene_is_an_environment_that_score_offers(found: dict[str, Any], workspace: Path) -> None:
+    assert "| `siesta` | A robot rests, which always succeeds. |" in found["plugins_page"]
+    assert found["environments"][1] == "siesta"
+    assert "cup, siesta, wiping" in run(workspace, "./rpbi", "score", "--help").stdout
+    assert "siesta" in completed(workspace, "score")
+
+
+def test_solver_is_made_by_its_name_and_has_a_schema(found: dict[str, Any]) -> None:
+    assert "| `lazy` | Returns the start of the search. |" in found["plugins_page"]
+    assert found["solver"] is True
+    assert found["solver_schema"]["title"] == "lazy"
 
 
 @pytest.mark.usefixtures("found")

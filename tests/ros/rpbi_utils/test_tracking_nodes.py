@@ -14,7 +14,7 @@ from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
 from robot_model.geometry import Pose, rotation_between
-from rpbi_utils.tracking.tag_files import write_tag
+from rpbi_utils.tracking.tags import write_tag
 
 CAMERA = Pose((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
 """Looks down from 1 m."""

@@ -16,8 +16,8 @@ from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.state import WorldState
 from rpbi_data.episodes.bags import episodes_to_dataframes
 from rpbi_data.episodes.folder import BAG, EpisodeFolder
+from rpbi_data.episodes.session_messages import read_recording
 from rpbi_data.farm.policy import POLICIES
-from rpbi_data.replay.session_messages import read_recording
 
 RECORDED = Path(__file__).parent / "recorded"
 NAMES = {
@@ -34,12 +34,12 @@ NAMES = {
     "rpbi_utils:align": "rpbi_data.bags.resampling:align",
     "rpbi_utils:bag_to_dataframe": "rpbi_data.bags.bag_reader:bag_to_dataframe",
     "rpbi_utils:bag_to_dataframes": "rpbi_data.bags.bag_reader:bag_to_dataframes",
-    "rpbi_utils:bag_to_images": "rpbi_data.bags.image_files:bag_to_images",
+    "rpbi_utils:bag_to_images": "rpbi_data.bags.images:bag_to_images",
     "rpbi_utils:resample": "rpbi_data.bags.resampling:resample",
     "rpbi_utils:topic_report": "rpbi_data.bags.topic_report:topic_report",
     "rpbi_utils:transforms_between": "rpbi_data.bags.transforms:transforms_between",
-    "rpbi_utils:write_images": "rpbi_data.bags.image_files:write_images",
-    "rpbi_utils:write_video": "rpbi_data.bags.image_files:write_video",
+    "rpbi_utils:write_images": "rpbi_data.bags.images:write_images",
+    "rpbi_utils:write_video": "rpbi_data.bags.images:write_video",
     "rpbi_utils.labelled_images.dataset:write_labelled_images": "rpbi_data.labels.dataset:write_labelled_images",
 }
 """Names that pages had, and where each is now."""

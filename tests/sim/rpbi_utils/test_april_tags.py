@@ -16,9 +16,8 @@ from worlds import write_world
 from robot_model.geometry import Pose, rotation_between
 from rpbi.images import CameraImages
 from rpbi.world import World
-from rpbi_utils.tracking import tag_files
-from rpbi_utils.tracking.tag_files import write_tag
-from rpbi_utils.tracking.tags import DetectedTag, TagDetector, tag_image, tag_pose, tag_poses
+from rpbi_utils.tracking.tags import DetectedTag, TagDetector, tag_image, tag_pose, tag_poses, write_tag
+from rpbi_utils.tracking.tags import main as make_april_tag
 
 POSES = int(os.environ.get("APRIL_TAG_POSES", "12"))
 """How many poses are tried; docs/tracking.md has the figures of 500."""
@@ -124,10 +123,10 @@ def test_two_tags_are_distinguished_and_one_from_behind_is_ignored(lab) -> None:
 
 def test_the_command_makes_the_same_files(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setattr("sys.argv", ["make_april_tag", "7", "0.1", str(tmp_path / "new")])
-    tag_files.main()
+    make_april_tag()
     assert capsys.readouterr().out == f"{tmp_path / 'new' / 'tag36h11_7.obj'}\n"
     assert sorted(path.suffix for path in (tmp_path / "new").iterdir()) == [".mtl", ".obj", ".png"]
     monkeypatch.setattr("sys.argv", ["make_april_tag", "587", "0.1"])
     with pytest.raises(SystemExit):
-        tag_files.main()
+        make_april_tag()
     assert "tag36h11 has ids from 0 to 586, got 587" in capsys.readouterr().err

@@ -81,14 +81,15 @@ def _observe(window: Any, path: Path) -> Any:
 def main() -> None:
     """Runs the node as its own script does."""
     node: Any = import_module(os.environ.get(MODULE, "rpbi_utils.controls.ros.node"))
-    show = node._show
+    window_node: Any = import_module("rpbi_utils.window_node")
+    show = window_node._show
 
     def show_observed(opened: Any) -> None:
         timer = _observe(opened[-1], Path(os.environ[FILE]))
         show(opened)
         timer.stop()
 
-    node._show = show_observed
+    window_node._show = show_observed
     node.main()
 
 

@@ -11,8 +11,7 @@ import pytest
 from custom_ros_tools.errors import ConfigError
 from robot_model.geometry import Pose, rotation_between
 from rpbi_utils.tracking.config import AprilTagNodeConfig, TrackingNodeConfig
-from rpbi_utils.tracking.one_euro import OneEuroPose, SmoothingConfig
-from rpbi_utils.tracking.tracker import OutlierConfig, OutlierError, PoseTracker
+from rpbi_utils.tracking.tracker import OneEuroPose, OutlierConfig, OutlierError, PoseTracker, SmoothingConfig
 
 DT_S = 0.01
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rpbi_data.bags.bag_reader import bag_to_dataframe, bag_to_dataframes
+    from rpbi_data.bags.images import bag_to_images, write_images, write_video
 
-    from .bags.image_files import bag_to_images, write_images, write_video
     from .bags.recorded_topics import Recorder
     from .bags.resampling import align, resample
     from .bags.topic_report import topic_report
@@ -40,13 +40,13 @@ _HOMES = {
     "align": "rpbi_data.bags.resampling",
     "bag_to_dataframe": "rpbi_data.bags.bag_reader",
     "bag_to_dataframes": "rpbi_data.bags.bag_reader",
-    "bag_to_images": "rpbi_data.bags.image_files",
+    "bag_to_images": "rpbi_data.bags.images",
     "episodes_to_dataframes": "rpbi_data.episodes.bags",
     "resample": "rpbi_data.bags.resampling",
     "topic_report": "rpbi_data.bags.topic_report",
     "transforms_between": "rpbi_data.bags.transforms",
-    "write_images": "rpbi_data.bags.image_files",
-    "write_video": "rpbi_data.bags.image_files",
+    "write_images": "rpbi_data.bags.images",
+    "write_video": "rpbi_data.bags.images",
 }
 
 

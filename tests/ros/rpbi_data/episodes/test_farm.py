@@ -29,8 +29,7 @@ from rpbi_data.episodes.folder import BAG, EpisodeFolder
 from rpbi_data.episodes.verified_messages import verify
 from rpbi_data.farm.job import LOG
 from rpbi_data.farm.ros.farm import WORKER, Farm
-from rpbi_data.farm.ros.maker import EpisodeMaker
-from rpbi_data.farm.ros.remote import make_remotely
+from rpbi_data.farm.ros.maker import EpisodeMaker, make_remotely
 
 ROOT = Path(__file__).resolve().parents[4]
 CONSOLE = (sys.executable, str(ROOT / "devel/lib/custom_ros_tools/console"))

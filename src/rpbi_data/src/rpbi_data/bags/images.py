@@ -1,14 +1,25 @@
-"""Serialised images to arrays, without ROS."""
+"""Images in bags: decoded without ROS, and as arrays, files and video."""
 
 from __future__ import annotations
 
 import io
+import shutil
+import subprocess
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from custom_ros_tools.errors import MissingDependency, UnknownNameError
+from custom_ros_tools.files import atomic_file
+
+from .bag_reader import BagReader
+from .limits import BagError
 from .message_layout import Layout, MessageType, lay_out
+from .topic_report import message_time, topic_report
 
 Array = NDArray[Any]
 
@@ -84,3 +95,131 @@ def _decompress(data: bytes) -> Array:
             return np.asarray(image)
     except (OSError, Image.DecompressionBombError) as error:
         raise ValueError(f"expected a JPEG or PNG: {error}") from error
+
+
+Array = NDArray[Any]
+
+
+def bag_to_images(
+    path: str | Path, topic: str, *, any_size: bool = False
+) -> Generator[tuple[float, Array], None, None]:
+    """Yields the images of a topic one by one, in the order in which they were recorded.
+
+    Args:
+        path: A `.bag` file.
+        topic: A topic of `sensor_msgs/Image` or `sensor_msgs/CompressedImage`.
+        any_size: See `bag_to_dataframes`.
+
+    Yields:
+        The stamp [s], and the pixels as `rpbi_data.bags.images.decode_image` returns them.
+
+    Raises:
+        BagError: If the bag cannot be read, or an image of it.
+        UnknownNameError: If the bag does not have the topic.
+    """
+    with BagReader(path, any_size) as bag:
+        if topic not in bag.types:
+            raise UnknownNameError("topic", topic, bag.types)
+        for number, message in enumerate(bag.messages([topic])):
+            try:
+                pixels = decode_image(message.type, message.raw)
+            except ValueError as error:
+                raise BagError(bag.path, f"{topic}: message {number}: {error}") from error
+            yield message_time(message), pixels
+
+
+def write_images(path: str | Path, topic: str, folder: str | Path, *, any_size: bool = False) -> list[Path]:
+    """Writes the images of a topic as `000000.png`, `000001.png` ..., and their stamps [s] as `times.csv`.
+
+    Images of floats, such as depths [m], become `.npy` files, which keep every bit. `times.csv` comes last.
+
+    Raises:
+        BagError, UnknownNameError: See `bag_to_images`.
+        OSError: If a file cannot be written.
+    """
+    from PIL import Image
+
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written, times = [], []
+    for number, (time_s, pixels) in enumerate(bag_to_images(path, topic, any_size=any_size)):
+        file = folder / f"{number:06}{'.npy' if pixels.dtype.kind == 'f' else '.png'}"
+        with atomic_file(file) as part:
+            if part.suffix == ".npy":
+                np.save(part, pixels)
+            else:
+                Image.fromarray(pixels).save(part)
+        written.append(file)
+        times.append(f"{file.name},{time_s!r}\n")
+    with atomic_file(folder / "times.csv") as part:
+        part.write_text("file,time\n" + "".join(times))
+    return written
+
+
+def write_video(
+    path: str | Path, topic: str, video: str | Path, *, hz: float | None = None, any_size: bool = False
+) -> int:
+    """Writes the 8-bit images of a topic as an H.264 video; each frame shows the newest image at its time.
+
+    Args:
+        path: A `.bag` file.
+        topic: See `bag_to_images`.
+        video: The file to write, such as `camera.mp4`; there is none if this fails.
+        hz: Frames a second; by default the mean rate of the topic.
+        any_size: See `bag_to_dataframes`.
+
+    Returns:
+        The number of frames.
+
+    Raises:
+        BagError: If the images cannot be read, change their size, or are not of 8 bits.
+        UnknownNameError: If the bag does not have the topic.
+        MissingDependency: If ffmpeg is not installed.
+        OSError: If the file cannot be written.
+    """
+    if shutil.which("ffmpeg") is None:
+        raise MissingDependency("ffmpeg", "apt install ffmpeg")
+    if hz is None:
+        report = topic_report(path, any_size)
+        if topic not in report.index:
+            raise UnknownNameError("topic", topic, report.index)
+        hz = float(report.rate_hz[topic])
+        hz = hz if np.isfinite(hz) else 1.0
+    video = Path(video)
+    video.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(video) as part, closing(bag_to_images(path, topic, any_size=any_size)) as images:
+        return _encode(Path(path), topic, images, hz, part)
+
+
+def _encode(path: Path, topic: str, images: Iterator[tuple[float, Array]], hz: float, video: Path) -> int:
+    """Pipes images into ffmpeg at a constant rate; returns the number of frames."""
+    first_time_s, newest = next(images)
+    shape = newest.shape
+    if newest.dtype != np.uint8:
+        raise BagError(path, f"{topic}: expected images of 8 bits a channel, got {newest.dtype}; see write_images")
+    pixel_format = {2: "gray", 3: "rgb24" if shape[-1] == 3 else "rgba"}[newest.ndim]
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", pixel_format]
+    command += ["-video_size", f"{shape[1]}x{shape[0]}", "-framerate", f"{hz:.9g}", "-i", "-", "-c:v", "libx264"]
+    command += ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-movflags", "+faststart", str(video)]
+    encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert encoder.stdin is not None
+    frames = 0
+    try:
+        for time_s, pixels in images:
+            if pixels.shape != shape or pixels.dtype != np.uint8:
+                raise BagError(path, f"{topic}: expected images of one size, {shape}, got {pixels.shape}")
+            while frames < round((time_s - first_time_s) * hz):
+                encoder.stdin.write(newest.tobytes())
+                frames += 1
+            newest = pixels
+        encoder.stdin.write(newest.tobytes())
+    except BrokenPipeError:
+        pass  # its own words follow
+    except BaseException:
+        encoder.kill()
+        encoder.wait()
+        raise
+    _, errors = encoder.communicate()
+    if encoder.returncode:
+        raise OSError(f"ffmpeg cannot write {video}: {errors.decode(errors='replace').strip()}")
+    return frames + 1

@@ -15,7 +15,7 @@ from custom_ros_tools.plugins import trust_only
 from rpbi.replay.parallel import groups_of, in_forks, merged
 from rpbi.replay.session import Replay, ReplayResult
 from rpbi_data.bags.limits import BagError
-from rpbi_data.replay.session_messages import MAX_TICKS, read_recording, require_few_ticks
+from rpbi_data.episodes.session_messages import MAX_TICKS, read_recording, require_few_ticks
 
 
 def replay(

@@ -7,8 +7,8 @@ from typing import Annotated
 from custom_ros_tools.console.argument import Argument, UsageError
 from custom_ros_tools.foreign import printable
 from rpbi_data.episodes.folder import EpisodeFolder
+from rpbi_data.episodes.session_messages import MAX_TICKS
 from rpbi_data.episodes.verified_messages import MAX_CPU_S, ReplayLimits, verify_all
-from rpbi_data.replay.session_messages import MAX_TICKS
 
 MAX_LINE = 10_000
 """Characters of the line of an episode."""

@@ -6,7 +6,6 @@ import json
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -18,13 +17,13 @@ from custom_ros_tools.foreign import printable
 from custom_ros_tools.plugins import trust_only
 from rpbi.replay.parallel import TooSlowError, groups_of, in_forks, limit_cpu_time, merged
 from rpbi.replay.session import RecordedPart, Recording, Replay, ReplayResult
-from rpbi_data.replay.session_messages import MAX_TICKS, read_recording, require_few_ticks
 
 from .bags import seals_of
 from .compared_messages import Compared, Comparison
 from .errors import EpisodeError
-from .files import changed_files, newer_files, stored_names, with_stored_files
-from .folder import BAG, EARLIER, SEAL, Episode, EpisodeFolder, file_in
+from .files import changed_files, newer_files
+from .folder import SEAL, Episode, EpisodeFolder
+from .session_messages import MAX_TICKS, recorded_episode, require_few_ticks
 
 _PROGRAM = "import sys; from rpbi_data.episodes.verified_messages import main; main(sys.argv[1:])"
 
@@ -142,19 +141,7 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
 
 def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
     """Returns whether an episode is the same, the comparison in words, and notes."""
-    place = folder.folder_of(episode.number)
-    bag = file_in(place, BAG)
-    if bag is None:
-        raise EpisodeError(place, episode.note or "has no bag")
-    with tempfile.TemporaryDirectory(prefix="verify-") as files:
-        recording = read_recording(
-            bag,
-            episode.namespace,
-            any_size=limits.any_size,
-            earlier=file_in(place, EARLIER),
-            relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
-            names=stored_names(episode.files, Path(files)),
-        )
+    with recorded_episode(folder, episode, limits.any_size) as (bag, recording):
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)
         results, comparisons = zip(*in_forks(compare, groups_of(recording.parts(), jobs), limits.cpu_s))

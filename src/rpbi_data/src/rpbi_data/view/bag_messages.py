@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,10 +13,8 @@ from rpbi.replay.session import Recording
 from rpbi.world import World
 from rpbi_data.bags.bag_reader import BagReader, bag_to_dataframes
 from rpbi_data.bags.limits import BagError
-from rpbi_data.episodes.errors import EpisodeError
-from rpbi_data.episodes.files import with_stored_files
-from rpbi_data.episodes.folder import BAG, EARLIER, EpisodeFolder, file_in
-from rpbi_data.replay.session_messages import read_recording
+from rpbi_data.episodes.folder import EpisodeFolder
+from rpbi_data.episodes.session_messages import read_recording, recorded_episode
 
 from .bodies import add_later_bodies, links_of
 from .first_view import first_view
@@ -42,19 +39,8 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
         BagError: If its bag cannot be read.
         ConfigError: If its world cannot be built.
     """
-    episode, place = folder.read(number), folder.folder_of(number)
-    bag = file_in(place, BAG)
-    if bag is None:
-        raise EpisodeError(place, episode.note or "has no bag")
-    with tempfile.TemporaryDirectory(prefix="view-") as files:
-        recording = read_recording(
-            bag,
-            episode.namespace,
-            any_size,
-            earlier=file_in(place, EARLIER),
-            relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
-            needs_states=False,
-        )
+    episode = folder.read(number)
+    with recorded_episode(folder, episode, any_size, is_replayed=False) as (bag, recording):
         title = f"Episode {number}{f' ({episode.label})' if episode.label else ''} of {folder.path.resolve().name}"
         return _scene(title, bag, episode.namespace, recording, any_size)
 

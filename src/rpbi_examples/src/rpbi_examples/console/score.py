@@ -19,7 +19,7 @@ INTERRUPTED = 130
 
 
 def score(
-    scene: Annotated[str, Argument("SCENE")],
+    scene: Annotated[str, Argument("SCENE", choices=lambda: SCENES, is_open=True)],
     *,
     seeds: Annotated[str, Argument("A-B")] = "1-100",
     json: Annotated[Path | None, Argument("FILE", parse=Path, files="*.json")] = None,
@@ -32,15 +32,14 @@ def score(
         ./rpbi score cup --seeds 1-100 --json cup.json
 
     It needs no ROS master. Success is determined from the state of the simulation. A seed leads to the same episode in
-    any process, also in the example's launch file: `./rpbi launch cup seed:=17`. Pictures of the ends of failed
-    episodes are
-    in FOLDER/SCENE_failures.png. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
+    any process, also in the example's launch file: `./rpbi launch cup seed:=17`. FOLDER/SCENE_failures.png has
+    pictures of the ends of failed episodes. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
 
     Usage:
         ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--noise] [--jobs N]
 
     Args:
-        SCENE: cup, wiping, handover, talos, factory or dual_arm; or module:Class of your own
+        scene: {choices}; or module:Class of your own
         seeds: the seeds, such as 1-100 or 17; 1-100 without it
         json: file of the results, a row for each seed
         out: folder of the pictures; out/score without it

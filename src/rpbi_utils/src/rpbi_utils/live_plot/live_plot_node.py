@@ -6,12 +6,10 @@ import argparse
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import rospy
 
-from custom_ros_tools.ros.lifecycle.run_node import run_node
-from rpbi_utils.windows import missing_for_windows
+from rpbi_utils.window_node import Opened, run_window
 
 from .plot import LivePlot
 
@@ -21,11 +19,7 @@ NAME = "live_plot"
 def main() -> None:
     """Runs the program; exits with 1 without a display, with 2 for wrong arguments, with 0 when it is closed."""
     arguments = _parser().parse_args(rospy.myargv(sys.argv)[1:])
-    if missing := missing_for_windows():
-        sys.exit(f"{NAME}: {missing}")
-    run_node(
-        NAME, partial(_open, arguments), _show, anonymous=True, ros_time=False, loggers=["rpbi_utils", "rpbi_data"]
-    )
+    run_window(NAME, partial(_open, arguments), anonymous=True)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -54,7 +48,7 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def _open(arguments: argparse.Namespace) -> tuple[Any, Any, Any]:
+def _open(arguments: argparse.Namespace) -> Opened:
     from PyQt5.QtCore import QObject, pyqtSignal
     from PyQt5.QtWidgets import QApplication
 
@@ -73,13 +67,3 @@ def _open(arguments: argparse.Namespace) -> tuple[Any, Any, Any]:
     plot = LivePlot()
     window = LivePlotWindow(plot, arguments.seconds, arguments.out.absolute())
     return application, (signals, FieldSource(arguments.fields, plot)), window
-
-
-def _show(opened: tuple[Any, Any, Any]) -> None:
-    application, _, window = opened
-    if not rospy.core.is_shutdown_requested():
-        window.show()
-        application.exec_()
-    window.hide()
-    window.end()
-    rospy.signal_shutdown("the window was closed")

@@ -23,8 +23,7 @@ from custom_ros_tools.schema import (
 )
 from robot_model.geometry import Pose
 
-from .one_euro import SmoothingConfig
-from .tracker import OutlierConfig
+from .tracker import OutlierConfig, SmoothingConfig
 
 FAMILY_SIZE = 587
 """Tags in the family tag36h11."""

@@ -19,7 +19,7 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi_data.episodes.folder import EpisodeFolder
 from rpbi_data.farm.job import EpisodeOutcome, FarmJob
 
-from .remote import make_remotely, store
+from .maker import make_remotely, store
 
 POLL_S = 0.2
 """Longest time between two looks at new requests [s]."""

@@ -23,7 +23,7 @@ from rpbi_data.farm.pool import Child, Pool
 
 from .maker import new_world
 
-WORKER, CLUSTER = "rpbi_data.farm.ros.worker", "rpbi_data.farm.ros.cluster"
+WORKER, CLUSTER = "rpbi_data.farm.ros.maker", "rpbi_data.farm.ros.cluster"
 """Programs that make episodes."""
 
 

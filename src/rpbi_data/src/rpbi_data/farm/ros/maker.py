@@ -1,21 +1,30 @@
-"""Makes episodes of a job in this process."""
+"""Makes episodes of a job: in this process, on a node of a Ray cluster, or as the program of a process.
+
+`python -m rpbi_data.farm.ros.maker FD` makes the episodes that the other end of a connection requests.
+"""
 
 from __future__ import annotations
 
 import logging
 import shutil
+import signal
+import socket
 import sys
+import tempfile
 from datetime import datetime
+from functools import lru_cache
+from multiprocessing.connection import Connection
 
 import pybullet
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.foreign import path_below
 from rpbi.ros.headers import use_own_frames, use_prefix
 from rpbi.world import World
 from rpbi.world.loading import LoadedWorld, load_world
 from rpbi_data.episodes.bags import measure_topics
 from rpbi_data.episodes.errors import DISK_FULL
-from rpbi_data.episodes.folder import BAG, EpisodeFolder
+from rpbi_data.episodes.folder import BAG, FACTS, EpisodeFolder
 from rpbi_data.farm.job import EpisodeOutcome, FarmJob, digest, policy_digest
 from rpbi_data.farm.policy import POLICIES
 from rpbi_data.farm.run import EpisodeRun
@@ -98,3 +107,68 @@ class _AnotherError(InterfaceError):
     def __str__(self) -> str:
         where = "another one here than where the farm was started"
         return f"{self.args[0]} is {where}: expected the same files, version of this workspace, and PyBullet"
+
+
+Files = dict[str, bytes]
+"""Contents of the files of an episode by name."""
+
+
+def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
+    """Makes an episode in a temporary folder of this node, and returns its files; none if it has failed.
+
+    A fault that stops the farm names the node.
+    """
+    node = socket.gethostname()
+    try:
+        maker = _maker(job)
+    except InterfaceError as error:
+        return EpisodeOutcome(number, fault=f"{node}: {error}", stops=True), {}
+    with tempfile.TemporaryDirectory(prefix="rpbi-farm-") as path:
+        folder = EpisodeFolder(path)
+        outcome = maker.make(folder, number)
+        place = folder.folder_of(number)
+        files = {name: (place / name).read_bytes() for name in (BAG, FACTS)} if outcome.label else {}
+    return (outcome._replace(fault=f"{node}: {outcome.fault}") if outcome.stops else outcome), files
+
+
+def store(folder: EpisodeFolder, number: int, files: Files) -> None:
+    """Puts an episode of another node into a folder, under its final name when it is complete.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    part = folder.part_of(number)
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir()
+    for name, content in files.items():
+        path_below(part, name).write_bytes(content)
+    part.rename(folder.folder_of(number))
+
+
+@lru_cache(maxsize=1)
+def _maker(job: FarmJob) -> EpisodeMaker:
+    """Returns the maker of a job, cached, since the process of a node mostly continues with the same job."""
+    return EpisodeMaker(job)
+
+
+def main() -> None:
+    """Makes the requested episodes until the other end is closed."""
+    connection = Connection(int(sys.argv[1]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it
+    job, path = connection.recv()
+    folder = EpisodeFolder(path)
+    try:
+        maker = EpisodeMaker(job)
+    except InterfaceError as error:
+        connection.send(EpisodeOutcome(-1, fault=str(error), stops=True))
+        return
+    while True:
+        try:
+            number = connection.recv()
+        except EOFError:
+            return
+        connection.send(maker.make(folder, number))
+
+
+if __name__ == "__main__":
+    main()

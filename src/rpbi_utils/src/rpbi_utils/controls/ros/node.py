@@ -1,6 +1,5 @@
 """The node that opens the controls window."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,10 +8,10 @@ import roslib.packages
 import rospy
 from pydantic import Field
 
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.schema import ConfigModel, Switch, Text, optional
-from rpbi_utils.windows import missing_for_windows
+from rpbi_utils.window_node import Opened, run_window
 
 NAME = "rpbi_controls_node"
 
@@ -29,15 +28,11 @@ class ControlsParameters(ConfigModel):
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start or has no display, with 0 when it is interrupted or closed."""
-    if missing := missing_for_windows():
-        sys.exit(f"{NAME}: {missing}")
-    run_node(NAME, _open, _show, ros_time=False, loggers=["rpbi_utils", "rpbi_data"])
+    run_window(NAME, _open)
 
 
-def _open() -> tuple[Any, Any, Any]:
+def _open() -> Opened:
     from PyQt5.QtWidgets import QApplication
-
-    from rpbi_utils.controls.view import rviz_view
 
     from .link import SimulatorLink
     from .window import ControlsWindow, Signals
@@ -52,18 +47,46 @@ def _open() -> tuple[Any, Any, Any]:
     view = None
     if parameters.view:
         file = Path(roslib.packages.get_pkg_dir("rpbi_utils")) / "configs/controls/view.rviz"
-        view = rviz_view(parameters.rviz_config or str(file), parameters.world_frame)
+        view = _rviz_view(parameters.rviz_config or str(file), parameters.world_frame)
         if view is None:
             rospy.loginfo("python3-rviz is not installed: the window has no 3-D view")
     window = ControlsWindow(SimulatorLink(), signals, first, view)
     return application, signals, window
 
 
-def _show(opened: tuple[Any, Any, Any]) -> None:
-    application, _, window = opened
-    if not rospy.core.is_shutdown_requested():
-        window.show()
-        application.exec_()
-    window.hide()
-    window.end()
-    rospy.signal_shutdown("the window was closed")
+def _rviz_view(config_file: str, world_frame: str) -> Any:
+    """Returns a widget with RViz's 3-D view, or None if its Python bindings are not installed.
+
+    Its panels are hidden; the menu of its tool bar, by a right click, shows them.
+
+    Args:
+        config_file: Displays and view, as RViz saves them.
+        world_frame: Its fixed frame.
+
+    Raises:
+        InterfaceError: If the file is missing or is no configuration of RViz.
+    """
+    try:
+        from rviz import bindings
+    except ImportError:
+        return None
+    from PyQt5.QtWidgets import QDockWidget
+
+    if not Path(config_file).is_file():
+        raise InterfaceError(f"rviz_config: expected a file of RViz, got {config_file}, which does not exist")
+    config = bindings.Config()
+    reader = bindings.YamlConfigReader()
+    reader.readFile(config, config_file)
+    if reader.error():
+        raise InterfaceError(f"rviz_config: {config_file}: {reader.errorMessage()}")
+    frame = bindings.VisualizationFrame()
+    frame.setSplashPath("")
+    frame.initialize()
+    frame.load(config)
+    frame.setMenuBar(None)
+    frame.setStatusBar(None)
+    frame.setHideButtonVisibility(False)
+    for panel in frame.findChildren(QDockWidget):
+        panel.hide()
+    frame.getManager().setFixedFrame(world_frame)
+    return frame

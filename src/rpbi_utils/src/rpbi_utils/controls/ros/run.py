@@ -1,9 +1,9 @@
-"""Start, stop, steps, reset and pace."""
+"""Start, stop and step of the world, and of a model predictive controller."""
 
 from functools import partial
 from typing import Any
 
-from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QPushButton, QSpinBox
+from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QHBoxLayout, QPushButton, QSpinBox
 from std_srvs.srv import Trigger
 
 from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
@@ -138,3 +138,28 @@ def _runs(snapshot: SimulatorSnapshot) -> bool:
 
 def _stands(snapshot: SimulatorSnapshot) -> bool:
     return not snapshot.is_running
+
+
+BUTTONS = {"Start": "Lets the controller run", "Step": "Runs one cycle", "Stop": "Lets the robot stand"}
+"""Titles of buttons and their tips; their services are `mpc/start` and so on."""
+
+
+class MpcPanel(Panel):
+    """Start, stop and step of the controller behind `mpc/...`; hidden as long as there is none."""
+
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
+        super().__init__("Model predictive control", link, requests)
+        row = QHBoxLayout(self)
+        for title, tip in BUTTONS.items():
+            service = f"mpc/{title.lower()}"
+            button = named(QPushButton(title), f"mpc_{title.lower()}", tip)
+            button.clicked.connect(partial(self._call, f"MPC {title.lower()}", service))
+            self.require(service, button)
+            row.addWidget(button)
+
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
+        super().refresh(snapshot)
+        self.setVisible(snapshot.has("mpc/step"))
+
+    def _call(self, name: str, service: str, _: Any = None) -> None:
+        self.ask(name, lambda: RunningSimulator().call(service, Trigger).message)

@@ -9,11 +9,10 @@ from rpbi_utils.plain_text import plain_label, plain_tip
 from .cameras import CamerasPanel
 from .joints import JointsPanel
 from .link import SimulatorLink
-from .mpc import MpcPanel
 from .objects import ObjectsPanel
 from .panel import Panel, ScrolledDown, named
 from .recording import RecordingPanel
-from .run import RunPanel
+from .run import MpcPanel, RunPanel
 
 TITLE = "ROS-PyBullet Interface Controls"
 REFRESH_MS = 100

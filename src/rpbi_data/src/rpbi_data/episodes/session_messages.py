@@ -1,6 +1,8 @@
-"""Reads the recorded session of a simulator from a bag."""
+"""Reads the recorded session of a simulator from a bag, or from an episode with the files that are stored with it."""
 
-from collections.abc import Callable, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +18,10 @@ from rpbi.world.saved.description import WorldDescription
 from rpbi.world.saved.values import from_text, to_text
 from rpbi_data.bags.bag_reader import BagReader
 from rpbi_data.bags.limits import BagError
+
+from .errors import EpisodeError
+from .files import stored_names, with_stored_files
+from .folder import BAG, EARLIER, Episode, EpisodeFolder, file_in
 
 MAX_TICKS = 20_000_000
 """Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
@@ -85,6 +91,40 @@ def read_recording(
         return Recording(WorldDescription(relocate(descriptions[0])), commands, checkpoints)
     except ValueError as error:
         raise BagError(path, str(error)) from None
+
+
+@contextmanager
+def recorded_episode(
+    folder: EpisodeFolder, episode: Episode, any_size: bool = False, *, is_replayed: bool = True
+) -> Iterator[tuple[Path, Recording]]:
+    """Yields the bag of an episode and its session, whose files are copies in a folder until the end of the context.
+
+    Args:
+        folder: The folder of the episode.
+        episode: The episode.
+        any_size: As for `read_recording`.
+        is_replayed: Whether it is simulated again: it needs states to compare, and its keyframes name the copies.
+
+    Raises:
+        EpisodeError: If it has no bag, or a stored file cannot be read.
+        BagError: If its bag cannot be read.
+    """
+    place = folder.folder_of(episode.number)
+    bag = file_in(place, BAG)
+    if bag is None:
+        raise EpisodeError(place, episode.note or "has no bag")
+    with tempfile.TemporaryDirectory(prefix="episode-") as name:
+        copies = Path(name)
+        recording = read_recording(
+            bag,
+            episode.namespace,
+            any_size,
+            earlier=file_in(place, EARLIER),
+            relocate=lambda text: with_stored_files(text, episode.files, folder.files, copies),
+            names=stored_names(episode.files, copies) if is_replayed else {},
+            needs_states=is_replayed,
+        )
+        yield bag, recording
 
 
 def _rename(commands: _Commands, names: Mapping[str, str]) -> None:

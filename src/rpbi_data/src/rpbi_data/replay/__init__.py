@@ -1,1 +1,0 @@
-"""Recorded sessions in bags."""
