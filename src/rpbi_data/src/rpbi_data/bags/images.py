@@ -97,9 +97,6 @@ def _decompress(data: bytes) -> Array:
         raise ValueError(f"expected a JPEG or PNG: {error}") from error
 
 
-Array = NDArray[Any]
-
-
 def bag_to_images(
     path: str | Path, topic: str, *, any_size: bool = False
 ) -> Generator[tuple[float, Array], None, None]:

@@ -63,8 +63,6 @@ def row_times(start: int, end: int, hz: float) -> Array:
     return np.array([row for row in rows if row <= end], np.int64)
 
 
-Array = NDArray[Any]
-
 MAX_BACK_S = 1.0
 """Largest time by which stamps may run back against the order of recording [s]; publishers are never exactly
 synchronous.
