@@ -332,7 +332,7 @@ root = pathlib.Path.cwd()
 for package in (ik_ros, operator_node, rpbi, rpbi_data, rpbi_examples, rpbi_utils):
     assert pathlib.Path(package.__file__).is_relative_to(root), package.__file__
 from custom_ros_tools.console.docs import console_files
-from ik_ros.schemas import schemas as solver_schemas
+from ik_ros.node_configs import schemas as solver_schemas
 from ik_ros.solvers import SOLVERS
 from operator_node.devices import DEVICES
 from rpbi.gym.schemas import schemas as task_schemas
