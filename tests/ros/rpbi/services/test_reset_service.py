@@ -259,7 +259,7 @@ def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
     wait_until(lambda: len(ros.output(listener)) > heard, "TF is still known")
     assert rosout.logs("refused") == []
     warned = [log.msg for log in rosout.logs() if log.level > 2 and log.name == "/ros_pybullet_interface"]
-    harmless = ("the ROS master", "too slow")  # which may be slow to answer, as a busy machine may be
+    harmless = ("the ROS master", "too slow", "too late")  # of the master, the machine, and targets on a busy one
     assert [message for message in warned if not any(words in message for words in harmless)] == []
     assert "TF_" not in ros.output(listener), "TF_OLD_DATA and the like"
     last: dict[str, int] = {}

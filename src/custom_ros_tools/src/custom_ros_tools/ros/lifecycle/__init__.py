@@ -1,1 +1,0 @@
-"""Lifecycle of a node: start, interrupts, log, the master, end."""

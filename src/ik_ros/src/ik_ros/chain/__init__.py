@@ -1,1 +1,0 @@
-"""Chains of joints between two links, and the common part of their solvers."""

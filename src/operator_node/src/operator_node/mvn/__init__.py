@@ -1,1 +1,0 @@
-"""Motion capture by Xsens MVN: its stream, the people in it, and recordings."""

@@ -1,1 +1,0 @@
-"""URDFs: reading, structural checks, referenced files, and modified copies."""

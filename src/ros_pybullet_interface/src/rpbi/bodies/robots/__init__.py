@@ -1,1 +1,0 @@
-"""Bodies with joints that are driven."""

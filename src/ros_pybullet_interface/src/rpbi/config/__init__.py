@@ -1,1 +1,0 @@
-"""YAML files: reading, and models of their keys."""

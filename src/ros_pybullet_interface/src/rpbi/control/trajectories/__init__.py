@@ -1,1 +1,0 @@
-"""Following trajectories of joints."""

@@ -1,1 +1,0 @@
-"""Parts that run a world: clock, pacer, mailbox, inputs."""

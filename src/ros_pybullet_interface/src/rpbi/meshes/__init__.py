@@ -1,1 +1,0 @@
-"""Mesh files: checks, and trial loading in a separate process."""

@@ -1,1 +1,0 @@
-"""The ROS node around the world."""

@@ -1,1 +1,0 @@
-"""Cameras in ROS: scenes to the renderer process, images from it."""

@@ -1,1 +1,0 @@
-"""Services of the node and of each body."""

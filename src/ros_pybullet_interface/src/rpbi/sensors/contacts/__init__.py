@@ -1,1 +1,0 @@
-"""Contact points between bodies: of one tick, as means, and as arrows."""

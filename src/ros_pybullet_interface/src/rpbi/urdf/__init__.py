@@ -1,1 +1,0 @@
-"""URDFs in PyBullet."""

@@ -1,1 +1,0 @@
-"""Forks of a world: processes in which it continues independently."""

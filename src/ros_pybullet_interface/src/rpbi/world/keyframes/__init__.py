@@ -1,1 +1,0 @@
-"""Keyframes: states of a world from which it continues without former commands."""

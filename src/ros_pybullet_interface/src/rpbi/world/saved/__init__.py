@@ -1,1 +1,0 @@
-"""Saved worlds as text and files: descriptions, commands and states."""

@@ -1,1 +1,0 @@
-"""Commands for bags, episodes and data sets."""

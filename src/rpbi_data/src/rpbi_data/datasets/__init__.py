@@ -1,1 +1,0 @@
-"""Episodes as data sets in formats of other projects: writing, provenance, and checks."""

@@ -1,1 +1,0 @@
-"""Demonstrations as episodes: recorded, listed, read as one table, and verified."""

@@ -1,1 +1,0 @@
-"""The processes of a farm, which write bags."""

@@ -1,1 +1,0 @@
-"""An arm draws a sleeve over that of a person."""

@@ -1,1 +1,0 @@
-"""Nodes of model predictive controllers."""

@@ -1,1 +1,0 @@
-"""The window for the running world."""

@@ -1,1 +1,0 @@
-"""A window with buttons for a running simulator."""

@@ -1,1 +1,0 @@
-"""Emulated driver of a robot: its controller, with limits and reflexes, without ROS."""

@@ -1,1 +1,0 @@
-"""Former names of `rpbi_data.labels`."""

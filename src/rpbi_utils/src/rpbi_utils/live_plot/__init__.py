@@ -1,1 +1,0 @@
-"""Numeric fields of running topics as lines over time, without ROS and Qt."""
