@@ -1,6 +1,5 @@
-"""Former names of episodes.
-
-The names in `__all__` are those of `rpbi_data`, and are loaded from there when they are used.
+"""Former names of episodes. The names in `__all__` are defined in `rpbi_data`, and are loaded from there when they are
+used.
 """
 
 from typing import Any

@@ -1,19 +1,21 @@
-"""Costs of predicted states, for model predictive control by sampling."""
+"""Cost of predicted states, for sampling-based model predictive control."""
 
 from rpbi.world import World
 
 GOAL = (-0.1, 0.1)
-"""Goal of the middle of the box [m]."""
+"""Goal of the middle of the box, x and y [m]."""
 BEHIND_M = 0.09
-"""Distance of the hand behind the middle of the box, seen from the goal [m]."""
+"""Distance of the desired hand position from the middle of the box, along -y [m]."""
 HEIGHT_M = 0.06
 """Height of the hand above the floor [m]."""
 PER_M2 = 10.0
-"""Cost of the box's distance, squared, relative to that of the hand."""
+"""Weight of the box's squared distance; the hand's squared distance has the weight 1."""
 
 
 def box_to_goal(world: World) -> float:
-    """Returns the squared distances of the box from its goal and of the hand from the place behind the box [m^2]."""
+    """Returns the weighted sum of two squared distances [m^2]: from the box to its goal, and from the hand to its place
+    behind the box.
+    """
     box, arm = world.bodies["box"].base_pose().position, world.bodies["kuka_lwr"]
     hand = arm.link_pose(arm.link_indices[-1]).position
     place = (box[0], box[1] - BEHIND_M, HEIGHT_M)

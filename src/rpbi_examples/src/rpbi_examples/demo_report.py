@@ -14,16 +14,16 @@ import numpy.typing as npt  # noqa: E402
 import pandas as pd  # noqa: E402
 
 ENOUGH = 0.95
-"""Share of its rate that a topic must reach."""
+"""Share of the expected rate that a topic must reach."""
 MIN_SPAN_RAD = 0.2
-"""Smallest range of a joint's plot, so that a joint at rest looks like one [rad or m]."""
+"""Smallest range of a joint's plot [rad or m], so that noise of a joint at rest is not magnified."""
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
-    """Compares measured with expected rates of topics over a duration [s of ROS time].
+    """Compares measured with expected message rates of topics over a duration of ROS time [s].
 
     Returns:
-        One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
+        One row for each topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
     """
     table = pd.DataFrame({"expected_hz": pd.Series(expected_hz, dtype=float)})
     table.index.name = "topic"
@@ -35,14 +35,14 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
 
 
 def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
-    """Compares positions with the targets that were active at the same time.
+    """Compares joint positions with the targets that were active at the same time.
 
     Args:
-        states: Joint states with columns `position/JOINT`, index time [s].
+        states: Joint states with columns `position/JOINT`, indexed by time [s].
         targets: Targets, in the same form.
 
     Returns:
-        One row a joint with the columns `rms` and `max` [rad or m].
+        One row for each joint with the columns `rms` and `max` [rad or m].
     """
     columns = [column for column in targets.columns if column.startswith("position/")]
     latest = targets[columns].ffill()
@@ -71,7 +71,7 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
 
 
 def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
-    """Draws the motors' efforts."""
+    """Draws the motor efforts of the given joints."""
     figure, axis = plt.subplots(figsize=(9, 4))
     for joint in joints:
         axis.plot(states.index - states.index[0], states[f"effort/{joint}"], lw=1.0, label=joint)
@@ -83,11 +83,12 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
 
 
 def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
-    """Returns the normal forces with which another body presses [N], added up, by time [s]; 0 where it does not touch.
+    """Returns the sum of the normal forces of another body [N], indexed by time [s]; 0 where that body does not touch.
 
     Args:
-        contacts: A row a contact with `other_body` and `normal_force`, and one for each time without any.
-        other_body: The other body.
+        contacts: One row for each contact with `other_body` and `normal_force`, and one for each time without a
+            contact.
+        other_body: Name of the other body.
     """
     if "other_body" not in contacts:  # no contact in the whole recording
         return pd.Series(0.0, contacts.index)
@@ -107,11 +108,11 @@ def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start
     """Draws the arm's force on the box, the friction that it overcomes, and the force at the wrist [N].
 
     Args:
-        push: Force of the arm on the box [N], by time [s].
-        friction: Largest friction of the floor, mu N, likewise.
-        wrist: Samples of the force-torque sensor, by time.
+        push: Force of the arm on the box [N], indexed by time [s].
+        friction: Largest friction force of the floor, mu N [N], indexed by time [s].
+        wrist: Samples of the force-torque sensor, indexed by time [s].
         start_s: The time that is drawn as 0.
-        path: Where to write.
+        path: Picture file to write.
     """
     figure, (above, below) = plt.subplots(2, sharex=True, figsize=(9, 5))
     above.plot(friction.index - start_s, friction, color="#22333f", lw=2.2, alpha=0.35, label="mu N of the floor")
@@ -145,7 +146,7 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
 
 
 def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
-    """Returns a line for each required topic without any message."""
+    """Returns a line for each required topic that has no message."""
     topics = summary["topics"].items()
     return [f"{topic} had no message" for topic, row in topics if topic in required and not row["messages"]]
 
@@ -153,7 +154,7 @@ def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], world: str) -> list[str]:
     """Returns a line for each rate that a slow or busy machine reduced, with cause and remedy.
 
-    Images share a line. `world` is the main YAML file.
+    All image topics share one line. `world` is the main YAML file.
     """
     topics, factor = summary["topics"], summary["figures"]["real_time_factor"]
     lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]

@@ -1,4 +1,4 @@
-"""Rate at which this machine draws images of a world, the limit of its cameras, without physics and ROS."""
+"""Measures how fast this machine draws images of a world without physics and ROS; cameras cannot be faster."""
 
 import argparse
 import json
@@ -18,21 +18,21 @@ TIMEOUT_S = 120.0
 
 
 def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> float:
-    """Measures how often the world's camera can be drawn, at the priority of an ordinary program.
+    """Measures the rate at which the images of the world's camera are drawn, at normal process priority.
 
-    It is measured in a separate process, since some drivers crash.
+    The measurement runs in a separate process, since some graphics drivers crash.
 
     Args:
         world: Main YAML file.
         camera: Pose of the camera's optical frame in the world.
-        seconds: Duration of the measurement.
+        seconds: Duration of the measurement [s].
         renderer: Name of the renderer to measure, as in the diagnostics.
 
     Returns:
-        Images of colour and depth a second.
+        Number of images per second, each with colour and depth.
 
     Raises:
-        InterfaceError: If they cannot be drawn.
+        InterfaceError: If the images cannot be drawn.
     """
     numbers = [str(number) for number in (*camera.position, *camera.quat_xyzw)]
     command = [sys.executable, "-m", __name__, world, str(seconds), renderer, *numbers]
@@ -48,7 +48,7 @@ def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> flo
 
 
 def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
-    """Draws in this process for a time [s]; returns images per second."""
+    """Draws in this process for a given time [s], and returns the number of images per second."""
     loaded = World.from_file(world)
     config = loaded.config.rgbd_sensor
     assert config is not None
@@ -68,7 +68,7 @@ def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
 
 
 def main() -> None:
-    """Prints the images a second as JSON."""
+    """Prints the number of images per second as JSON."""
     parser = argparse.ArgumentParser(prog=__name__)
     parser.add_argument("world")
     parser.add_argument("seconds", type=float)

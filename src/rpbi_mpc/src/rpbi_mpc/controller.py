@@ -13,10 +13,10 @@ class Sensed(NamedTuple):
     """A measurement.
 
     Attributes:
-        time_s: Time of the plant at which it is available [s].
-        values: The measured numbers, in the order and units of the controller; None if something is missing.
+        time_s: Plant time at which the measurement is available [s].
+        values: The measured numbers, in the order and units that the controller expects; None if a number is missing.
         missing: What is missing, as a clause such as `vicon/box/box: no pose for 0.52 s, expected one every 0.01 s`.
-        age_s: Time between measurement and `time_s` [s].
+        age_s: Time from the instant of measurement to `time_s` [s].
     """
 
     time_s: float
@@ -29,8 +29,8 @@ class Plant(ABC):
     """A system that is measured and commanded, and that advances in time.
 
     Attributes:
-        is_timed: Whether it runs in real time, as hardware does. Then late plans are discarded; otherwise the plant
-            waits, and no decision depends on the speed of the computer.
+        is_timed: Whether the plant runs in real time, as hardware does. If so, late plans are discarded; otherwise the
+            plant waits for plans, and no decision depends on the speed of the computer.
     """
 
     is_timed = False
@@ -49,7 +49,7 @@ class Plant(ABC):
 
     @abstractmethod
     def advance(self, duration_s: float) -> None:
-        """Lets time pass: steps a simulation by as many ticks, or waits on hardware."""
+        """Lets the given time pass: a simulation is stepped by the corresponding ticks; on hardware, the call waits."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,16 @@ class ControlPlan:
     """Commands for the next cycles, and the predicted states.
 
     Attributes:
-        commands: Commands of this cycle and those after it, cycles x numbers of a command.
-        states: Predicted states, from the time at which the first command acts; rows x numbers of a state.
+        commands: Commands of this and the following cycles, shape (cycles, numbers of a command).
+        states: Predicted states, from the time at which the first command acts, shape (rows, numbers of a state).
         state_step_s: Time between two predicted states [s].
         cost: Value of the cost.
         converged: Whether the solver found a solution within its limits.
-        status: Status of the solver, or the reason why there is none.
-        iterations: Number of its iterations.
-        wall_s: Wall time of the solution [s].
-        processor_s: Processor time [s].
-        extras: Further numbers of this cycle, by name, for the table.
+        status: Status that the solver reports, or the reason why there is no solution.
+        iterations: Number of solver iterations.
+        wall_s: Wall time that the solver took [s].
+        processor_s: Processor time that the solver took [s].
+        extras: Further numbers of this cycle for the table of cycles, indexed by name.
     """
 
     commands: np.ndarray
@@ -104,10 +104,10 @@ class MpcController(ABC):
         """
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:  # noqa: B027 (optional)
-        """Records the command that acts from a time on [s]; None if the plant is stopped."""
+        """Records the command that acts from `time_s` [s] on; None if the plant is stopped."""
 
     def reset(self) -> None:  # noqa: B027 (optional)
-        """Discards all history; the next plan is that of a new controller."""
+        """Discards all history, so that the next plan equals the first plan of a new controller."""
 
     @property
     def is_finished(self) -> bool:
@@ -116,10 +116,10 @@ class MpcController(ABC):
 
     @property
     def result(self) -> str:
-        """Result of a finished task, as a clause."""
+        """Result of a finished task, as a clause such as `the task is done`."""
         return "the task is done"
 
     @property
     def failure(self) -> str:
-        """Reason of a failed task, with which the loop stops; empty while the task can succeed."""
+        """Reason why the task has failed, for which the loop stops; empty while the task can succeed."""
         return ""

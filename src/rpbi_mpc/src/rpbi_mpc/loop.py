@@ -18,14 +18,14 @@ from .controller import ControlPlan, MpcController, Plant, Sensed
 
 
 class LoopConfig(ConfigModel):
-    """Times of a loop.
+    """Timing of a loop.
 
     Attributes:
         hz: Cycles a second [Hz].
-        delay_s: Time from a measurement until its command acts [s], at most one cycle. It is constant: in simulation
-            however long the solver takes, on hardware as long as the solver is faster.
-        max_missed: Number of cycles without a new plan for which the last plan is executed; after that, plant and loop
-            stop.
+        delay_s: Time from a measurement until the resulting command acts [s], at most one cycle. The delay is constant:
+            in simulation always, on hardware as long as the solver takes no longer than `delay_s`.
+        max_missed: Number of successive cycles without a new plan in which the last plan is still executed; after
+            them, plant and loop stop.
     """
 
     hz: Hz = Field(25.0, description="Cycles a second.")
@@ -42,7 +42,7 @@ class LoopConfig(ConfigModel):
 
     @property
     def period_s(self) -> float:
-        """Time of a cycle [s]."""
+        """Duration of a cycle [s]."""
         return 1.0 / self.hz
 
 
@@ -61,12 +61,12 @@ class Cycle:
     """One pass of the loop.
 
     Attributes:
-        index: Its number, from 0.
-        status: Its outcome.
-        reason: Why, if it is not `solved`.
+        index: Number of the cycle, from 0.
+        status: Outcome of the cycle.
+        reason: Reason for the status; empty if the status is `solved`.
         sensed: The measurement.
         plan: The new plan; None without a measurement.
-        command: The command that acted; None if the plant stood.
+        command: The command that was applied; None if the plant was stopped.
     """
 
     index: int
@@ -79,7 +79,7 @@ class Cycle:
 
 @dataclass
 class _Held:
-    """The last good plan, and the number of cycles since."""
+    """The last good plan, and the number of cycles since that plan."""
 
     plan: ControlPlan | None = None
     age: int = 0
@@ -89,21 +89,21 @@ class _Held:
 class LockStep:
     """Senses, solves, acts and steps, one cycle at a time.
 
-    The measurement of a cycle decides the command that acts `delay_s` later. A simulated plant waits for the solver, so
-    the same start leads to the same end on any computer. A timed plant does not wait: late plans are
+    The measurement of a cycle determines the command that acts `delay_s` later. A simulated plant waits for the
+    solver, so that the same start leads to the same end on any computer. A timed plant does not wait: late plans are
     discarded.
 
-    Without a new plan, the last one is executed for `max_missed` cycles; then plant and loop stop. Without a
-    measurement, the plant stops until the next one.
+    Without a new plan, the last plan is executed for at most `max_missed` cycles; then plant and loop stop. Without a
+    measurement, the plant stops until the next measurement.
 
     Args:
         plant: The controlled system.
         controller: The controller.
-        config: Times.
-        observers: Are called with each cycle.
+        config: Timing; by default `LoopConfig()`.
+        observers: Functions that are called with each cycle after its end.
 
     Raises:
-        InterfaceError: If plan or measurement do not have the numbers that the controller names.
+        InterfaceError: If a measurement or a command does not have one number for each name that the controller lists.
     """
 
     def __init__(
@@ -126,12 +126,12 @@ class LockStep:
         return bool(self._stopped) or self.controller.is_finished
 
     def restart(self) -> None:
-        """Goes on after a stop, with no plan and a controller that has forgotten everything."""
+        """Makes the loop run again after a stop; discards the last plan and resets the controller."""
         self._held, self._stopped = _Held(), ""
         self.controller.reset()
 
     def run(self, max_s: float = math.inf) -> list[Cycle]:
-        """Runs cycles until the task is done, the loop stops, or a time [s] has passed; returns these cycles."""
+        """Runs cycles until the task is done, the loop stops, or `max_s` [s] has passed, and returns these cycles."""
         first = len(self.cycles)
         while not self.is_over and (len(self.cycles) - first) * self.config.period_s < max_s - 1e-9:
             self.cycle()
@@ -139,7 +139,7 @@ class LockStep:
         return self.cycles[first:]
 
     def cycle(self) -> Cycle:
-        """Runs one cycle, at the end of which a whole period has passed."""
+        """Runs one cycle, which advances the plant by one period."""
         sensed = self.plant.sense()
         plan, status, reason = self._decide(sensed)
         command = self._command() if status in (Status.SOLVED, Status.LAST_PLAN) else None
@@ -186,7 +186,9 @@ class LockStep:
         return ""
 
     def _without(self, fault: str) -> tuple[Status, str]:
-        """Continues with the last plan, if there is one."""
+        """Returns status and reason of a cycle without a new plan; stops the loop if the last plan cannot be
+        continued.
+        """
         self._held.age += 1
         last = self._held.plan
         if last is not None and self._held.age <= min(self.config.max_missed, len(last.commands) - 1):

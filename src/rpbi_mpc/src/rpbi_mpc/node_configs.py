@@ -1,4 +1,4 @@
-"""Parameters of the nodes, and the schema of the YAML files that have them."""
+"""Parameters of the nodes, and the schemas of the YAML files that contain these parameters."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from .pushing.sampling_planner import PushSamplingConfig
 from .sampling import SAMPLERS, InputConfig, SamplingConfig
 
 SAME_S = 1e-9
-"""Difference below which two times are the same [s]."""
+"""Difference below which two times count as equal [s]."""
 
 
 class PlantConfig(ConfigModel):
-    """Topics of slider and robot, and how they are driven."""
+    """Names and topics of slider and robot, and rates and limits of the plant."""
 
     robot: Text = Field("nextage", description="Name of the robot whose targets are set, rpbi/NAME.")
     joint_states: TopicName = Field(
@@ -58,7 +58,7 @@ class PlantConfig(ConfigModel):
 
 
 class PushingNodeConfig(ConfigModel):
-    """A slider that the hand of a robot pushes along a path."""
+    """Parameters of the node that pushes a slider along a path with a robot's hand."""
 
     loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
     controller: Literal["program", "sampling"] = Field(
@@ -86,7 +86,7 @@ class PushingNodeConfig(ConfigModel):
 
 
 class SamplingNodeConfig(ConfigModel):
-    """A robot that is commanded by the best of its predicted futures."""
+    """Parameters of the node that commands a robot with the best of several simulated candidates."""
 
     loop: LoopConfig = Field(LoopConfig(hz=10.0), description="Times of the loop.")
     sampling: SamplingConfig = Field(SamplingConfig(), description="Candidates, and the choice among them.")
@@ -98,14 +98,14 @@ class SamplingNodeConfig(ConfigModel):
 
 
 CONFIGS: dict[str, type[ConfigModel]] = {"pushing_mpc": PushingNodeConfig, "sampling_mpc": SamplingNodeConfig}
-"""Parameters of each node."""
+"""Class of the parameters of each node, indexed by node name."""
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file.
+    """Returns the text of each schema file, indexed by its path.
 
     Args:
-        root: The workspace.
+        root: Root folder of the workspace.
     """
     found = {name: json_schema(config, name) for name, config in CONFIGS.items()}
     for schema in found.values():
@@ -114,7 +114,7 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 
 def _any_sampler() -> Schema:
-    """Returns the schema of a sampler of any type."""
+    """Returns the schema of a sampler: one of `SAMPLERS`, or a user's own class."""
     own_type = {"type": "object", "properties": {"type": {"pattern": r"^[\w.]+:\w+$"}}, "required": ["type"]}
     known = [
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}

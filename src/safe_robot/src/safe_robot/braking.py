@@ -1,6 +1,6 @@
 """Braking trajectories in discrete time: how joints that move come to rest within their acceleration and jerk limits.
 
-Time advances in periods of T, and derivatives are backward differences, as in a controller with one command a period:
+Time advances in periods of T, and derivatives are backward differences, as in a controller with one command per period:
 v_k = (q_k - q_{k-1}) / T, a_k = (v_k - v_{k-1}) / T, j_k = (a_k - a_{k-1}) / T.
 """
 
@@ -10,25 +10,25 @@ from typing import NamedTuple
 import numpy as np
 
 GROWTH = 1.15
-"""Ratio of each prepared duration of braking to the previous one."""
+"""Ratio of each prepared braking duration to the next shorter one."""
 INSIDE = 1.0 - 1e-6
-"""Share of the limits that braking uses, so that rounding does not exceed them."""
+"""Share of the limits that braking uses, so that rounding errors cannot exceed the limits."""
 TINY = 1e-300
 """Added to divisors that may be 0."""
 MAX_PERIODS = 10_000
-"""Largest number of periods of a braking; all lengths up to it are prepared."""
+"""Largest number of periods that a braking may take."""
 FASTEST = 10.0
 """Speed up to which braking is prepared for joints without a velocity limit [rad/s or m/s]."""
 
 
 class Brake(NamedTuple):
-    """Braking of n joints within k periods: each a k x n array.
+    """Braking of n joints in k periods; all arrays have the shape (k, n).
 
     Attributes:
-        displacement: Displacement from the start [rad or m].
-        velocity: [rad/s or m/s].
-        acceleration: [rad/s^2 or m/s^2].
-        jerk: [rad/s^3 or m/s^3].
+        displacement: Displacements from the start [rad or m].
+        velocity: Velocities [rad/s or m/s].
+        acceleration: Accelerations [rad/s^2 or m/s^2].
+        jerk: Jerks [rad/s^3 or m/s^3].
     """
 
     displacement: np.ndarray
@@ -37,7 +37,12 @@ class Brake(NamedTuple):
     jerk: np.ndarray
 
     def with_joints_of(self, other: "Brake", joints: np.ndarray) -> "Brake":
-        """Returns a braking in which some joints, n booleans, come to rest as in another one, of any length."""
+        """Returns a braking in which the selected joints come to rest as in another braking.
+
+        Args:
+            other: The other braking, which may have another number of periods.
+            joints: n booleans: whether each joint is selected.
+        """
         rows = max(len(self.velocity), len(other.velocity))
         return Brake(
             *(
@@ -48,13 +53,13 @@ class Brake(NamedTuple):
 
 
 class BrakingCommands(NamedTuple):
-    """The commands of a braking to n joints, a period apart: each a k x n array.
+    """Commands to n joints during a braking, one per period; all arrays have the shape (k, n).
 
     Attributes:
-        position: [rad or m].
-        velocity: [rad/s or m/s].
-        acceleration: [rad/s^2 or m/s^2].
-        jerk: [rad/s^3 or m/s^3].
+        position: Positions [rad or m].
+        velocity: Velocities [rad/s or m/s].
+        acceleration: Accelerations [rad/s^2 or m/s^2].
+        jerk: Jerks [rad/s^3 or m/s^3].
     """
 
     position: np.ndarray
@@ -64,7 +69,7 @@ class BrakingCommands(NamedTuple):
 
     @classmethod
     def none(cls, n: int) -> "BrakingCommands":
-        """Returns no commands, k = 0, to n joints."""
+        """Returns an empty sequence of commands to n joints, with k = 0."""
         return cls(*np.empty((4, 0, n)))
 
     def after_first(self) -> "BrakingCommands":
@@ -72,22 +77,22 @@ class BrakingCommands(NamedTuple):
         return BrakingCommands(*(each[1:] for each in self))
 
     def brake_from(self, position: np.ndarray) -> Brake:
-        """Returns the braking that these commands describe from n positions [rad or m]."""
+        """Returns these commands as a braking that starts at n positions [rad or m]."""
         return Brake(self.position - position, *self[1:])
 
 
 class Braking:
-    """Finds braking trajectories of n joints, each joint by itself.
+    """Finds braking trajectories of n joints, independently for each joint.
 
-    A joint comes to rest in N periods with the sequence of jerks that has the least sum of squares. It is linear in
-    velocity and acceleration, so all lengths N are prepared, and braking is one product of matrices. The length is the
-    shortest that keeps the limits.
+    A joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
+    linear in velocity and acceleration. The factors are prepared for a series of lengths N, so a braking is one matrix
+    product. The shortest prepared length that keeps the limits is used.
 
     Args:
-        max_velocity: n largest speeds [rad/s or m/s]; inf where there is none, as below.
-        max_acceleration: n largest accelerations [rad/s^2 or m/s^2].
-        max_jerk: n largest jerks [rad/s^3 or m/s^3].
-        period_s: T [s].
+        max_velocity: Largest speeds, shape (n,) [rad/s or m/s]; inf for a joint without a limit.
+        max_acceleration: Largest accelerations, shape (n,) [rad/s^2 or m/s^2]; inf without a limit.
+        max_jerk: Largest jerks, shape (n,) [rad/s^3 or m/s^3]; inf without a limit.
+        period_s: The period T [s].
 
     Raises:
         ValueError: If a braking may take more than `MAX_PERIODS` periods.
@@ -123,7 +128,7 @@ class Braking:
         self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
-        """Returns the braking of n joints from n velocities and n accelerations, None if their limits forbid it.
+        """Returns the braking of n joints from n velocities and n accelerations; None if the limits forbid it.
 
         Velocities and positions during braking are not checked here.
         """
@@ -138,9 +143,10 @@ class Braking:
         return Brake(*found.transpose(1, 2, 0))
 
     def ends(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the braking distances of n joints from each of m x n states, and their largest speeds.
+        """Returns the braking distances [rad or m], and the largest speeds until rest [rad/s or m/s].
 
-        NaN where limits forbid the braking [rad or m, rad/s or m/s].
+        The arguments are m states of n joints. All arrays have the shape (m, n). Results are NaN where the limits
+        forbid the braking.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state)
@@ -151,7 +157,7 @@ class Braking:
         return can * (end[..., 0] * state[0] + end[..., 1] * state[1]), can * speed
 
     def _turning_speed(self, state: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Returns the speed where the acceleration first changes its sign, in periods, as `state`."""
+        """Returns the velocity where the acceleration first changes its sign; the unit of time is the period."""
         v, a = state
         lines = self._lines[:2, which]  # 2 x m x n x 2
         first, slope = lines[..., 0] * v + lines[..., 1] * a
@@ -162,9 +168,10 @@ class Braking:
         return speed
 
     def factors(self, velocity: np.ndarray, acceleration: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the factors of velocity and of acceleration in the distances of n joints, each count x n.
+        """Returns the factors of velocity and of acceleration in the distances of n joints, two arrays of (count, n).
 
-        Rows are instants, evenly spaced from the beginning until all joints rest.
+        The distance of a joint at an instant is its velocity times the first factor plus its acceleration times the
+        second. Rows are instants, evenly spaced from the beginning until all joints rest.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
@@ -173,7 +180,12 @@ class Braking:
         return way[0] * self._period_s, way[1] * self._period_s**2
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
-        """Returns which of l lengths keep the limits, for each of m x n states; states are 2 x m x n, in periods."""
+        """Returns whether each of the l prepared lengths keeps the limits, shape (l, m, n).
+
+        Args:
+            state: Velocities and accelerations of m states of n joints, shape (2, m, n); the unit of time is the
+                period.
+        """
         products = self._lines.reshape(-1, 2) @ state.reshape(2, -1)
         first, slope, first_jerk, last_jerk, first_acceleration = products.reshape(5, -1, *state.shape[1:])  # l x m x n
         length = self._lengths[:, None, None]
@@ -189,15 +201,15 @@ class Braking:
 
 
 def _padded(values: np.ndarray, rows: int, repeats: bool) -> np.ndarray:
-    """Returns k x n values with rows after them, which repeat the last one, if there is one, or are 0."""
+    """Returns k x n values, extended to `rows` rows with copies of the last row if `repeats`, else with zeros."""
     return np.pad(values, ((0, rows - len(values)), (0, 0)), "edge" if repeats and len(values) else "constant")
 
 
 def _jerk_line(length: int) -> np.ndarray:
-    """Returns p and r, each of velocity and acceleration, such that jerk m = 1 ... N of a braking is p + r m.
+    """Returns the factors of velocity and acceleration in p and in r, where p + r m is jerk m = 1 ... N of a braking.
 
-    With T = 1, rest after N periods is sum(j_m) = -a and sum((N - m + 1) j_m) = -v - N a. The least sum of squares is
-    where j is a sum of both rows, a line in m.
+    With T = 1, a joint rests after N periods if sum(j_m) = -a and sum((N - m + 1) j_m) = -v - N a. The sum of squares
+    is smallest where j is a linear combination of the coefficients of both equations, which is linear in m.
     """
     n = float(length)
     s1, s2 = n * (n + 1.0) / 2.0, n * (n + 1.0) * (2.0 * n + 1.0) / 6.0
@@ -210,8 +222,8 @@ def _jerk_line(length: int) -> np.ndarray:
 def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
     """Returns an upper bound of the duration of braking from any state within limits [s].
 
-    In continuous time the least squares have jerk (6 v + 4 a D) / D^2 at first, and at worst a third of the present
-    acceleration and 1.5 v / D the other way.
+    In continuous time, the braking of duration D with the least squares starts with the jerk (6 v + 4 a D) / D^2. Its
+    opposite acceleration is at most a third of the present acceleration plus 1.5 v / D.
     """
     velocity = min(velocity, FASTEST)
     acceleration = min(acceleration, 2.0 * math.sqrt(velocity * jerk))

@@ -1,4 +1,4 @@
-"""Distances between collision shapes by PyBullet, in a client of its own; meshes are replaced by their convex hulls."""
+"""Distances between collision shapes, measured in a separate PyBullet client; meshes become their convex hulls."""
 
 import math
 import weakref
@@ -27,21 +27,21 @@ OF_PYBULLET: dict[int, ObstacleKind] = {
 NO_FILE = ("", "unknown_file")
 """Names that PyBullet reports for a mesh without a file."""
 EDGE_M = (math.sqrt(3.0) - 1.0) * 1e-3
-"""Largest distance of a box's corner from its rounded corner in PyBullet, of radius 1 mm [m]."""
+"""Largest distance from the corner of a box to the corner that PyBullet rounds with a radius of 1 mm [m]."""
 EDGED = (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER)
 """Shapes whose edges and corners PyBullet rounds."""
 AABB_MARGIN_M = 6e-3
-"""Largest excess of PyBullet's boxes around shapes [m]."""
+"""Largest distance by which PyBullet's bounding boxes exceed the shapes in them [m]."""
 
 
 class BulletShapes:
     """Collision shapes of a robot and of obstacles in PyBullet, see `Shapes`.
 
     Args:
-        robot: The robot; the files of its meshes must exist.
+        robot: The robot; its mesh files must exist.
 
     Attributes:
-        links: Links that have a collision shape.
+        links: Names of the links that have a collision shape.
 
     Raises:
         ConfigError: If the robot cannot be loaded.
@@ -108,10 +108,10 @@ class BulletShapes:
 
 
 def _add(pb: Client, obstacle: Obstacle) -> int:
-    """Adds an obstacle, and returns PyBullet's id of it.
+    """Adds an obstacle to PyBullet, and returns its body ID.
 
     Raises:
-        ValueError: If PyBullet cannot represent it.
+        ValueError: If PyBullet cannot represent the obstacle.
     """
     x, y, z = obstacle.size
     options: dict[str, dict[str, Any]] = {
@@ -134,21 +134,21 @@ def _add(pb: Client, obstacle: Obstacle) -> int:
 
 
 def _solids_of_link(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the collision shapes of a link, in the frame of its centre of mass, larger by `missing_m`."""
+    """Returns the collision shapes of a link, enlarged by `_missing_m`, in the frame of its centre of mass."""
     return [solid.grown(_missing_m(pb, body, link)) for solid in _shapes_of_link(pb, body, link)]
 
 
 def _missing_m(pb: Client, body: int, link: int) -> float:
-    """Returns how much too large PyBullet's distances from a link may be, since it rounds edges [m]."""
+    """Returns by how much PyBullet may overestimate distances from a link, because it rounds edges [m]."""
     return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
 
 
 def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the collision shapes of a link, in the frame of its centre of mass, in their true size.
+    """Returns the collision shapes of a link in their true size, in the frame of its centre of mass.
 
     If PyBullet does not report the corners of all shapes, the result is the axis-aligned box around the link in its
-    present pose. This is also the case if only some of the shapes are meshes from files, or if meshes are rotated
-    relative to each other.
+    present pose. The result is this box, too, if only some of the shapes are meshes from files, or if meshes are
+    rotated relative to each other.
     """
     shapes = pb.getCollisionShapeData(body, link)
     if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):

@@ -30,12 +30,12 @@ class Violation(NamedTuple):
     Attributes:
         check: Name of the check.
         subject: The joint, link, pair of links, or another subject.
-        value: Value that the target would cause, in `unit`; NaN, as `limit`, if there is no number.
-        limit: Allowed value, in `unit`.
-        unit: The unit of both.
+        value: Value that the target would cause, in `unit`; NaN if the violation has no numbers.
+        limit: Allowed value, in `unit`; NaN if the violation has no numbers.
+        unit: Unit of `value` and `limit`.
         is_while_braking: Whether the braking after the target is unsafe, not the target itself.
-        quantity: Quantity of value and limit; empty if the subject is itself a quantity.
-        words: Text with advice, which replaces the sentence made of the other attributes.
+        quantity: Name of the quantity of `value` and `limit`; empty if `subject` names the quantity.
+        words: Text with advice; if not empty, it replaces the text made from the attributes after `check`.
     """
 
     check: str
@@ -61,11 +61,11 @@ class MarginViolation(NamedTuple):
 
     Attributes:
         check: Name of the check.
-        pair: The pair, in the check's own terms.
-        subject: The pair, for messages.
-        distance_m: Distance [m].
+        pair: Names of two links, or the name of a link and the number of an obstacle.
+        subject: Description of the pair, for messages.
+        distance_m: Distance of the pair [m].
         margin_m: Smallest allowed distance [m].
-        gradient: Change of distance by the motion of each of n joints [m/rad or 1].
+        gradient: Derivatives of the distance with respect to the n joint positions [m/rad or 1].
     """
 
     check: str
@@ -77,18 +77,19 @@ class MarginViolation(NamedTuple):
 
 
 class CheckContext(NamedTuple):
-    """Context of a motion for the checks of a target.
+    """What checks use in addition to the motion: times, measurements and obstacles.
 
     Attributes:
-        now_s: The present time [s], of a clock that never goes back.
+        now_s: Present time of a monotonic clock [s].
         age_s: Age of the target [s]; 0 if unknown.
-        stamp_step_s: Difference from the previous target's stamp [s]; None without one.
-        since_command_s: Time since the previous command [s]; for a repeated stamp, time since that stamp was new.
-        measured: Measured positions by joint [rad or m], empty if there are none.
-        measured_age_s: Their age [s].
+        stamp_step_s: Stamp of the target minus stamp of the previous target [s]; None if there is none.
+        since_command_s: Time since the previous command [s]; for a repeated stamp, time since this stamp first arrived.
+        measured: Measured positions, indexed by joint name [rad or m]; empty if there are none.
+        measured_age_s: Age of the oldest measured position [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].
-        wrench_age_s: Its age [s]; inf if there is none.
-        obstacles: Present bodies of the environment; None without a source. Equal ones are the same tuple.
+        wrench_age_s: Age of the wrench [s]; inf if there is no wrench.
+        obstacles: Present bodies of the environment; None without a source. While they do not change, this is the same
+            tuple object.
     """
 
     now_s: float = 0.0
@@ -103,25 +104,26 @@ class CheckContext(NamedTuple):
 
 
 class Check(ABC):
-    """A check of motions.
+    """Base class of checks, each of which decides whether a motion is safe.
 
-    It is stateless: equal motions have equal answers. For trials, only the verdict has to be equal.
+    Results do not depend on earlier calls: equal motions and contexts have equal results. For trials, only the decision
+    whether the motion is safe has to be equal.
 
     Args:
-        config: Its options.
-        robot: The robot.
-        limits: Limits of its n joints.
+        config: Options of the check.
+        robot: The guarded robot.
+        limits: Limits of the robot's n joints.
         file: Source of the options, for messages.
 
     Raises:
         ConfigError: If the options do not fit the robot.
 
     Attributes:
-        Config: Model of its options.
-        name: Its name in the table and in messages.
-        is_default: Whether it is used by default, without an entry in the configuration.
-        watches: Whether it checks the context, not the command; such checks also run while no target comes.
-        takes_obstacles: Whether it uses `CheckContext.obstacles`.
+        Config: Model of the check's options.
+        name: Name of the check in the table and in messages.
+        is_default: Whether the check is used even without an entry in the configuration.
+        watches: Whether the check examines the context, not the command; such checks also run while no targets arrive.
+        takes_obstacles: Whether the check uses `CheckContext.obstacles`.
     """
 
     Config: ClassVar[type[CheckConfig]] = CheckConfig
@@ -135,29 +137,31 @@ class Check(ABC):
 
     @abstractmethod
     def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
-        """Returns the violation of a motion, None if it is safe.
+        """Returns the violation that a motion causes; None if the motion is safe.
 
-        NaN is never safe. A robot outside a position limit may move back towards it.
+        A motion with NaN is never safe. A robot that is outside a position limit may move back towards the limit.
         """
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
-        """Returns linear bounds that keep the robot safe near some configurations of its braking.
+        """Returns linear bounds that keep the robot safe near given configurations of its braking.
 
-        Only for the policy `limit`, after `check`. They only guide the search for a command that passes `check`.
+        Called after `check`, and only with the policy `limit`. The bounds guide the search for a safe command, but each
+        command that is found still has to pass `check`.
 
         Args:
             rows: The configurations, k x n positions [rad or m].
-            spread: Largest deviation of n joints from there; bounds beyond it may be left out.
-            before: n present positions: violations there may not increase.
+            spread: Largest deviations of the n joints from the configurations [rad or m]; bounds that these deviations
+                cannot reach may be left out.
+            before: The n present positions [rad or m]; violations that exist there may not increase.
         """
         return ()
 
     def inside(self, q: np.ndarray) -> Sequence[MarginViolation]:
-        """Returns the margin violations in a configuration of n positions; it is called after `check`."""
+        """Returns the margin violations at n positions [rad or m], with the obstacles of the last `check`."""
         return ()
 
     def require_link(self, link: str, key: str) -> None:
-        """Raises a ConfigError if an option names a link that the robot lacks."""
+        """Raises a ConfigError if an option names a link that the robot does not have."""
         try:
             self.robot.check_link(link)
         except UnknownNameError as error:
@@ -166,13 +170,13 @@ class Check(ABC):
     def first_above(
         self, values: np.ndarray, limit: np.ndarray, quantity: str, unit: tuple[str, str]
     ) -> Violation | None:
-        """Returns a violation of the first of k x n values that exceeds its limit; None if none does.
+        """Returns the violation for the first value that exceeds its limit; None if no value does.
 
         Args:
-            values: Values, none negative.
-            limit: n limits, or k x n.
-            quantity: Name of the quantity.
-            unit: The unit for a joint that turns, and for one that slides.
+            values: Values that are not negative, shape (k, n).
+            limit: Limits, shape (n,) or (k, n).
+            quantity: Name of the quantity, for the violation.
+            unit: The unit for revolute joints, and the unit for prismatic joints.
         """
         is_inside = values <= limit
         if is_inside.all():
@@ -184,7 +188,7 @@ class Check(ABC):
     def of_joint(
         self, i: int, value: float, limit: float, quantity: str, unit: tuple[str, str], is_while_braking: bool
     ) -> Violation:
-        """Returns the violation of a joint."""
+        """Returns the violation for joint `i`; see `Violation` and, for `unit`, `first_above`."""
         which = unit[0] if self.robot.joints[i].is_revolute else unit[1]
         subject = f"joint '{self.robot.joint_names[i]}'"
         return Violation(self.name, subject, value, limit, which, is_while_braking, quantity)

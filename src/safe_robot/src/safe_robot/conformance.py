@@ -1,4 +1,4 @@
-"""Tests that any check passes; a package with checks of its own may subclass them in its tests."""
+"""Tests that every check has to pass; packages that define checks may subclass them in their tests."""
 
 import math
 from collections.abc import Mapping
@@ -17,17 +17,17 @@ from .motion import CommandedMotion, State
 
 
 class CheckConformance:
-    """Tests that any check passes.
+    """Tests that every check has to pass.
 
-    A subclass names the check, its options and a robot, and has one motion that is safe and one that is not.
+    A subclass names the check, its options and a robot, and provides one safe and one unsafe motion.
 
     Attributes:
-        check_name: A name of the table, or `"their_package.module:Class"`.
-        options: Its options.
-        limits: Limits of the robot's joints.
-        urdf: The robot's description.
+        check_name: Name of the check in `CHECKS`, or `"their_package.module:Class"`.
+        options: Options of the check.
+        limits: Limits of the robot's joints, as in `LimitsConfig`.
+        urdf: Path of the robot's URDF.
         period_s: Period of the motions [s].
-        is_about_motion: Whether it checks the motion; otherwise only the context.
+        is_about_motion: Whether the check examines the motion; otherwise it examines only the context.
     """
 
     check_name: ClassVar[str]
@@ -50,16 +50,16 @@ class CheckConformance:
     # --- Helpers for a subclass
 
     def motion(self, start: State, command: Any) -> CommandedMotion:
-        """Returns the motion of a command, without braking."""
+        """Returns the motion of a command, without the braking after it."""
         return CommandedMotion(self.robot, start, np.array(command, dtype=float), self.period_s)
 
     @property
     def robot(self) -> RobotModel:
-        """The robot."""
+        """A new model of the robot."""
         return RobotModel(self.urdf)
 
     def make(self) -> Check:
-        """Returns a new check."""
+        """Returns a new instance of the check."""
         robot = self.robot
         limits = MotionLimits.of(robot, LimitsConfig(**self.limits), "guard.yaml")
         options = {self.check_name: {**self.options, "active": True}}
@@ -71,11 +71,11 @@ class CheckConformance:
     # --- The tests.
 
     def test_safe_motion_passes(self) -> None:
-        """A check that refuses everything does not pass."""
+        """A check that refuses every motion fails this test."""
         assert self.make().check(*self.safe()) is None
 
     def test_unsafe_motion_is_refused_with_value_and_limit(self) -> None:
-        """A check that accepts everything does not pass."""
+        """A check that accepts every motion fails this test."""
         check = self.make()
         violation = check.check(*self.unsafe())
         assert violation is not None
@@ -84,7 +84,7 @@ class CheckConformance:
         assert f"{violation.limit:.6g}" in str(violation)
 
     def test_equal_motions_have_equal_answers_in_any_order(self) -> None:
-        """The same holds for another check with the same options."""
+        """A second instance with the same options has the same answers."""
         check, other = self.make(), self.make()
         answers = [check.check(*each()) for each in (self.unsafe, self.safe, self.unsafe, self.unsafe, self.safe)]
         assert answers == [answers[0], None, answers[0], answers[0], None]
@@ -92,7 +92,7 @@ class CheckConformance:
         assert other.check(*self.unsafe()) == answers[0]
 
     def test_non_finite_target_is_refused(self) -> None:
-        """Comparisons with NaN are false, so a check for values that are too large would accept it."""
+        """Comparisons with NaN are false, so a check that only refuses too large values would accept NaN."""
         if not self.is_about_motion:
             pytest.skip(f"'{self.check_name}' does not check the motion")
         motion, context = self.safe()

@@ -1,4 +1,4 @@
-"""The first target after a start: it has to be near the robot, and safe."""
+"""Check of the first target after a start, which has to be near the robot, and safe."""
 
 import math
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class FirstTarget:
         file: Source of the configuration, for messages.
 
     Raises:
-        ConfigError: If the reach of links depends on limits that are not checked.
+        ConfigError: If the reach of links depends on joint limits, but the check `joint_position` is not active.
     """
 
     def __init__(self, config: GuardConfig, robot: RobotModel, checks: Sequence[Check], file: str) -> None:
@@ -40,12 +40,12 @@ class FirstTarget:
         self._config, self._robot, self._checks = config, robot, checks
 
     def judged(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> State | Violation:
-        """Returns the state in which the robot starts, at rest, or the reason why it cannot.
+        """Returns the state at rest in which the robot starts, or a violation if it cannot start.
 
         Args:
             target: n positions [rad or m].
-            last: The last n commanded positions [rad or m]; None if there are none.
-            context: Everything else that the decision depends on.
+            last: The n positions that were commanded last [rad or m]; None if there are none.
+            context: Context of the checks, with the measured positions.
         """
         there = self._present_position(target, last, context)
         if there is None:
@@ -88,7 +88,7 @@ class FirstTarget:
         return "rad" if self._robot.joints[i].is_revolute else "m"
 
     def _far_outside(self, there: np.ndarray) -> Violation | None:
-        """Returns a joint that is so far outside its limits that the reach of links is unknown."""
+        """Returns a violation if a joint is so far outside its limits that the reach of links is unknown."""
         for name in self._robot.telescopic:
             i = self._robot.joint_names.index(name)
             joint, position = self._robot.joints[i], float(there[i])

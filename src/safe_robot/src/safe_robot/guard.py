@@ -27,17 +27,17 @@ from .motion import CommandedMotion, State
 log = logging.getLogger(__name__)
 
 MENDED_BY_BRAKING = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
-"""Checks that a period of braking may satisfy when a smoothed command narrowly fails."""
+"""Checks that the next braking command may pass when a smoothed command fails them."""
 
 
 class Decision(NamedTuple):
     """Answer of a guard to a target.
 
     Attributes:
-        command: n positions to be commanded [rad or m]; those of the target if it is safe. None: nothing is sent, as
-            for a repeated stamp.
-        violation: Why the target is not safe; None if it is.
-        is_halted: Whether nothing is sent until `Guard.start`.
+        command: The n positions to command [rad or m], equal to the target if the target is safe and not smoothed; None
+            if nothing is sent, for example for a repeated stamp.
+        violation: Reason why the target is not safe; None if the target is safe, or was not checked.
+        is_halted: Whether targets are refused until `Guard.start` is called.
         is_shaped: Whether the target was smoothed.
     """
 
@@ -48,7 +48,7 @@ class Decision(NamedTuple):
 
 
 class _Safe(NamedTuple):
-    """A command that is safe, and the braking after it."""
+    """A safe command, and the braking after it."""
 
     command: tuple[float, ...]
     state: State
@@ -56,31 +56,32 @@ class _Safe(NamedTuple):
 
 
 class Guard:
-    """Passes safe targets.
+    """Passes on safe targets, and replaces or refuses unsafe targets.
 
-    A target is safe if it and the braking from it pass every check. After every command, a known braking can therefore
-    bring the robot to rest within all limits.
+    A target is safe if both the target and the braking that would follow it pass every check. After every command, a
+    known braking can therefore bring the robot to rest within all limits.
 
-    The reference is the previous command, never a measurement. Every command counts as one period regardless of its
-    stamp, so stamps cannot make the robot faster; the sender ensures that commands are at least a period apart.
+    Except at a start, motions are computed from the previous command, never from a measurement. Every command counts as
+    lasting one period, whatever its stamp is, so stamps cannot make the robot faster; the caller ensures that commands
+    are at least a period apart.
 
-    Targets with the same stamp are one target: only the first one causes a command. Only a new stamp shows that targets
-    continue, so `staleness` applies while the stamp does not change.
+    Targets with the same stamp count as one target: only the first of them causes a command. While the stamp does not
+    change, the check `staleness` treats targets as missing.
 
-    With `shape`, the smoothed command is checked instead of a target that joints cannot follow.
+    With the option `shape`, a target that the joints cannot follow is smoothed, and the smoothed command is checked.
 
     Args:
         config: Configuration of the guard.
-        robot: The robot.
+        robot: The guarded robot.
         file: Source of the configuration, for messages.
 
     Attributes:
-        config: Its configuration.
-        robot: The robot.
-        joint_names: The n joints.
-        limits: Their limits.
+        config: Configuration of the guard.
+        robot: The guarded robot.
+        joint_names: Names of the n guarded joints.
+        limits: Limits of the n joints.
         checks: The checks in use.
-        is_halted: Whether nothing is sent until `start`, as at first.
+        is_halted: Whether targets are refused until `start` is called; True at first.
 
     Raises:
         ConfigError: If the configuration does not fit the robot.
@@ -116,27 +117,32 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether it is halted or targets are late, and `next_braking` has commands that bring the robot to rest."""
+        """Whether the robot moves while the guard is halted or targets are late; `next_braking` then has commands."""
         return (self.is_halted or self._is_late) and self.is_moving
 
     @property
     def last_command(self) -> tuple[float, ...] | None:
-        """The n positions that were commanded last [rad or m]; None before the first command."""
+        """The n positions that were commanded last [rad or m]; None before the first command after `start`."""
         return None if self._state is None or self._is_first else tuple(self._state.position.tolist())
 
     @property
     def stop_commands(self) -> np.ndarray:
-        """The commands of the braking that was found safe, k x n [rad or m]."""
+        """Commands that bring the robot to rest after the last command, k x n [rad or m]; they have passed the
+        checks.
+        """
         return self._stop.position.copy()
 
     def way_out(self) -> EscapeDirection | None:
-        """Returns the motion that leaves the violated margins at the last command; None if no margin is violated."""
+        """Returns the motion out of the margins that are violated at the last command.
+
+        Returns None if no margin is violated, or before the first command.
+        """
         if self._state is None or self._is_first:
             return None
         return find_escape(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
-        """Passes targets again; the first one has to be near the robot.
+        """Accepts targets again; the first target has to be near the robot.
 
         Raises:
             RuntimeError: If the robot still brakes.
@@ -146,13 +152,19 @@ class Guard:
         self.is_halted, self._is_late, self._is_first = False, False, True
 
     def halt(self) -> None:
-        """Passes no further targets; with `on_halt: brake`, `next_braking` has the commands that brake the robot."""
+        """Refuses further targets; with `on_halt: brake`, `next_braking` then returns the commands that stop
+        the robot.
+        """
         self.is_halted = True
         if self.config.on_halt == "nothing":
             self._assume_rest()
 
     def wait_for_target(self) -> None:
-        """Ends the motion because targets are late, as after a halt; with `limit`, the next target is followed."""
+        """Ends the motion because targets are late.
+
+        With the policy `reject`, the guard halts. With `limit`, the robot stops as after a halt, but follows the next
+        target.
+        """
         if self.config.policy == "reject":
             self.halt()
             return
@@ -171,15 +183,18 @@ class Guard:
         self._stop = BrakingCommands.none(len(self.joint_names))
 
     def next_braking(self) -> tuple[float, ...] | None:
-        """Returns the next command of the braking, due a period after the last command; None if the robot rests."""
+        """Advances the braking by one command, and returns the n positions of that command [rad or m].
+
+        The command is due a period after the last one. Returns None if the robot does not brake.
+        """
         return self._continue_braking() if self.is_braking else None
 
     def decide(self, target: Sequence[float], context: CheckContext) -> Decision:
-        """Returns the command for a target.
+        """Decides on the command for a target, and updates the state of the guard.
 
         Args:
             target: n positions [rad or m].
-            context: Everything else that the decision depends on.
+            context: Context of the checks, such as times, measurements and obstacles.
         """
         if self.is_halted:
             return Decision(None, None, True)
@@ -194,7 +209,7 @@ class Guard:
         return decision
 
     def refuse(self, reason: str) -> Decision:
-        """Returns the command in place of a target that cannot be checked, with the reason."""
+        """Decides on the command in place of a target that cannot be checked; `reason` says why."""
         if self.is_halted:
             return Decision(None, None, True)
         decision = self._brake_or_halt(Violation("input", reason, math.nan, math.nan, ""))
@@ -203,8 +218,10 @@ class Guard:
         return decision
 
     def check_watchdogs(self, context: CheckContext) -> Violation | None:
-        """Returns a violation found between targets, after which the guard halts or, for late targets, waits for the
-        next."""
+        """Runs the checks that apply between targets, and returns the first violation; None if there is none.
+
+        After a violation, the guard halts. If targets are late, it calls `wait_for_target` instead.
+        """
         if self.is_halted or self._is_first or self._state is None:
             return None
         try:
@@ -252,7 +269,10 @@ class Guard:
         return Decision(self._commit(found), is_shaped=wanted != target)
 
     def _overshoot(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
-        """Returns the violation of a joint that would pass a target that does not move; only for the policy `limit`."""
+        """Returns a violation if braking would carry a joint past its target, and this target has not changed.
+
+        Returns None if no joint would pass its target, or with the policy `reject`.
+        """
         if self.config.policy == "reject" or before is None or not len(safe.stop.position):
             return None
         assert self._state is not None
@@ -266,7 +286,7 @@ class Guard:
 
     @property
     def _braking_commands(self) -> np.ndarray:
-        """The commands of the braking that was found safe, k x n, k >= 1."""
+        """Commands that bring the robot to rest, k x n, k >= 1; if the robot rests, its position."""
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
 
@@ -292,7 +312,7 @@ class Guard:
         return None
 
     def _start_at(self, target: tuple[float, ...], context: CheckContext) -> Violation | None:
-        """Sets the guard's state to the start of the robot, if the first target is accepted."""
+        """Sets the state at the start if the first target is accepted; otherwise returns the violation."""
         last = None if self._state is None else self._state.position
         found = self._first_target.judged(np.array(target), last, context)
         if isinstance(found, Violation):
@@ -303,7 +323,7 @@ class Guard:
     def _evaluate(
         self, command: Sequence[float], context: CheckContext, checks: Sequence[Check], is_trial: bool = False
     ) -> _Safe | Violation:
-        """Returns the command if it is safe, else the violation of the first check that it fails."""
+        """Returns a safe command with its braking, or the violation of the first check that the command fails."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
@@ -318,7 +338,10 @@ class Guard:
         return _Safe(tuple(command), state, motion.braking_commands)
 
     def _brake(self, state: State) -> Brake | None:
-        """Returns the braking after a command; joints that continue their present braking keep it."""
+        """Returns the braking after a command; None if the limits forbid it.
+
+        Joints that already follow the present braking keep it.
+        """
         keeps_braking = np.zeros(len(state.position), dtype=bool)
         if len(self._stop.position):
             keeps_braking = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
@@ -343,7 +366,10 @@ class Guard:
         return safe.command
 
     def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
-        """Returns the nearest safe command, or the next command of the braking that was found safe."""
+        """Decides in place of an unsafe target: on a safe command near the target, or else on the next braking command.
+
+        With the policy `reject`, the guard halts. If the failed check examines only the context, the robot brakes.
+        """
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command can satisfy these
             return self._brake_or_halt(violation)

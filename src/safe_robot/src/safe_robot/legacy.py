@@ -1,4 +1,4 @@
-"""Parameters of the authors' release, and of its README, as the configuration of a guard."""
+"""Translation of parameters of the authors' release, and of its README, to the configuration of a guard."""
 
 import math
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ CHECKERS = {
     "linkboxlimit": "link_box",
     "statevalidity": "self_collision",
 }
-"""Our check for each `~checker/NAME/active`."""
+"""The check of this guard for each NAME in the parameters `~checker/NAME/active`."""
 SWITCHES = {
     "check_joint_position_limits": "joint_position",
     "check_joint_velocity_limits": "joint_velocity",
@@ -36,15 +36,16 @@ KEYS = (
 
 
 def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> dict[str, Any]:
-    """Returns the keys of `GuardConfig` equivalent to parameters of the release.
+    """Translates parameters of the authors' release to the keys of `GuardConfig`.
 
     Args:
-        given: The parameters; parameters that the release lacks are passed on unchanged.
-        joint_names: The joints of the robot, in the order of lists of numbers, unless `joint_name_order` names others.
+        given: The parameters; parameters that the release does not have are returned unchanged.
+        joint_names: Names of the joints to which numbers in lists belong; the parameter `joint_name_order` replaces
+            them.
         file: Source of the parameters, for messages.
 
     Raises:
-        ConfigError: If one is not as the release has it.
+        ConfigError: If a parameter does not have the form that the release requires.
     """
     config = {key: value for key, value in given.items() if key not in KEYS}
     limits = dict(_mapping(given, "limits", file))
@@ -87,7 +88,11 @@ def _words(value: Any, key: str, file: str) -> list[str]:
 
 
 def _numbers(value: Any, count: int, key: str, file: str) -> list[float]:
-    """Returns the numbers in a text, a list, or a single number."""
+    """Returns `count` numbers from a list, a text with spaces between the numbers, or a single number.
+
+    Raises:
+        ConfigError: If there are not `count` numbers, or one of them is NaN.
+    """
     try:
         numbers = [float(word) for word in (str(value).split() if not isinstance(value, list) else value)]
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The limits of the guarded joints: the robot description's, narrowed by the configuration."""
+"""Limits of the guarded joints: the limits in the robot's description, narrowed by the configuration."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from robot_model.model import RobotModel
 
 Factor = Annotated[float, Field(gt=0, le=1)]
 PerJoint = Positive | dict[str, Positive]
-"""A number for all joints, or one by joint."""
+"""One number for all joints, or a number for each joint name."""
 
 
 class LimitsConfig(ConfigModel):
@@ -31,14 +31,14 @@ class LimitsConfig(ConfigModel):
 
 
 class MotionLimits(NamedTuple):
-    """Limits of n joints; inf where there is none.
+    """Limits of n joints; where a joint has no limit, the value is infinite.
 
     Attributes:
-        lower: n [rad or m].
-        upper: n [rad or m].
-        velocity: n [rad/s or m/s].
-        acceleration: n [rad/s^2 or m/s^2].
-        jerk: n [rad/s^3 or m/s^3].
+        lower: Lower position limits, shape (n,) [rad or m].
+        upper: Upper position limits, shape (n,) [rad or m].
+        velocity: Largest speeds, shape (n,) [rad/s or m/s].
+        acceleration: Largest accelerations, shape (n,) [rad/s^2 or m/s^2].
+        jerk: Largest jerks, shape (n,) [rad/s^3 or m/s^3].
     """
 
     lower: np.ndarray
@@ -49,10 +49,11 @@ class MotionLimits(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotModel, config: LimitsConfig, file: str) -> "MotionLimits":
-        """Returns the limits of a robot.
+        """Returns the limits of a robot's joints, narrowed by a configuration.
 
         Raises:
-            ConfigError: If limits contradict each other, or are wider than the robot's; it names file, key, and both.
+            ConfigError: If limits contradict each other, or a joint's limit is wider than in the robot's description;
+                the message names the file, the key and both values.
         """
         problems: list[Problem] = []
         lower = _narrowed(robot, "lower", [joint.lower for joint in robot.joints], config.lower, problems, file)

@@ -1,4 +1,4 @@
-"""Motions that are checked: a command, and the braking from it."""
+"""Motions that are checked: a command, and the braking that would follow it."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -10,16 +10,16 @@ from robot_model.model import RobotModel
 from .braking import Brake, BrakingCommands
 
 WAYPOINT_SPACING = 0.15
-"""Largest motion of all joints together between two waypoints [rad or m], unless they move more in one period."""
+"""Largest sum of all joints' motions between two waypoints [rad or m], unless it is larger in a single period."""
 
 
 class State(NamedTuple):
-    """Last command to n joints, with its backward differences.
+    """Last command to n joints, with derivatives that are backward differences.
 
     Attributes:
-        position: n [rad or m].
-        velocity: n [rad/s or m/s].
-        acceleration: n [rad/s^2 or m/s^2].
+        position: Positions, shape (n,) [rad or m].
+        velocity: Velocities, shape (n,) [rad/s or m/s].
+        acceleration: Accelerations, shape (n,) [rad/s^2 or m/s^2].
     """
 
     position: np.ndarray
@@ -28,27 +28,27 @@ class State(NamedTuple):
 
     @classmethod
     def at_rest(cls, position: np.ndarray) -> "State":
-        """Returns the state of a robot at rest."""
+        """Returns the state of a robot at rest at n positions [rad or m]."""
         return cls(position, np.zeros_like(position), np.zeros_like(position))
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether nothing moves."""
+        """Whether all velocities and accelerations are 0."""
         return not (self.velocity.any() or self.acceleration.any())
 
     def then(self, position: np.ndarray, period_s: float) -> "State":
-        """Returns the state after a further command of n positions [rad or m], a period [s] later."""
+        """Returns the state after the next command, n positions [rad or m], which is a period [s] later."""
         velocity = (position - self.position) / period_s
         return State(position, velocity, (velocity - self.velocity) / period_s)
 
 
 class Bound(NamedTuple):
-    """A bound near one of k configurations: `gradient @ (q - configuration) >= -room`.
+    """A linear bound on positions q near one of k configurations: `gradient @ (q - configuration) >= -room`.
 
     Attributes:
-        row: Number of the configuration.
-        gradient: n derivatives of the safety distance by the joints.
-        room: Remaining distance; negative beyond the bound.
+        row: Index of the configuration.
+        gradient: n derivatives of the safety distance with respect to the joint positions.
+        room: Distance that remains until the bound is reached; negative beyond the bound.
     """
 
     row: int
@@ -57,17 +57,19 @@ class Bound(NamedTuple):
 
 
 class CommandedMotion:
-    """A command to n joints in row 0, and the braking from it in the rows below: k rows, a period apart.
+    """A command to n joints, and the braking that would follow it.
+
+    Arrays have k rows, a period apart. Row 0 is the command, and the other rows are the braking.
 
     Attributes:
-        robot: The robot.
-        period_s: The period [s].
+        robot: The guarded robot.
+        period_s: Time between two rows [s].
         start: The state before the command.
-        is_trial: Whether only the verdict matters, so any violation may be reported.
-        position: k x n [rad or m].
-        velocity: k x n [rad/s or m/s].
-        acceleration: k x n [rad/s^2 or m/s^2].
-        jerk: k x n [rad/s^3 or m/s^3].
+        is_trial: Whether it only matters if the motion is safe, so that checks may report any of its violations.
+        position: Positions, shape (k, n) [rad or m].
+        velocity: Velocities, shape (k, n) [rad/s or m/s].
+        acceleration: Accelerations, shape (k, n) [rad/s^2 or m/s^2].
+        jerk: Jerks, shape (k, n) [rad/s^3 or m/s^3].
     """
 
     def __init__(
@@ -93,24 +95,24 @@ class CommandedMotion:
 
     @property
     def braking_commands(self) -> BrakingCommands:
-        """The braking."""
+        """The braking: all rows except row 0."""
         return BrakingCommands(self.position[1:], self.velocity[1:], self.acceleration[1:], self.jerk[1:])
 
     @cached_property
     def with_start(self) -> np.ndarray:
-        """The command before, and the k rows: (k + 1) x n positions [rad or m]."""
+        """Positions of the previous command and of the k rows, shape (k + 1, n) [rad or m]."""
         return np.concatenate((self.start.position[None], self.position))
 
     @cached_property
     def travelled(self) -> np.ndarray:
-        """Length of the path of each joint from row 0 to each row, k x n [rad or m]."""
+        """Path length of each joint from row 0 to each row, shape (k, n) [rad or m]."""
         travelled = np.zeros_like(self.position)
         np.cumsum(np.abs(self.position[1:] - self.position[:-1]), axis=0, out=travelled[1:])
         return travelled
 
     @cached_property
     def waypoints(self) -> np.ndarray:
-        """Rows close enough to each other, including the first and the last."""
+        """Indices of rows about `WAYPOINT_SPACING` apart, including the first and the last row."""
         travelled = self.travelled.sum(axis=1)
         marks = np.arange(WAYPOINT_SPACING, travelled[-1], WAYPOINT_SPACING)
         rows = np.searchsorted(travelled, marks).tolist()
@@ -118,17 +120,20 @@ class CommandedMotion:
 
     @cached_property
     def waypoint_frames(self) -> np.ndarray:
-        """Frames of links at the waypoints, see `LinkFrames`."""
+        """Frames of the robot at the waypoints, see `LinkFrames.at`."""
         return self.robot.frames.at(self.position[self.waypoints])
 
     @property
     def path(self) -> np.ndarray:
-        """Length of the path of each of n joints after row 0 [rad or m]."""
+        """Path length of each joint from row 0 to the last row, shape (n,) [rad or m]."""
         path: np.ndarray = self.travelled[-1]
         return path
 
     def link_positions(self, link: str) -> np.ndarray:
-        """Returns the positions of a link's origin in the robot's root, at the previous command and the k rows [m]."""
+        """Returns the positions of a link's origin in the robot's root [m], shape (k + 1, 3).
+
+        The first one belongs to the previous command, the others to the k rows.
+        """
         if link not in self._link_positions:
             self._link_positions[link] = self.robot.frames.positions(self.with_start, link)
         return self._link_positions[link]

@@ -1,4 +1,4 @@
-"""Former place of the robot of a guard, which is a `RobotModel`."""
+"""Former module of the guard's robot class, kept for existing imports; use `RobotModel` instead."""
 
 from robot_model.model import RobotModel as GuardedRobot
 

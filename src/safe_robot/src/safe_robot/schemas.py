@@ -16,7 +16,7 @@ _OWN_CHECK = r"^[\w.]+:\w+$"
 
 
 def schema() -> Schema:
-    """Returns the schema of the parameters of a guard and its node, with the options of all checks of the table."""
+    """Returns the schema of the parameters of a guard and its node, with the options of all checks in `CHECKS`."""
     text = "Options of checks by name."
     known: dict[str, Any] = {name: (config, Field(default_factory=dict)) for name, config in CHECKS.configs().items()}
     model = create_model("Checks", __base__=ConfigModel, __doc__=text, **known)
@@ -28,5 +28,5 @@ def schema() -> Schema:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file of a workspace."""
+    """Returns the path and the text of each schema file below the root of a workspace."""
     return schema_texts(root / "src/safe_robot/schema", {TITLE: schema()})

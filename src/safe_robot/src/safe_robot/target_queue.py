@@ -1,4 +1,4 @@
-"""Queue that passes targets to the guard one period apart, and only while new ones arrive."""
+"""Queue that passes targets to the guard one period apart, and only while new targets arrive."""
 
 import threading
 import time
@@ -8,24 +8,25 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 PATIENCE_S = 0.1
-"""Longest time that targets wait for a newer one [s]."""
+"""Longest time that targets wait for a newer target [s]."""
 WAKE_UP_S = 0.0002
-"""Time by which the queue's thread wakes up before a target is due [s]."""
+"""Time before a target is due at which the queue's thread wakes up [s]."""
 
 
 class TargetQueue(Generic[Item]):
-    """Passes targets on, a period apart, while the newest one is recent.
+    """Passes targets on, at least a period apart, while the newest target is recent.
 
-    A target that comes after the period is passed on at once, in the thread that delivers it. An earlier one waits, so
-    that a burst does not make the robot faster. Waiting targets are passed on only while the newest one is younger than
-    a limit: after the death of a source, the robot stops.
+    A target that arrives after the period is passed on at once, in the thread that delivers it. An earlier target
+    waits, so that a burst does not make the robot faster. Waiting targets are passed on only while the newest target is
+    younger than a limit, so that the robot stops when the source of targets has ended.
 
     Args:
-        period_s: The period [s].
-        silence_s: Largest age of the newest target [s]; beyond it, waiting targets are dropped.
-        size: Largest number of waiting targets; beyond it, the oldest are dropped.
-        on_target: Called with each target, `lock` held; returns whether the period restarts.
-        give_up: Called, `lock` held, with the age of the newest target [s] when waiting targets are dropped.
+        period_s: Shortest time between two targets that are passed on [s].
+        silence_s: Largest age of the newest target [s]; when it is older, waiting targets are dropped after
+            `PATIENCE_S`.
+        size: Largest number of waiting targets; if there are more, the oldest are dropped.
+        on_target: Called with each target while `lock` is held; returns whether a new period begins.
+        give_up: Called with the age of the newest target [s] when waiting targets are dropped, while `lock` is held.
 
     Attributes:
         lock: Held while a target is passed on.
@@ -52,7 +53,7 @@ class TargetQueue(Generic[Item]):
 
         Args:
             item: The target.
-            age_s: Its age [s]; 0 if unknown.
+            age_s: Age of the target [s]; 0 if unknown.
         """
         with self.lock:
             now_s = time.monotonic()
@@ -64,16 +65,16 @@ class TargetQueue(Generic[Item]):
                 self.lock.notify()
 
     def clear(self) -> None:
-        """Drops all waiting targets; `lock` is held."""
+        """Drops all waiting targets; the caller holds `lock`."""
         self._waiting.clear()
 
     def run_instead(self, step: Callable[[], bool]) -> None:
-        """Drops all waiting targets, and calls a step each period after the last target; `lock` is held.
+        """Drops all waiting targets, and calls `step` once per period from now on; the caller holds `lock`.
 
-        Lateness is not caught up with: calls are at least a period apart.
+        The first call is a period after the last target. Calls are at least a period apart, even after a late call.
 
         Args:
-            step: Called, `lock` held, until it returns False.
+            step: Called while `lock` is held, until it returns False.
         """
         self._waiting.clear()
         self._step = step
@@ -97,7 +98,7 @@ class TargetQueue(Generic[Item]):
                 self.lock.wait(self._rest_s())
 
     def _rest_s(self) -> float | None:
-        """Passes on targets that are due; returns the time until the next one is due [s], None if none waits."""
+        """Passes on all targets, or runs all steps, that are due; returns the time until the next one [s], or None."""
         while self._step or self._waiting:
             now_s = time.monotonic()
             if (left_s := self._left_s(now_s)) > WAKE_UP_S:

@@ -1,4 +1,4 @@
-"""Bodies of a world of the simulator as obstacles of a guard."""
+"""Bodies of a simulated world as obstacles for a guard."""
 
 from collections.abc import Iterator, Set
 
@@ -15,16 +15,17 @@ from .bullet import NO_FILE, OF_PYBULLET
 
 
 def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) -> tuple[Obstacle, ...]:
-    """Returns the collision shapes of a world at its start, relative to the root link of one of its robots.
+    """Returns the collision shapes of a world's rigid bodies at the start, in the root link of the guarded robot.
 
     Args:
         path: The main YAML file of the world.
         joints: Names of the joints of the guarded robot.
         robot: Name of the guarded robot in the world; its own shapes are left out. By default, it is the only body of
-            the world that has these joints; if there is none, its root link is at the world's origin.
+            the world that has these joints; if no body has them, the robot's root link is at the world's origin.
 
     Raises:
-        ConfigError: If the world cannot be loaded, has no such robot, or a shape that no obstacle can have.
+        ConfigError: If the world cannot be loaded, does not have such a robot, or has a shape that `Obstacle` cannot
+            describe.
     """
     world = World.from_file(path, connection_mode=pybullet.DIRECT)
     try:

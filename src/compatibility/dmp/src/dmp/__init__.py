@@ -1,1 +1,1 @@
-"""The names of the release's package `dmp`; see `motion_primitives`."""
+"""Modules named as in the package `dmp` of the authors' release; see `motion_primitives`."""

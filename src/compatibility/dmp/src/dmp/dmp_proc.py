@@ -1,3 +1,3 @@
-"""Learning and planning by the release's services, under the release's names."""
+"""Learning and planning through the services of the authors' release, with the release's class names."""
 
 from motion_primitives.ros.dmp_services import DMPProcessor as DMPProcessor

@@ -1,3 +1,3 @@
-"""Bags as pandas tables: `bag_to_dataframe` of `rpbi_utils`, which has more, such as a table for each topic."""
+"""Bags as pandas tables: `bag_to_dataframe` from `rpbi_utils`. That package also makes a table for each topic."""
 
 from rpbi_data import bag_to_dataframe as bag_to_dataframe

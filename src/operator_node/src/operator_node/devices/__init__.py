@@ -1,4 +1,4 @@
-"""The devices; a new one is a class in its own file and a line here."""
+"""Table of the input devices; a new device needs a class in a file of its own and a line in this table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from operator_node.device import Device
@@ -14,4 +14,6 @@ DEVICES: PluginTable[Device] = PluginTable(
         "spacenav": "operator_node.devices.spacenav:Spacenav",
     },
 )
-"""All devices; each is imported when it is looked up, so a missing library matters to its own device only."""
+"""All devices. A device is imported only when it is looked up, so a missing library affects only the devices that need
+it.
+"""

@@ -1,4 +1,4 @@
-"""Keeps a device open and publishes its readings once they are checked."""
+"""Keeps a device open, checks its readings, and publishes the valid ones."""
 
 import logging
 import math
@@ -16,26 +16,26 @@ from custom_ros_tools.schema import ConfigModel, HzOrOff, NonNegative
 from operator_node.device import Device, DeviceClosedError, DeviceError, Reading
 
 REOPENING_PERIOD_S = 1.0
-"""Period at which an absent device is looked for [s]."""
+"""Time between two attempts to open an absent device [s]."""
 WARNING_PERIOD_S = 5.0
-"""Shortest time between two equal warnings [s]."""
+"""Shortest time between two warnings for the same reason [s]."""
 AT_REST = 0.1
-"""Distance from its value at rest within which an axis counts as released."""
+"""Largest difference between an axis and its value at rest at which the axis counts as being at rest."""
 MAX_READINGS = 1000
-"""Largest number of readings that are merged into one, so that a device that never pauses is published all the same."""
+"""Largest number of readings that are merged into one; otherwise a device that never pauses would not be published."""
 MAX_REASONS, OTHER_REASONS = 100, "other reasons"
-"""Largest number of reasons that are counted separately, since reasons from devices of other packages may contain
-numbers; further ones are counted together.
+"""Largest number of reasons that are counted separately; further reasons are counted together. The limit is needed
+because reasons from devices of other packages may contain numbers and so be arbitrarily many.
 """
 MAX_POSTED = 1000
-"""Largest number of actions that wait for a device; the oldest are dropped beyond it."""
+"""Largest number of queued actions on a device; beyond it, the oldest actions are dropped."""
 HELD_S = 5.0
-"""Time after opening at which axes and buttons that have not been at rest yet are reported in a warning [s]."""
+"""Time after opening at which a warning names the axes and buttons that have not been at rest yet [s]."""
 logger = logging.getLogger(__name__)
 
 
 class FeedConfig(ConfigModel):
-    """Rates at which readings are published; the names are those of `joy_node`."""
+    """Rate and merging of the published readings; the parameters are named as in ROS's `joy_node`."""
 
     autorepeat_rate: HzOrOff = Field(
         20.0,
@@ -49,28 +49,28 @@ class FeedConfig(ConfigModel):
 class DeviceFeed:
     """Keeps a device open, checks its readings, and publishes them.
 
-    An absent device is looked for once a second. The first reading after opening is one at rest. Each axis and button
-    stays at rest until the device has reported it at rest, so that nothing that is held while a node starts or a device
-    is plugged in causes a motion; `held` names these axes and buttons. When the device goes or is closed, the last
-    reading is at rest, too.
+    An attempt to open an absent device is made once a second. The first reading that is published after opening is at
+    rest. Each axis and button is published as at rest until the device has reported it at rest, so that an axis or a
+    button that is held while a node starts or a device is plugged in does not cause a motion; `held` names these axes
+    and buttons. When the device is disconnected or closed, the last published reading is at rest, too.
 
-    Invalid readings are counted and dropped; the last valid one stays in force. Exceptions of the device do not escape,
-    except those documented for `step`.
+    Invalid readings are counted and dropped; the last valid reading remains in effect. Exceptions of the device are
+    caught, except those documented for `step`.
 
-    All methods except `post` belong to one thread.
+    All methods except `post` must be called from the same thread.
 
     Args:
-        name: Name of the device in messages.
-        device: The device, not open.
-        config: Rates and merging.
-        publish: Called with each reading.
+        name: Name of the device in log messages.
+        device: The device, which is not open yet.
+        config: Rate and merging of the published readings.
+        publish: Called with each reading that is to be published.
 
     Attributes:
-        problem: Why the device is not open; None if it is.
+        problem: Why the device is not open; None while it is open.
         published: Number of published readings.
-        refused: Number of refused readings, by reason.
+        refused: Number of refusals for each reason.
         free_axes: Indices of the axes that have been at rest since the device was opened.
-        held: Names of axes and buttons that have not been at rest since then.
+        held: Axes and buttons that have not been at rest since the device was opened, such as "axis 'x'".
     """
 
     def __init__(self, name: str, device: Device, config: FeedConfig, publish: Callable[[Reading], None]) -> None:
@@ -84,7 +84,7 @@ class DeviceFeed:
         self._free_buttons: set[int] = set()
         self._held_warning_due_s = math.inf
         self._buttons: tuple[int, ...] | None = None
-        """Buttons of the last reading; None before the first one since the device was opened."""
+        """Buttons of the last reading; None until the first reading after the device was opened."""
         self._open_at_s = self._repeat_at_s = -math.inf
         self._is_absent = False
         self._warned_s: dict[str, float] = {}
@@ -92,11 +92,11 @@ class DeviceFeed:
         self._pause = threading.Event()
 
     def run(self, is_over: Callable[[], bool], period_s: float = 0.02) -> None:
-        """Publishes readings until `is_over` returns True or the user closes the device; closes the device at the end.
+        """Publishes readings until `is_over` returns True or the user closes the device, then closes the device.
 
         Args:
-            is_over: Called once a period.
-            period_s: Longest time between two calls of `is_over`, and until posted actions are run [s].
+            is_over: Called before each step; ends the loop by returning True.
+            period_s: Longest time that one step waits, and hence that a posted action waits [s].
 
         Raises:
             MissingDependency: If the device needs a library that is not installed.
@@ -110,10 +110,13 @@ class DeviceFeed:
             self.close()
 
     def step(self, timeout_s: float) -> None:
-        """Runs the posted actions, opens the device if necessary, and waits for one reading.
+        """Runs the posted actions, then either tries to open the device or waits for one reading and publishes it.
+
+        Args:
+            timeout_s: Longest time to wait [s].
 
         Raises:
-            DeviceClosedError: If the user has closed the device; a last reading at rest was published.
+            DeviceClosedError: If the user has closed the device. If it was open, a last reading at rest was published.
             MissingDependency: If the device needs a library that is not installed.
         """
         for _ in range(len(self._posted)):
@@ -145,13 +148,11 @@ class DeviceFeed:
             logger.warning("%s: %s", self._name, held_text(self.held))
 
     def post(self, action: Callable[[], None]) -> None:
-        """Schedules an action on the device; the feed's thread runs it before the next reading. Any thread may call
-        this.
-        """
+        """Schedules an action, which the feed's thread runs before the next reading; may be called from any thread."""
         self._posted.append(action)
 
     def close(self) -> None:
-        """Closes the device and publishes a last reading at rest."""
+        """Closes the device and publishes a last reading at rest; does nothing if the device is not open."""
         if self.problem is None:
             self._leave()
         self.problem = "closed"
@@ -182,7 +183,7 @@ class DeviceFeed:
         self._emit(self._resting())
 
     def _lose(self, reason: str) -> None:
-        """Closes a device that has gone and publishes a last reading at rest."""
+        """Closes a device that has disconnected or failed, and publishes a last reading at rest."""
         if not self._is_absent:
             logger.warning("%s: %s", self._name, reason)
         self._is_absent = True
@@ -209,7 +210,11 @@ class DeviceFeed:
         return Reading((0.0,) * len(device.axes), (0,) * len(device.buttons))
 
     def _next(self, timeout_s: float) -> Reading | None:
-        """Returns the next reading, merged with those that follow within `coalesce_interval`."""
+        """Returns the next reading, merged with the readings that follow within `coalesce_interval`.
+
+        Merging ends early at a reading with other buttons, with events or with refusals. Returns None if there is no
+        reading within the timeout.
+        """
         first = self._read(timeout_s)
         if first is None or first.buttons != self._buttons:
             return first
@@ -227,7 +232,9 @@ class DeviceFeed:
         return reading._replace(events=tuple(events), refused=tuple(refused))
 
     def _read(self, timeout_s: float) -> Reading | None:
-        """Returns the next reading of the device, or None if there is none or it is no `Reading`."""
+        """Returns the next reading of the device, or None if the device returns None or something else than a
+        reading.
+        """
         value = self._device.read(timeout_s)
         if value is None:
             return None
@@ -250,7 +257,9 @@ class DeviceFeed:
             self._emit(reading)
 
     def _from_rest(self, reading: Reading) -> Reading:
-        """Returns a reading in which every axis and button that has not been at rest since opening is at rest."""
+        """Updates which axes and buttons have been at rest since opening, and returns the reading with all others at
+        rest.
+        """
         resting = self._resting().axes
         for index, (value, rest) in enumerate(zip(reading.axes, resting)):
             if abs(value - rest) <= AT_REST:
@@ -292,19 +301,19 @@ class DeviceFeed:
 
 
 def held_text(held: Sequence[str]) -> str:
-    """Returns a warning about axes and buttons that have not been at rest since the device was opened."""
+    """Returns a warning text about axes and buttons that have not been at rest since the device was opened."""
     return f"{', '.join(held)} not at rest since it was opened; release it: until then it counts as at rest"
 
 
 def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) -> str | None:
     """Returns why a reading is invalid, or None if it is valid.
 
-    There are few different reasons, so that they can be counted.
+    The reasons do not contain measured values, so that equal faults can be counted together.
 
     Args:
-        reading: The reading.
+        reading: The reading to check.
         axes: Names of the device's axes.
-        buttons: Names of its buttons.
+        buttons: Names of the device's buttons.
     """
     if len(reading.axes) != len(axes):
         return f"a reading whose number of axes differs from the {len(axes)} of the device"

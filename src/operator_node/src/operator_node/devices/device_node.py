@@ -1,4 +1,4 @@
-"""Nodes of input devices: they publish `joy`, and native topics of each device."""
+"""Nodes of input devices, which publish `joy` and the topics that are specific to each device."""
 
 import math
 import pkgutil
@@ -25,9 +25,9 @@ from .device_topics import DeviceTopics
 QUEUE_SIZE = 10
 DIAGNOSTICS_HZ = 1.0
 LAST_READING_S = 2.0
-"""Longest time that a node waits for the last reading when it ends [s]."""
+"""Longest time that a node waits at shutdown until its last reading is published [s]."""
 SENDING_S = 0.1
-"""Time for sending that reading [s]."""
+"""Time that the node then waits until the last reading is sent [s]."""
 
 
 class DeviceParameters(ConfigModel):
@@ -45,15 +45,15 @@ class CueConfig(ConfigModel):
 
 
 class DeviceNode:
-    """Publishes the readings of a device on `joy`, and its events on topics of their own.
+    """Publishes the readings of a device on `joy`, and the device's events on separate topics.
 
     Args:
-        name: Name of the device; it is the frame of the messages.
+        name: Name of the device, which is also the `frame_id` of the messages on `joy`.
 
     Raises:
-        UnknownNameError: If there is no such device.
-        MissingDependency: If it needs a library that is not installed.
-        ConfigError: If a parameter is wrong.
+        UnknownNameError: If there is no device with this name.
+        MissingDependency: If the device needs a library that is not installed.
+        ConfigError: If a parameter is invalid.
     """
 
     def __init__(self, name: str) -> None:
@@ -74,7 +74,7 @@ class DeviceNode:
         rospy.on_shutdown(self._end)
 
     def run(self) -> None:
-        """Reads the device until ROS shuts down, or until the user closes it, which ends the node."""
+        """Reads the device until ROS shuts down or the user closes the device; the latter shuts down the node."""
         try:
             self._feed.run(self._is_ending.is_set)
         finally:
@@ -82,7 +82,9 @@ class DeviceNode:
         rospy.signal_shutdown("its device was closed")
 
     def _end(self) -> None:
-        """Waits until the last reading is published, while topics are still open."""
+        """Ends the loop that reads the device, and waits until the last reading is sent, before ROS closes the
+        topics.
+        """
         self._is_ending.set()
         if self._has_ended.wait(LAST_READING_S):
             threading.Event().wait(SENDING_S)
@@ -118,30 +120,30 @@ class DeviceNode:
 
 
 def main() -> None:
-    """Runs the node of the device that `~device` names."""
+    """Runs the node of the device that is named in the parameter `~device`."""
     run_node("device", lambda: DeviceNode(private_parameters(DeviceParameters).device), DeviceNode.run)
 
 
 def joystick() -> None:
-    """Runs `joy_node.py`."""
+    """Runs the joystick's node, `joy_node.py`."""
     run_node("joy_node", lambda: DeviceNode("joystick"), DeviceNode.run)
 
 
 def keyboard() -> None:
-    """Runs `keyboard`."""
+    """Runs the keyboard's node, `keyboard`."""
     run_node("keyboard", lambda: DeviceNode("keyboard"), DeviceNode.run)
 
 
 def mouse() -> None:
-    """Runs `mouse_node.py`."""
+    """Runs the mouse's node, `mouse_node.py`."""
     run_node("mouse", lambda: DeviceNode("mouse"), DeviceNode.run)
 
 
 def mvn() -> None:
-    """Runs `mvn_node.py`."""
+    """Runs the node for Xsens MVN, `mvn_node.py`."""
     run_node("mvn", lambda: DeviceNode("mvn"), DeviceNode.run)
 
 
 def spacenav() -> None:
-    """Runs `spacenav_node.py`."""
+    """Runs the 6-D mouse's node, `spacenav_node.py`."""
     run_node("spacenav", lambda: DeviceNode("spacenav"), DeviceNode.run)

@@ -1,6 +1,7 @@
-"""Topics of devices other than `joy`: the base class, and the topics of joystick, keyboard and 6-D mouse.
+"""Topics of devices in addition to `joy`: the base class, and the topics of joystick, keyboard and 6-D mouse.
 
-Their names are those of `joy_node`, of the keyboard driver that the release used, and of `spacenav_node`.
+Most topics are named as in ROS's `joy_node`, as in the keyboard driver that the authors' release uses, and as in
+`spacenav_node`, respectively.
 """
 
 import math
@@ -22,26 +23,26 @@ from .spacenav import Spacenav
 QUEUE_SIZE = 10
 KEY_QUEUE_SIZE = 100
 STRONG = 0
-"""Number of the strong motor; all other numbers are the weak one."""
+"""Number of the strong motor in a feedback message; every other number selects the weak motor."""
 
 
 class DeviceTopics:
-    """Publishes the events of a device, and subscribes to its inputs; base class.
+    """Base class for the topics of a device other than `joy`: publishes its events, and subscribes to its inputs.
 
     Args:
-        device: The device.
-        post: Schedules an action in the thread of the device; every access to the device has to use it.
+        device: The device, which may only be changed through `post`.
+        post: Schedules an action in the thread that reads the device.
     """
 
     def __init__(self, device: Device, post: Callable[[Callable[[], None]], None]) -> None:
         self.device, self.post = device, post
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes the parts of a reading other than axes and buttons."""
+        """Publishes what the device's own topics need from a reading; publishes nothing in this base class."""
 
 
 class JoystickTopics(DeviceTopics):
-    """Rumbles on `joy/set_feedback`, and moves the virtual gamepad on `joy/virtual`."""
+    """Lets messages on `joy/set_feedback` rumble the joystick, and messages on `joy/virtual` move a virtual gamepad."""
 
     device: Joystick
 
@@ -65,7 +66,7 @@ class JoystickTopics(DeviceTopics):
 
 
 class KeyboardTopics(DeviceTopics):
-    """Publishes each key that goes down or up, on `~keydown` and `~keyup`."""
+    """Publishes a message on `~keydown` or `~keyup` for each key that goes down or up."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -82,7 +83,11 @@ class KeyboardTopics(DeviceTopics):
 
 
 class SpacenavTopics(DeviceTopics):
-    """Publishes translation, rotation, both as a twist, and the unscaled axes, below `spacenav`."""
+    """Publishes the readings of the 6-D mouse in the namespace `spacenav`.
+
+    The topics are `offset` (scaled translation), `rot_offset` (scaled rotation), `twist` (both), and `joy` (unscaled
+    axes, and buttons).
+    """
 
     device: Spacenav
 

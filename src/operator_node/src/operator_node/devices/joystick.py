@@ -15,11 +15,11 @@ from operator_node.device import Device, DeviceError, Reading
 from .sdl import pygame_with_joysticks, triggers_of
 
 RAW = 32768
-"""Divisor that pygame applies to raw axes."""
+"""Number by which pygame divides the raw value of an axis."""
 FULL = 32767
 UNPLUGGED = "it was unplugged"
 RUMBLE_MS = 200
-"""Time for which a force is rendered unless it is repeated [ms]."""
+"""Duration of one rumble [ms]."""
 
 
 def _numbered(path: str) -> str:
@@ -29,7 +29,10 @@ def _numbered(path: str) -> str:
 
 
 class JoystickConfig(ConfigModel):
-    """Selection and reading of a joystick; the names are those of `joy_node`."""
+    """Selection and reading of a joystick.
+
+    `dev`, `dev_name`, `deadzone` and `sticky_buttons` are named as in ROS's `joy_node`.
+    """
 
     dev: Annotated[Text, AfterValidator(_numbered)] = Field(
         "/dev/input/js0", description="Path whose number selects the joystick; the first one is 0."
@@ -46,13 +49,13 @@ class JoystickConfig(ConfigModel):
 
 
 class Joystick(Device):
-    """A joystick or gamepad by SDL.
+    """A joystick or gamepad that is read through SDL.
 
-    Axes are positive to the left and up; a trigger is 1 at rest and -1 when it is pressed. Each hat follows as two
-    axes, as in `joy_node`.
+    Axes are positive to the left and up; a trigger is 1 at rest and -1 when it is fully pressed. As in `joy_node`, each
+    hat adds two axes after those of the sticks.
 
     Attributes:
-        is_virtual: Whether it is a virtual gamepad.
+        is_virtual: Whether a virtual gamepad is created when the device is opened.
     """
 
     Config = JoystickConfig
@@ -78,7 +81,7 @@ class Joystick(Device):
 
             self._virtual = VirtualJoystick()
         with contextlib.suppress(SystemError):  # see `_fetch`
-            pygame.event.get()  # makes it detect new joysticks
+            pygame.event.get()  # makes pygame detect new joysticks
         index = self._index()
         try:
             self._joystick = pygame.joystick.Joystick(index)
@@ -120,12 +123,12 @@ class Joystick(Device):
         self.rumble(strength, strength)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Rumbles for `RUMBLE_MS` with the strong and the weak motor, each from 0 to 1."""
+        """Runs the strong and the weak motor for `RUMBLE_MS`, each with a strength from 0 to 1."""
         if self._joystick is not None:
             self._joystick.rumble(strong, weak, RUMBLE_MS)
 
     def move_virtual(self, axes: Sequence[float], buttons: Sequence[int]) -> None:
-        """Moves the virtual gamepad, see `VirtualJoystick.move`."""
+        """Sets axes and buttons of the virtual gamepad, if there is one; see `VirtualJoystick.move`."""
         if self._virtual is not None:
             self._virtual.move(axes, buttons)
 
@@ -145,10 +148,10 @@ class Joystick(Device):
         return number
 
     def _fetch(self, timeout_s: float) -> None:
-        """Waits for events if none are queued.
+        """Queues the events of pygame, and waits for one if none are queued.
 
-        pygame 2.1 loses the queued events when a joystick goes that was never opened; then the whole state is read
-        again.
+        pygame 2.1 loses its queued events when a joystick that was never opened is unplugged. In this case, the state
+        of all buttons is read again.
         """
         event = self._pygame.event
         try:
@@ -168,7 +171,7 @@ class Joystick(Device):
         self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
 
     def _apply_events(self) -> None:
-        """Applies the queued events up to the next button, so that the shortest press results in a reading."""
+        """Applies the queued events up to the next button event, so that even the shortest press yields a reading."""
         pygame, ours = self._pygame, self._joystick.get_instance_id()
         while self._events:
             event = self._events.popleft()
@@ -202,9 +205,12 @@ class Joystick(Device):
 
 
 def axis_of(raw: int, deadzone: float) -> float:
-    """Returns an axis in [-1, 1] from its raw value, from -32768 to 32767, which has the opposite sign.
+    """Converts a raw value from -32768 to 32767 to the value of an axis in [-1, 1], with the opposite sign.
 
-    The axis is 0 within the dead zone, a share of the full range, and rises from there to 1 at the end.
+    Args:
+        raw: Raw value of the axis.
+        deadzone: Share of the range to either side within which the axis is 0; beyond it, the magnitude rises linearly
+            to 1 at the end of the range.
     """
     beyond = max(0.0, abs(raw) - FULL * deadzone)
     return -math.copysign(min(1.0, beyond / (FULL * (1.0 - deadzone))), raw) if beyond else 0.0

@@ -1,4 +1,4 @@
-"""The keyboard read through a terminal, which reports when a key goes down but not when it goes up."""
+"""Reads the keyboard through a terminal, which reports when a key goes down but not when the key goes up."""
 
 import contextlib
 import os
@@ -29,13 +29,13 @@ SEQUENCES = {
     **{f"O{end}": f"F{number}" for number, end in enumerate("PQRS", 1)},
     **{f"[{code}~": f"F{number}" for number, code in enumerate((15, 17, 18, 19, 20, 21, 23, 24), 5)},
 }
-"""Names of keys by the characters that follow an escape, as xterm and VT100 send them."""
+"""Maps the characters after an escape character, as xterm and VT100 send them, to the name of the key."""
 CONTROLS = {"\x7f": "BACKSPACE", "\b": "BACKSPACE", "\t": "TAB", "\r": "RETURN", "\n": "RETURN", ESCAPE: "ESCAPE"}
 MAX_BYTES = 4096
 
 
 def codes_in(text: str) -> list[int]:
-    """Returns the codes of the keys that a terminal sent; 0 for keys without a code."""
+    """Returns the code of each key in the text that a terminal sent; 0 for a key without a code."""
     codes = []
     while text:
         length = next((n for n in (4, 3, 2) if text[0] == ESCAPE and text[1 : 1 + n] in SEQUENCES), 0)
@@ -47,16 +47,16 @@ def codes_in(text: str) -> list[int]:
 
 
 class KeyTerminal:
-    """Records the keys that are typed in the terminal; each counts as held for a time after its last repetition.
+    """Records the keys that are typed in the terminal; each key counts as held for a time after it was last received.
 
-    A terminal starts to repeat a held key only after about half a second: `hold_s` should be longer.
+    A terminal starts to repeat a held key only after about half a second, so `hold_s` should be longer.
 
     Args:
         keys: Receives the keys.
-        hold_s: Time for which a key counts as held [s].
+        hold_s: Time for which a key counts as held after the terminal sent it [s].
 
     Raises:
-        DeviceError: If standard input is no terminal.
+        DeviceError: If standard input is not a terminal.
     """
 
     def __init__(self, keys: HeldKeys, hold_s: float) -> None:
@@ -70,15 +70,18 @@ class KeyTerminal:
             raise DeviceError("keyboard", f"its standard input is no terminal: {error}") from None
 
     def wait(self, timeout_s: float) -> None:
-        """Processes typed keys, or waits for one.
+        """Waits until a key is typed or its holding time ends, and records keys that were typed or released.
+
+        Args:
+            timeout_s: Longest time to wait [s].
 
         Raises:
-            DeviceError: If the terminal has gone.
+            DeviceError: If the terminal was closed.
         """
         due_s = min(self._until_s.values(), default=float("inf"))
         timeout_s = max(0.0, min(timeout_s, due_s - time.monotonic()))
         is_typed = select.select([self._file], [], [], timeout_s)[0]
-        # One time for both loops: a key typed now is held for at least one call, however long this takes
+        # Both loops use the same time, so that a key typed now stays held until at least the next call
         now_s = time.monotonic()
         if is_typed:
             try:
@@ -96,6 +99,6 @@ class KeyTerminal:
                 self._keys.release(code)
 
     def close(self) -> None:
-        """Restores the settings of the terminal."""
+        """Restores the original settings of the terminal."""
         with contextlib.suppress(termios.error):
             termios.tcsetattr(self._file, termios.TCSANOW, self._settings)  # TCSANOW does not wait for output

@@ -11,9 +11,11 @@ from .window import INK, DeviceWindow
 
 WIDTH_PX, HEIGHT_PX = 420, 220
 LOCKS = {0x02: CAPS_LOCK, 0x10: NUM_LOCK}
-"""Modifier bit of each lock, by its bit in the state of an event."""
+"""Maps the bit of each lock in the state of a tkinter event to the bit of this lock in `keyboard/Key`."""
 REPEAT_GAP_S = 0.003
-"""Time to wait for the second half of a repetition [s]: X reports a held key as going up and, at the same time, down.
+"""Time to wait after a key goes up before it counts as released [s].
+
+X reports each repetition of a held key as the key going up and, with the same time stamp, down again.
 """
 NAMES = {
     "BackSpace": "BACKSPACE",
@@ -77,13 +79,13 @@ NAMES = {
     "EuroSign": "EURO",
     "Undo": "UNDO",
 }
-"""Names of keys by the names of X symbols; all other symbols are characters, with their own codes."""
+"""Maps the names of X symbols to names of keys; all other symbols are characters, whose codes are used directly."""
 CODES = frozenset(KEY_CODES.values())
 NAME_OF_CODE = {code: name for name, code in KEY_CODES.items()}
 
 
 def code_of(name: str, number: int) -> int:
-    """Returns the code of an X symbol by its name and number; 0 if it has none."""
+    """Returns the key code for the name and the number of an X symbol; 0 if the symbol has no key code."""
     if name in NAMES:
         return KEY_CODES[NAMES[name]]
     code = ord(chr(number).lower()) if ord("A") <= number <= ord("Z") else number
@@ -91,13 +93,13 @@ def code_of(name: str, number: int) -> int:
 
 
 class PendingRelease(NamedTuple):
-    """The release of a key, which X may revoke by a press at the same time.
+    """A key that X reported as going up; the key counts as still held if X reports a press with the same time stamp.
 
     Attributes:
-        keycode: Its position on the keyboard, as X numbers it.
-        time: Time of the event, by X.
+        keycode: X's number for the position of the key on the keyboard.
+        time: X's time stamp of the event [ms].
         locks: Bits of the locks that were on.
-        due_s: Time from which it counts as released, by `time.monotonic`.
+        due_s: Time of `time.monotonic` from which the key counts as released [s].
     """
 
     keycode: int
@@ -107,11 +109,11 @@ class PendingRelease(NamedTuple):
 
 
 class KeyWindow:
-    """Records the keys that are pressed while its window has the focus, and shows those that are held.
+    """A window that records the keys that are pressed while it has the focus, and shows which keys are held.
 
     Args:
         keys: Receives the keys.
-        explanation: Lines that the window shows.
+        explanation: Lines of text that the window shows below the held keys.
 
     Raises:
         DeviceError: If there is no display.
@@ -120,7 +122,8 @@ class KeyWindow:
     def __init__(self, keys: HeldKeys, explanation: Sequence[str]) -> None:
         self._keys, self._explanation = keys, explanation
         self._codes: dict[int, int] = {}
-        """Code of each held key by its X keycode, since its symbol depends on modifiers."""
+        """Maps the X keycode of each held key to its code when it went down: the symbol of a key depends on modifiers.
+        """
         self._pending: PendingRelease | None = None
         self._has_focus = False
         self._drawn: object = None
@@ -134,12 +137,12 @@ class KeyWindow:
         self._draw()
 
     def wait(self, timeout_s: float) -> None:
-        """Processes queued events, or waits for the next one; see `DeviceWindow.wait`."""
+        """Processes queued events, or waits for the next event; errors are those of `DeviceWindow.wait`."""
         now_s = time.monotonic()
         due_s = self._pending.due_s if self._pending else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
         if self._is_due():
-            self._window.wait(0.0)  # a busy machine may be late, and the awaited event be queued already
+            self._window.wait(0.0)  # on a busy machine this call may be late, and the awaited press already queued
             if self._is_due():
                 self._apply_release()
         if self._drawn != (tuple(self._keys.codes), self._has_focus):

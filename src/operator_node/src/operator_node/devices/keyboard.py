@@ -1,4 +1,4 @@
-"""The keys of a keyboard."""
+"""A keyboard, whose keys act as axes and buttons."""
 
 import sys
 import time
@@ -18,7 +18,7 @@ Milliseconds = Annotated[Positive, Unit("ms")]
 
 
 class KeyboardConfig(ConfigModel):
-    """Keys of axes and buttons, and the repetition of keys."""
+    """Keys that act as axes and buttons, repetition of keys, and source of the keys (window or terminal)."""
 
     axes: ListOf[KeyPair] = Field((), description="Negative and positive key of each axis of `joy`.")
     buttons: ListOf[KeyName] = Field((), description="Key of each button of `joy`.")
@@ -36,12 +36,13 @@ class KeyboardConfig(ConfigModel):
 
 
 class Keyboard(Device):
-    """Keys that are pressed in a window of its own, or in the terminal.
+    """A keyboard that is read through a separate window or through the terminal.
 
-    Its events are of type `KeyEvent`. No key is held while the window does not have the focus.
+    The events of its readings are of type `KeyEvent`. All keys count as released while the window does not have the
+    focus.
 
     Raises:
-        ConfigError: If `terminal` is set and standard input is no terminal.
+        ConfigError: If `terminal` is set and standard input is not a terminal.
     """
 
     Config = KeyboardConfig
@@ -69,7 +70,7 @@ class Keyboard(Device):
     def read(self, timeout_s: float) -> Reading | None:
         if self._source is None:
             raise DeviceError("keyboard", "it is not open")
-        if not (self._is_new and self._config.terminal):  # no key of a terminal can be held before it is typed there
+        if not (self._is_new and self._config.terminal):  # the first reading from a terminal is always at rest
             self._source.wait(max(0.0, min(timeout_s, self._keys.repeat_at_s - time.monotonic())))
         events = self._keys.drain_events()
         if not events and not self._is_new:

@@ -1,4 +1,4 @@
-"""Keys: names and codes, those that are held, and axes and buttons made from them."""
+"""Names and codes of keys, tracking of held keys, and their conversion to axes and buttons."""
 
 import math
 import time
@@ -93,7 +93,7 @@ KEY_CODES: dict[str, int] = {
     "EURO": 321,
     "UNDO": 322,
 }
-"""Code of each key by its name, which is the part after `KEY_` in `keyboard/Key`; the codes are those of SDL 1.2."""
+"""Maps the name of each key, the part after `KEY_` in `keyboard/Key`, to its code, which is the code in SDL 1.2."""
 MODIFIERS = {
     KEY_CODES["LSHIFT"]: 1,
     KEY_CODES["RSHIFT"]: 2,
@@ -105,9 +105,9 @@ MODIFIERS = {
     KEY_CODES["RMETA"]: 2048,
     KEY_CODES["MODE"]: 16384,
 }
-"""Bit of each modifier by the code of its key, see `keyboard/Key`."""
+"""Maps the key code of each modifier to the bit of this modifier in `keyboard/Key`."""
 NUM_LOCK, CAPS_LOCK = 4096, 8192
-"""Bits of the locks, modifiers that stay on without being held."""
+"""Bits of the locks, which are modifiers that stay on without being held."""
 
 
 def _digit_as_text(value: Any) -> Any:
@@ -127,20 +127,20 @@ KeyName = Annotated[
     AlsoTakes({"type": "integer", "minimum": 0, "maximum": 9}),
     Expects("the name of a key, such as LEFT or b"),
 ]
-"""Name of a key; YAML reads 1 as a number, which stands for the key 1."""
+"""Name of a key. Integers from 0 to 9 are accepted, too, since YAML reads the name of a digit key as a number."""
 KeyPair = Annotated[tuple[KeyName, KeyName], Field(strict=False)]
-"""The two keys of an axis: the negative one and the positive one."""
+"""Names of the negative key and the positive key of an axis."""
 
 
 class KeyAxes:
     """Maps held keys to axes and buttons.
 
-    An axis is 1 while its positive key is held, -1 while its negative one is, and 0 with both or none; a button is 1
-    while its key is held.
+    An axis is 1 while only its positive key is held, -1 while only its negative key is held, and 0 while both or
+    neither are held. A button is 1 while its key is held.
 
     Args:
         axes: Names of the negative and the positive key of each axis.
-        buttons: Name of the key of each button.
+        buttons: Name of the key for each button.
     """
 
     def __init__(self, axes: ListOf[KeyPair], buttons: ListOf[KeyName] = ()) -> None:
@@ -148,7 +148,7 @@ class KeyAxes:
         self._buttons = [KEY_CODES[name] for name in buttons]
 
     def reading(self, held: Collection[int]) -> Reading:
-        """Returns axes and buttons for the codes of the keys that are held."""
+        """Returns the axes and buttons for the codes of the held keys."""
         axes = tuple(float((positive in held) - (negative in held)) for negative, positive in self._axes)
         return Reading(axes, tuple(int(code in held) for code in self._buttons))
 
@@ -157,9 +157,9 @@ class KeyEvent(NamedTuple):
     """A key that went down or up.
 
     Attributes:
-        code: Its code, see `KEY_CODES`.
+        code: Code of the key, see `KEY_CODES`.
         modifiers: Sum of the bits of the modifiers that were held or locked.
-        is_down: Whether it went down.
+        is_down: True if the key went down, False if it went up.
     """
 
     code: int
@@ -168,12 +168,12 @@ class KeyEvent(NamedTuple):
 
 
 class HeldKeys:
-    """Tracks the keys that are held, and repeats the last one that went down.
+    """Tracks which keys are held, and repeats the key that went down last while it is held.
 
     Args:
-        repeats: Whether keys repeat.
-        delay_s: Time for which a key is held before it repeats [s].
-        interval_s: Period of the repetition [s].
+        repeats: Whether held keys are repeated.
+        delay_s: Time for which a key is held before it is repeated [s].
+        interval_s: Time between two repetitions [s].
     """
 
     def __init__(self, repeats: bool, delay_s: float, interval_s: float) -> None:
@@ -185,16 +185,21 @@ class HeldKeys:
 
     @property
     def codes(self) -> Set[int]:
-        """Codes of the keys that are held, the oldest first."""
+        """Codes of the held keys, in the order in which they went down."""
         return self._held.keys()
 
     @property
     def repeat_at_s(self) -> float:
-        """Time of the next repetition, by `time.monotonic`; infinity if none is due."""
+        """Time of `time.monotonic` at which the next repetition is due [s]; infinity if no key is to be repeated."""
         return self._repeat_at_s
 
     def press(self, code: int, locks: int = 0) -> None:
-        """Records that a key went down; ignores a key that is held already."""
+        """Records that a key went down; ignores a key that is held already.
+
+        Args:
+            code: Code of the key.
+            locks: Sum of the bits of the locks that are on.
+        """
         if code in self._held:
             return
         self._events.append(KeyEvent(code, self._modifiers(locks), True))
@@ -203,7 +208,12 @@ class HeldKeys:
             self._repeating, self._repeat_at_s = code, time.monotonic() + self._delay_s
 
     def release(self, code: int, locks: int = 0) -> None:
-        """Records that a key went up; ignores a key that is not held."""
+        """Records that a key went up; ignores a key that is not held.
+
+        Args:
+            code: Code of the key.
+            locks: Sum of the bits of the locks that are on.
+        """
         if code not in self._held:
             return
         del self._held[code]
@@ -212,12 +222,12 @@ class HeldKeys:
             self._repeat_at_s = math.inf
 
     def release_all(self) -> None:
-        """Records that all keys went up, the last one first."""
+        """Records that all held keys went up, starting with the key that went down last."""
         for code in [*reversed(self._held)]:
             self.release(code)
 
     def drain_events(self) -> tuple[KeyEvent, ...]:
-        """Returns and clears the events since the last call, with the repetition if one is due."""
+        """Returns the events since the last call, followed by a repetition if one is due, and clears them."""
         now_s = time.monotonic()
         if now_s >= self._repeat_at_s:
             self._events.append(KeyEvent(self._repeating, self._modifiers(0), True))

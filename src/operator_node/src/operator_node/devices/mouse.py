@@ -14,9 +14,9 @@ from .window import INK, DeviceWindow
 SIZE_PX = 400
 RADIUS_PX = 12
 BUTTONS = {1: 0, 2: 1, 3: 2}
-"""Index of each button by its X number."""
+"""Maps X's number of each button to the index of the button in a reading."""
 WHEEL_STEPS = {4: 1.0, 5: -1.0}
-"""Sign of each direction of the wheel, by its X button number."""
+"""Maps X's button number for each direction of the wheel to the sign of the motion."""
 DRAGGING = 0x100
 """Bit of an event's state that is set while the left button is held."""
 HELP = "drag: x, y    wheel: z    release: stop"
@@ -30,11 +30,11 @@ class MouseConfig(ConfigModel):
 
 
 class Mouse(Device):
-    """A mouse that is dragged in a window of its own.
+    """A mouse that is dragged in a separate window.
 
-    Axes are `x` to the right and `y` up, measured from the point where the left button went down, as a share of half
-    the window; and `wheel`, positive away from the user, which returns to 0 after a time. `x` and `y` are 0 when the
-    button is released.
+    The axes `x` (to the right) and `y` (up) are the displacement from the point where the left button went down,
+    divided by half the width and half the height of the window. They are 0 while the left button is not held. The axis
+    `wheel` is positive away from the user, and returns to 0 `wheel_return_s` after the last notch.
     """
 
     Config = MouseConfig
@@ -64,9 +64,9 @@ class Mouse(Device):
     def read(self, timeout_s: float) -> Reading | None:
         if self._window is None:
             raise DeviceError("mouse", "it is not open")
-        if not self._is_new:  # else it was just opened: the first reading is at rest, whatever has been pressed since
+        if not self._is_new:  # otherwise the window was just opened, and the first reading must be at rest
             self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
-        if not self._is_new and time.monotonic() >= self._wheel_over_s:  # each motion of the wheel is reported first
+        if not self._is_new and time.monotonic() >= self._wheel_over_s:  # a motion of the wheel must be reported first
             self._wheel, self._wheel_over_s, self._is_new = 0.0, math.inf, True
         if not self._is_new:
             return None
@@ -122,7 +122,7 @@ class Mouse(Device):
         return max(canvas.winfo_width(), 2) / 2, max(canvas.winfo_height(), 2) / 2
 
     def _draw(self) -> None:
-        """Draws the drag as an arrow from the middle, the wheel as a bar, and the instructions."""
+        """Draws the displacement as an arrow from the center, the wheel's axis as a bar, and the instructions."""
         if self._window is None:
             return
         canvas = self._window.canvas

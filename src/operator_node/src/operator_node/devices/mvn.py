@@ -1,4 +1,4 @@
-"""Motion capture by Xsens MVN; the hands of the first person are its axes."""
+"""Motion capture with Xsens MVN as an input device, whose axes are the hand displacements of the first person."""
 
 import errno
 import logging
@@ -21,21 +21,23 @@ logger = logging.getLogger(__name__)
 
 
 class HandAxes:
-    """Displacements of the hands forwards, left and up since they were engaged.
+    """Displacements of both hands, forward, left and up, since the frame in which they were engaged.
 
-    They are relative to the pelvis and its heading, in arm lengths.
+    The displacements are measured relative to the pelvis and its heading, in arm lengths.
     """
 
     def __init__(self) -> None:
         self._engaged: tuple[Array, Array] | None = None
-        """Positions of the hands, and lengths of the arms, when they were engaged."""
+        """Positions of the hands [m], shape (2, 3), and arm lengths [m], shape (2, 1), when the hands were engaged."""
 
     def release(self) -> None:
-        """Disengages the hands; the next frame engages them at their place then."""
+        """Disengages the hands; the next frame engages them at their position in this frame."""
         self._engaged = None
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
-        """Returns the numbers of `AXES`, each in [-1, 1]; zeros for the frame that engages."""
+        """Returns the values of `AXES`, each in [-1, 1]; if the hands are disengaged, engages them and returns
+        zeros.
+        """
         places = _places(frame)
         if self._engaged is None:
             lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)
@@ -45,18 +47,18 @@ class HandAxes:
 
 
 def _places(frame: SegmentFrame) -> Array:
-    """Returns the positions of both hands relative to the pelvis and its heading [m]."""
+    """Returns the positions of both hands relative to the pelvis and its heading [m], shape (2, 3)."""
     ahead = np.tile(about_z(heading_rad(frame.quats_xyzw[0])), (2, 1))
     return rotate(inverse(ahead), frame.positions[_HANDS] - frame.positions[0])
 
 
 class Mvn(Device):
-    """People as streamed by MVN.
+    """People whose motion MVN streams.
 
-    Its axes are the displacements of the right and the left hand of person 0 forward, left and up since the first
-    frame, in arm lengths, relative to the pelvis. After a silence they are measured from the next frame. Its events are
-    those of `Receiver.poll`. The device is open as soon as it listens, whether there is a sender or not. A stream that
-    ceases is reported as a `Silence` and a reading at rest; it resumes with the next frame.
+    The axes are the displacements of the right and the left hand of person 0, forward, left and up, since the first
+    frame. They are measured relative to the pelvis and its heading, in arm lengths. The events are those of
+    `Receiver.poll` except `Refused`. The device is open as soon as it listens, whether or not there is a sender. When
+    the stream ceases, the device reports a `Silence` and a reading at rest; the next frame is then the new first frame.
     """
 
     Config = MvnConfig
@@ -71,11 +73,11 @@ class Mvn(Device):
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of datagrams by result."""
+        """Number of datagrams for each result of their processing."""
         return self.receiver.counts
 
     def open(self) -> None:
-        """Starts to listen; only frames show whether there is a sender."""
+        """Starts to listen; succeeds even if there is no sender."""
         config = self.receiver.config
         self._release()
         try:
@@ -88,7 +90,10 @@ class Mvn(Device):
         logger.info("mvn: listening at %s:%d", config.host, self.receiver.port)
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Returns the hands at the newest frame, and all events; zeros once frames of person 0 have ceased."""
+        """Returns the hand displacements in the newest frame, and all events since the last call.
+
+        The displacements are 0 once the frames of person 0 have ceased. Returns None if there are no events.
+        """
         if not self.receiver.port:
             raise DeviceError("mvn", "it is closed")
         try:

@@ -1,4 +1,4 @@
-"""Topics and TF for the messages of MVN."""
+"""Publishes the messages of MVN as ROS topics and TF."""
 
 import time
 from datetime import datetime
@@ -36,7 +36,7 @@ from .mvn import Mvn
 MARKER_HZ = 2.0
 DIAGNOSTICS_HZ = 1.0
 RECENT_S = 5.0
-"""Time for which the diagnostics show a finding [s]."""
+"""Time for which the diagnostics show a finding of the stream's checks [s]."""
 
 
 class MvnTopicsConfig(ConfigModel):
@@ -47,10 +47,10 @@ class MvnTopicsConfig(ConfigModel):
 
 
 class MvnTopics(DeviceTopics):
-    """Publishes the events of the device MVN, and provides calibration and recording.
+    """Publishes the events of the device MVN, and provides services for calibration and recording.
 
     Raises:
-        ConfigError: If a parameter is wrong.
+        ConfigError: If a parameter is invalid.
     """
 
     device: Mvn
@@ -75,7 +75,7 @@ class MvnTopics(DeviceTopics):
         WallTimer(DIAGNOSTICS_HZ, self._diagnose)
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes the events, each frame with a stamp of its own."""
+        """Publishes the events of a reading, each with the present time as its stamp rather than `stamp`."""
         for event in reading.events:
             stamp = present_stamp()
             if isinstance(event, SegmentFrame):
@@ -129,14 +129,14 @@ class MvnTopics(DeviceTopics):
     # --- Services, in threads of their own.
 
     def _calibrate(self, _: Any) -> TriggerResponse:
-        """Calibrates everybody with their present pose as the T-pose."""
+        """Calibrates all people, taking the present pose of each person as the T-pose."""
         try:
             return TriggerResponse(True, self._receiver.calibrate())
         except InterfaceError as error:
             return TriggerResponse(False, str(error))
 
     def _clear_calibration(self, _: Any) -> TriggerResponse:
-        """Clears the calibration."""
+        """Deletes the calibration of all people."""
         self._receiver.calibration.clear()
         return TriggerResponse(True, "orientations are uncalibrated")
 
@@ -158,7 +158,7 @@ class MvnTopics(DeviceTopics):
 
 
 class _Person:
-    """The topics of one person."""
+    """Publishes the topics of one person."""
 
     def __init__(
         self, number: int, config: MvnTopicsConfig, tf: FastTopic, first: FastTopic, markers: rospy.Publisher
@@ -176,7 +176,9 @@ class _Person:
         self._stamp = rospy.Time()
 
     def publish_frame(self, frame: SegmentFrame, stamp: rospy.Time) -> None:
-        """Publishes a frame, unless its stamp equals the last one, as while simulated time stands still."""
+        """Publishes a frame, unless its stamp equals the stamp of the last frame, as happens while simulated time is
+        paused.
+        """
         if stamp == self._stamp:
             return
         self._stamp = stamp
@@ -188,7 +190,7 @@ class _Person:
             self._markers.publish(self._drawing.message(frame))
 
     def publish(self, message: Message, stamp: rospy.Time) -> None:
-        """Publishes a message about the person that is not a frame."""
+        """Publishes joint angles or a center of mass, or stores the person's name from a `PersonInfo`."""
         header = Header(stamp=stamp, frame_id=self._parent)
         if isinstance(message, PersonInfo):
             self.name = message.fields.get("name", self.name)
@@ -202,5 +204,5 @@ class _Person:
             self._joints.publish(JointState(header, names, message.angles_rad.ravel().tolist(), [], []))
 
     def remove_markers(self) -> None:
-        """Removes the person from RViz."""
+        """Removes the person's markers from RViz."""
         self._markers.publish(self._drawing.removal())

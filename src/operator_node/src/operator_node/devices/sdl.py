@@ -1,4 +1,4 @@
-"""SDL joysticks through pygame, without windows and sound."""
+"""Access to SDL joysticks through pygame, without windows and sound."""
 
 import os
 from typing import Any
@@ -7,14 +7,15 @@ from custom_ros_tools.errors import MissingDependency
 
 SETTINGS = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
-    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # otherwise it only reads while a window of its own has the focus
+    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # otherwise SDL reads joysticks only while its window has the focus
     "SDL_NO_SIGNAL_HANDLERS": "1",
     "SDL_VIDEODRIVER": "dummy",
 }
 
 
 def pygame_with_joysticks() -> Any:
-    """Returns pygame with joysticks enabled; from then on its events report joysticks that come and go.
+    """Enables joysticks in pygame and returns the module; its events then report joysticks that are plugged or
+    unplugged.
 
     Raises:
         MissingDependency: If pygame is not installed.
@@ -25,14 +26,18 @@ def pygame_with_joysticks() -> Any:
         from pygame._sdl2 import controller
     except ModuleNotFoundError as error:
         raise MissingDependency(str(error.name), "apt install python3-pygame") from None
-    pygame.display.init()  # needed by its events
+    pygame.display.init()  # needed for pygame's events
     pygame.joystick.init()
     controller.init()
     return pygame
 
 
 def triggers_of(index: int) -> frozenset[int]:
-    """Returns the axes of a joystick, by its index, that rest at one end, according to SDL's table of gamepads."""
+    """Returns the indices of a joystick's trigger axes, according to SDL's table of gamepads.
+
+    Args:
+        index: Index of the joystick in SDL. The result is empty if SDL does not know the joystick as a gamepad.
+    """
     from pygame._sdl2 import controller
 
     if not controller.is_controller(index):

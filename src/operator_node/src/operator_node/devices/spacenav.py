@@ -1,4 +1,4 @@
-"""A 6-D mouse, through spacenavd or another daemon that speaks its protocol."""
+"""A 6-D mouse that is read from spacenavd or from another daemon with the same protocol."""
 
 import contextlib
 import math
@@ -20,29 +20,29 @@ SOCKET, SETTINGS = "/var/run/spnav.sock", "/etc/spnavrc"
 PACKET = struct.Struct("=8i")
 WORD = struct.Struct("=i")
 REQUEST = 0x7FAA0000
-"""Offset that marks the types of requests and of their answers."""
+"""Bits that mark the type of a packet as a request or an answer."""
 PROTOCOL_TAG = REQUEST | 0x5500
 PROTOCOL_MASK = 0x7FFFFF00
-"""All bits except the version in the word that negotiates the version."""
+"""Mask of all bits except the version in the word with which the protocol version is negotiated."""
 SENSITIVITY = struct.pack("=f", 1.0)
 MOTION, PRESS, RELEASE, DEVICE, LAST_EVENT = 0, 1, 2, 3, 6
-"""Types of packets; all from 0 to LAST_EVENT are events."""
+"""Types of packets; all types from 0 to LAST_EVENT are events."""
 GET_BUTTONS = REQUEST | 0x2003
 ANSWERS = range(REQUEST | 0x1000, REQUEST | 0x4000)
 ANSWER_TIMEOUT_S = 0.3
 MAX_VALUE = 32767
-"""Largest value of any 6-D mouse; larger ones are refused."""
+"""Largest raw value that a 6-D mouse reports; larger values are refused."""
 MAX_BUTTONS = 64
 MAX_REFUSED = 8
 """Number of consecutive invalid packets after which the protocol counts as unknown."""
 POLL_S = 0.001
-"""Length of one poll of `static_count_threshold` [s]."""
+"""Time that one unit of `static_count_threshold` stands for [s]."""
 
 Scale = Annotated[float | Vec3, Field()]
 
 
 class SpacenavConfig(ConfigModel):
-    """A 6-D mouse; the names are those of `spacenav_node`."""
+    """Connection and scaling of a 6-D mouse; all parameters except `socket` are named as in ROS's `spacenav_node`."""
 
     socket: Text | None = optional(
         f"Socket of the daemon; by default `$SPNAV_SOCKET`, then the one in `{SETTINGS}`, then `{SOCKET}`."
@@ -61,7 +61,8 @@ class SpacenavConfig(ConfigModel):
 class Spacenav(Device):
     """A 6-D mouse.
 
-    Axes are x forward, y left, z up and the rotations about them, as shares of the full scale.
+    The axes are the translations along x (forward), y (left) and z (up), followed by the rotations about x, y and z,
+    each as a share of `full_scale`.
     """
 
     Config = SpacenavConfig
@@ -136,7 +137,7 @@ class Spacenav(Device):
     # --- The connection.
 
     def _negotiate(self) -> int:
-        """Requests protocol 1 and returns the one in use; daemons that only have 0 do not answer."""
+        """Requests version 1 of the protocol and returns the version in use: 0 if the daemon does not answer."""
         self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while len(self._received) < WORD.size:
@@ -150,7 +151,13 @@ class Spacenav(Device):
         return 1
 
     def _request(self, request: int) -> int | None:
-        """Returns the first number of the answer, or None if the request was rejected; earlier events are processed."""
+        """Sends a request and returns the first number of the answer, or None if the daemon rejected the request.
+
+        Events that arrive before the answer are processed.
+
+        Raises:
+            DeviceError: If the daemon does not answer in time, or has disconnected.
+        """
         self._send(PACKET.pack(request, *[0] * 7))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while time.monotonic() < end_s:
@@ -169,7 +176,7 @@ class Spacenav(Device):
             raise DeviceError("spacenav", f"spacenavd has gone: {error.strerror or error}") from None
 
     def _receive(self, timeout_s: float) -> bool:
-        """Waits for bytes; returns whether some were received."""
+        """Waits for bytes, appends them to the receive buffer, and returns whether there were any."""
         assert self._socket is not None
         if not select.select([self._socket], [], [], timeout_s)[0]:
             return False
@@ -220,14 +227,17 @@ class Spacenav(Device):
         return None
 
     def _extend_buttons(self, count: int) -> None:
-        """Extends the buttons to a number; some devices reveal a button only by its first event."""
+        """Adds buttons until there are `count`, but at most `MAX_BUTTONS`.
+
+        For some devices, the first event of a button is the only sign that the button exists.
+        """
         missing = min(count, MAX_BUTTONS) - len(self._pressed)
         if missing > 0:
             self._pressed += [0] * missing
             self.buttons = [*map(str, range(len(self._pressed)))]
 
     def _zero_static_axes(self) -> None:
-        """Sets axes that have not moved for a time to 0."""
+        """Sets the axes to 0 after a time without motion events, as configured."""
         config = self.config
         linear, angular = self._motion[:3], self._motion[3:]
         if config.zero_when_static or all(abs(each) < config.static_trans_deadband for each in linear):
@@ -240,7 +250,7 @@ class Spacenav(Device):
 
 
 class _Packets:
-    """Iterates over the complete packets of a receive buffer, and removes them."""
+    """Iterates over the complete packets in a receive buffer, removing each packet from the buffer."""
 
     def __init__(self, received: bytearray) -> None:
         self._received = received
@@ -260,7 +270,7 @@ class _Packets:
 
 
 def socket_path() -> str:
-    """Returns the path of the daemon's socket, determined like libspnav does."""
+    """Returns the path of the daemon's socket, determined in the same way as in libspnav."""
     given = os.environ.get("SPNAV_SOCKET")
     if given:
         return given

@@ -1,4 +1,4 @@
-"""A virtual gamepad in this process, which SDL treats as a real one."""
+"""A virtual gamepad in this process, which SDL treats like a real gamepad."""
 
 import ctypes
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from operator_node.device import DeviceError
 from operator_node.devices.sdl import pygame_with_joysticks
 
 GAMEPAD = 1
-"""SDL's number for this type of joystick."""
+"""SDL's number for joysticks of the type gamepad."""
 AXES, BUTTONS, HATS = 6, 11, 1
 FULL = 32767
 HAT_UP, HAT_RIGHT, HAT_DOWN, HAT_LEFT = 1, 2, 4, 8
@@ -15,7 +15,7 @@ _Rumble = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint16, ctype
 
 
 class _VirtualJoystickDesc(ctypes.Structure):
-    """SDL_VirtualJoystickDesc, version 1."""
+    """SDL's structure `SDL_VirtualJoystickDesc`, version 1."""
 
     _fields_ = [
         *((name, ctypes.c_uint16) for name in ("version", "type", "naxes", "nbuttons", "nhats")),
@@ -34,19 +34,19 @@ class _VirtualJoystickDesc(ctypes.Structure):
 
 
 class VirtualJoystick:
-    """A virtual gamepad of SDL: two sticks, two triggers, a hat and buttons, in SDL's order.
+    """A virtual gamepad of SDL with two sticks, two triggers, a hat and buttons.
 
-    Its axes are, as in its messages, left stick, right stick (left and up positive), left and right trigger (1 at
-    rest), hat.
+    The axes are, in this order: left stick (2), right stick (2), left trigger, right trigger and hat (2). Sticks and
+    hat are positive to the left and up; a trigger is 1 at rest and -1 when it is fully pressed.
 
     Args:
-        name: Its name.
+        name: Name that SDL reports for the gamepad.
 
     Attributes:
-        felt: Last strengths of the strong and the weak motor, each from 0 to 1.
+        felt: Strengths of the strong and the weak motor in the last rumble, each from 0 to 1.
 
     Raises:
-        DeviceError: If this SDL has no virtual joysticks.
+        DeviceError: If the installed SDL does not support virtual joysticks.
         MissingDependency: If pygame is not installed.
     """
 
@@ -54,7 +54,7 @@ class VirtualJoystick:
         pygame_with_joysticks()
         self.felt = (0.0, 0.0)
         self._rumble = _Rumble(self._feel)
-        self._sdl = sdl = ctypes.CDLL("libSDL2-2.0.so.0")  # the one that pygame uses
+        self._sdl = sdl = ctypes.CDLL("libSDL2-2.0.so.0")  # the library that pygame uses
         sdl.SDL_GetError.restype = ctypes.c_char_p
         sdl.SDL_JoystickOpen.restype = ctypes.c_void_p
         description = _VirtualJoystickDesc(
@@ -68,7 +68,12 @@ class VirtualJoystick:
         self.move([0.0] * 4 + [1.0] * 2 + [0.0] * 2)
 
     def move(self, axes: Sequence[float] = (), buttons: Sequence[int] = ()) -> None:
-        """Sets the given axes and buttons, in order; values as in its messages."""
+        """Sets the first axes and buttons to the given values, and leaves the remaining ones unchanged.
+
+        Args:
+            axes: Values in [-1, 1] of the first axes, in the order of the class; the hat is set if all 8 are given.
+            buttons: States of the first buttons, in SDL's order; 0 means released.
+        """
         for index, value in enumerate(axes[:AXES]):
             raw = ctypes.c_int16(round(-FULL * max(-1.0, min(1.0, value))))
             self._sdl.SDL_JoystickSetVirtualAxis(self._joystick, index, raw)
@@ -81,7 +86,7 @@ class VirtualJoystick:
         self._sdl.SDL_JoystickUpdate()
 
     def unplug(self) -> None:
-        """Removes it; may be called once."""
+        """Removes the gamepad from SDL; may be called only once."""
         count = self._sdl.SDL_NumJoysticks()
         ids = [self._sdl.SDL_JoystickGetDeviceInstanceID(index) for index in range(count)]
         if self._id in ids:

@@ -1,4 +1,4 @@
-"""The types of bodies; to add one, write a class in its own file and a line here."""
+"""The types of bodies; to add a type, write a class in its own file and add a line to the table below."""
 
 from custom_ros_tools.plugin_table import PluginTable
 
@@ -20,6 +20,6 @@ BODY_TYPES: PluginTable[Body] = PluginTable(
     },
     suggests=False,
 )
-"""Types of bodies in the order of loading: soft bodies come last, since they may be attached to any others."""
+"""Types of bodies in the order of loading: soft bodies come last, since they may be attached to other bodies."""
 
 __all__ = ["BODY_TYPES", "Body", "BodyConfig"]

@@ -33,31 +33,34 @@ UNNAMED_LINK = "link0"
 class Body:
     """A body in one PyBullet client.
 
-    A new type is a subclass with a `Config` and an `__init__` that creates the body and passes its id on; all other
-    methods have defaults. If `__init__` raises, the caller removes everything that PyBullet has created.
+    A new type is a subclass with a `Config` and an `__init__` that creates the body and passes PyBullet's id of the
+    body to this class; all other methods have defaults. If `__init__` raises, the caller removes everything that
+    PyBullet has created.
     """
 
     Config: ClassVar[type[ConfigModel]]
     is_soft: ClassVar[bool] = False
-    """Whether it has neither links nor a fixed shape."""
+    """Whether the body has neither links nor a fixed shape."""
     has_physics: ClassVar[bool] = True
-    """Whether it has contacts; otherwise it is only visible."""
+    """Whether the body has contacts; otherwise it is only visible."""
     section: ClassVar[str] = "objects"
-    """List of the main YAML file that names objects of this type; by default the list for types from other packages."""
+    """Key of the list in the main YAML file for objects of this type; the default is the list for types from other
+    packages."""
     example: ClassVar[Mapping[str, Any]] = {}
-    """YAML keys, without the name, of an example with all ROS interfaces of this type, which follows the TF frame
-    `FRAME` if the type can follow one. Used to write the reference pages."""
+    """YAML keys, without the name, of an example that has all ROS interfaces of this type. If the type can follow a TF
+    frame, the example follows `FRAME`. The reference pages are generated from it."""
     not_in_keyframes: ClassVar[tuple[str, ...]] = ("_inertial", "_base")
-    """Attributes that are caches, not state; reading the body fills them."""
+    """Attributes that keyframes leave out, since they are caches that reading the body's pose fills."""
     object_tf: ObjectTf | None = None
-    """The TF frame that its base follows, if it follows one."""
+    """The TF frame that the base follows; None if it does not follow a frame."""
 
     @classmethod
     def prepare(cls, config: Any, has_window: bool) -> None:
-        """Prepares and caches data that are slow to compute, without calls to PyBullet; any thread may call it.
+        """Prepares and caches data that are slow to compute, without calls to PyBullet; any thread may call this
+        method.
 
         Raises:
-            ConfigError: If the configuration does not fit.
+            ConfigError: If data cannot be prepared from the configuration.
         """
 
     def __init__(self, pb: Client, name: str, body_id: int) -> None:
@@ -68,7 +71,7 @@ class Body:
         self.body_id = body_id
         self.joint_indices = tuple(range(pb.getNumJoints(body_id)))
         self.link_indices = self.joint_indices
-        """PyBullet's indices of all links but the root."""
+        """PyBullet's indices of all links except the root."""
         self.root_link: str = pb.getBodyInfo(body_id)[0].decode() or UNNAMED_LINK
         self._link_names = {index: pb.getJointInfo(body_id, index)[12].decode() for index in self.joint_indices}
         self._link_names[-1] = self.root_link
@@ -78,25 +81,26 @@ class Body:
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
         self._inertial: Any = None
         self._base = Pose()
-        """PyBullet's last pose of the base, and the frame pose computed from it; cached since most bodies rest."""
+        """The frame pose computed from `_inertial`, the last pose that PyBullet returned for the base; both are cached,
+        since most bodies rest."""
         self.pose_follower: PoseFollower | None = None
-        """Moves a fixed base along the poses of `object_tf`; None if the base is set to them instead."""
+        """Moves the base along the poses of `object_tf`; None if the base is set to these poses, or follows none."""
         self._has_jumped = False
-        """Whether it was warned that the body moves without a velocity."""
+        """Whether the warning that the body moves without a velocity was logged."""
         self.dynamics_changes = 0
-        """Number of changes of its dynamics; caches of them compare it."""
+        """Number of times that the dynamics were changed; caches of the dynamics compare it to see if they are old."""
 
     @cached_property
     def external_wrenches(self) -> ExternalWrenches:
-        """Forces and torques on its links from outside."""
+        """External forces and torques on the links of the body."""
         return ExternalWrenches(self)
 
     def push(self, wrench: ExternalWrench) -> None:
         """Applies a wrench to a link from the next tick on.
 
         Raises:
-            UnknownNameError: If it has no such link.
-            ValueError: If the wrench is refused.
+            UnknownNameError: If the body has no such link.
+            ValueError: If the body is soft or only visible, the link is static, or a number of the wrench is invalid.
         """
         if self.is_soft or not self.has_physics:
             raise ValueError(f"'{self.name}' is {'soft' if self.is_soft else 'only shown'}: no wrench acts on it")
@@ -104,18 +108,18 @@ class Body:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Names of its links; empty for the root, none if it is soft."""
+        """Names of the links, with an empty name for the root; a soft body has none."""
         return () if self.is_soft else ("", *map(self.link_name, self.link_indices))
 
     def link_name(self, index: int) -> str:
-        """Returns the name of a link by PyBullet's index, -1 for the base."""
+        """Returns the name of the link with a given PyBullet index; -1 is the base."""
         return self._link_names[index]
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
-        """Returns PyBullet's `getDynamicsInfo` of a link, by index.
+        """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index.
 
-        For a body in maximal coordinates, PyBullet leaves the values of another body in place of the inertial frame,
-        restitution, stiffness and damping; they are replaced by the configured ones.
+        For a body in maximal coordinates, PyBullet returns the inertial frame, restitution, stiffness and damping of
+        another body. Here, the configured values replace them, and the inertial frame is the body's frame.
         """
         info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
         if info[10] != MAXIMAL_COORDINATES:
@@ -132,7 +136,7 @@ class Body:
         return (*front, *info[6:8], *damping_and_stiffness, *info[10:])
 
     def change_dynamics(self, link: int, **arguments: Any) -> None:
-        """Calls PyBullet's `changeDynamics` for a link, by index."""
+        """Calls PyBullet's `changeDynamics` for the link with a given index."""
         info = self.dynamics_info(link)
         if info[10] == MAXIMAL_COORDINATES and "localInertiaDiagonal" in arguments:
             arguments.setdefault("mass", info[0])  # without it PyBullet makes the body a static one
@@ -142,7 +146,10 @@ class Body:
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
     ) -> None:
-        """Lets a fixed base follow its TF frame; sets the start velocity of others, and warns of ineffective keys."""
+        """Makes a fixed base follow its TF frame, or sets the start velocity of a base that is not fixed.
+
+        Logs a warning if the given keys have no effect.
+        """
         if is_fixed:
             self._follow(object_tf)
             if velocity is not None:
@@ -154,10 +161,10 @@ class Body:
             log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
 
     def _follow(self, object_tf: ObjectTf | None) -> None:
-        """Makes a fixed base follow the poses of its TF frame, if there is one.
+        """Makes a fixed base follow the poses of a TF frame, if a frame is given.
 
-        A body loaded with `useMaximalCoordinates` is set to the poses instead: PyBullet ignores the velocity of its
-        base, so it carries nothing.
+        A body in maximal coordinates has no `pose_follower`; it is set to each pose, since PyBullet ignores the
+        velocity of its base. It therefore does not carry other bodies.
         """
         self.object_tf = object_tf
         if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
@@ -165,7 +172,9 @@ class Body:
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
     def _track(self, object_tf: ObjectTf | None) -> None:
-        """Makes a base that physics moves follow its TF frame while it is up to date, if there is one."""
+        """Makes a base that physics moves follow a TF frame, if one is given, as long as new poses of the
+        frame come.
+        """
         self.object_tf = object_tf
         if object_tf is not None:
             centre = self.inertial_pose_in_base
@@ -176,50 +185,60 @@ class Body:
 
     @property
     def is_idle(self) -> bool:
-        """Whether `before_step` does nothing until an input or a request comes."""
+        """Whether `before_step` has nothing to do until the next input or request."""
         return False
 
     def halt(self, reason: str) -> None:
-        """Aborts actions over future ticks, which may not come; does nothing by default."""
+        """Aborts actions that last for several ticks, since no further tick may follow; does nothing by default."""
 
     def restart(self) -> bool:
-        """Restores its initial state, after PyBullet has restored its motion.
+        """Restores the body's initial state, after PyBullet has restored its motion.
 
         Returns:
-            Whether that is possible; by default a body is created anew instead.
+            Whether that is possible; if not, which is the default, the caller creates the body anew.
         """
         return False
 
     def resume(self) -> None:
-        """Sends PyBullet its settings other than motion and dynamics again, after the body has moved to another
-        client."""
+        """Sends the body's settings to PyBullet again, except motion and dynamics, after the body has moved to another
+        client; does nothing by default."""
 
     def pause(self, reason: str) -> None:
-        """Aborts actions that cannot be paused while the world is stopped; by default all."""
+        """Aborts actions that cannot be paused while the world is stopped; by default all actions, see `halt`."""
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Attaches it to existing bodies, by name, when it is added to their world; does nothing by default.
+        """Attaches the body to other bodies when it is added to their world; does nothing by default.
+
+        Args:
+            bodies: The bodies that exist in the world, indexed by name.
 
         Raises:
-            ConfigError: If it cannot be done.
+            ConfigError: If the body cannot be attached.
         """
 
     def detach(self, name: str | None = None) -> None:
-        """Undoes `attach` for a body that is about to be removed, or for all bodies."""
+        """Detaches this body from another body that is about to be removed; does nothing by default.
+
+        Args:
+            name: Name of the other body; None for all bodies.
+        """
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML of its section has this type, if several types share a section."""
+        """Returns whether an object of `section` has this type, judged from its YAML, if several types share a
+        section.
+        """
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Returns the sensors that the body carries."""
+        """Returns the sensors of the body's own type; those listed under `sensors` in YAML are not among them."""
         return ()
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns the inputs of the body by name: the `pose` of its TF frame, and the `external_wrench` on its movable
-        links.
+        """Returns the inputs of the body, indexed by name.
+
+        They are `pose` if the body follows a TF frame, and `external_wrench` if it has movable links.
         """
         inputs: dict[str, Input] = {}
         if self.object_tf is not None:
@@ -231,11 +250,19 @@ class Body:
         return inputs
 
     def inertial_pose(self, index: int) -> Pose:
-        """Returns where a link's centre of mass and principal axes are in its URDF frame, -1 for the base."""
+        """Returns the pose of a link's inertial frame (centre of mass and principal axes) in its URDF frame.
+
+        Args:
+            index: PyBullet's index of the link, -1 for the base.
+        """
         return self.inertial_pose_in_base if index < 0 else Pose(*self.pb.getLinkState(self.body_id, index)[2:4])
 
     def link_pose(self, index: int) -> Pose:
-        """Returns the pose of a link's URDF frame in the world, by PyBullet's index, -1 for the base."""
+        """Returns the pose of a link's URDF frame in the world.
+
+        Args:
+            index: PyBullet's index of the link, -1 for the base.
+        """
         if index >= 0:
             return Pose(*self.pb.getLinkState(self.body_id, index, computeForwardKinematics=1)[4:6])
         inertial = self.pb.getBasePositionAndOrientation(self.body_id)
@@ -248,11 +275,11 @@ class Body:
         return self.link_pose(-1)
 
     def set_base_pose(self, pose: Pose) -> None:
-        """Puts the base link's URDF frame at a pose in the world and leaves the velocity as it is."""
+        """Sets the pose of the base link's URDF frame in the world."""
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
 
     def _jump(self, pose: Pose) -> None:
-        """Sets a base without velocity to a pose of its TF frame; warns once if it moves while others touch it."""
+        """Sets the base to a pose of its TF frame, without a velocity; warns once if the body is in contact."""
         if self.has_physics and not self._has_jumped and self.pb.getContactPoints(self.body_id):
             self._has_jumped = True
             log.warning(
@@ -276,7 +303,7 @@ class Body:
             self.pose_follower.put(pose)
 
     def state(self) -> BodyState:
-        """Returns where the body is."""
+        """Returns the pose of the base's inertial frame in the world, and the joint positions."""
         position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
         joints = self.pb.getJointStates(self.body_id, self.joint_indices) if self.joint_indices else ()
         positions = [joint[0] for joint in joints]
@@ -286,7 +313,7 @@ class Body:
 
     @cached_property
     def _ball_joints(self) -> tuple[int, ...]:
-        """PyBullet's indices of joints that turn about three axes."""
+        """PyBullet's indices of the spherical joints."""
         types = [self.pb.getJointInfo(self.body_id, index)[2] for index in self.joint_indices]
         return tuple(index for index, kind in zip(self.joint_indices, types) if kind == pybullet.JOINT_SPHERICAL)
 
@@ -302,7 +329,7 @@ class Body:
         return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
     def close(self) -> None:
-        """Closes its resources outside the world."""
+        """Closes resources of the body that are not in the world; does nothing by default."""
 
     def remove(self) -> None:
         """Removes the body from the world."""

@@ -10,7 +10,7 @@ from rpbi.sensors import SENSOR_TYPES
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
-    """Returns the configuration of a sensor, by the model of its class."""
+    """Parses an entry of `sensors` with the `Config` of the sensor class that the entry names."""
     expected = "a mapping with 'type: module:Class', 'name' and 'hz'"
     return SENSOR_TYPES.parse_entry(entry, info, SensorConfig, expected)
 
@@ -20,7 +20,7 @@ SensorEntry = Annotated[
     PlainValidator(_sensor_config, json_schema_input_type=SensorConfig),
     Expects("a list of sensors"),  # error text for the list; the validator reports errors of entries
 ]
-"""A sensor of another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
+"""A sensor from another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
 
 
 class BodyConfig(ConfigModel):

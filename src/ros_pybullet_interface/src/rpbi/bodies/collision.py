@@ -56,5 +56,5 @@ class CollisionObject(ShapeObject):
         self._contacts = config.contacts
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its contacts, if configured."""
+        """Returns the contact sensors, if they are configured."""
         return contact_sensors(self, self._contacts)

@@ -1,4 +1,4 @@
-"""Dynamic objects: moved by physics, or by TF while it is up to date."""
+"""Dynamic objects: moved by physics, except while they follow an up-to-date TF frame."""
 
 from pydantic import Field
 
@@ -82,7 +82,7 @@ class DynamicObject(ShapeObject):
         self.config = config
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its pose, the state of its base and its contacts, each if configured."""
+        """Returns the sensors of the object's pose, base state and contacts, each only if it is configured."""
         frame, config = f"rpbi/{self.name}", self.config
         sensors: list[Sensor] = []
         if config.broadcast_hz:

@@ -1,4 +1,4 @@
-"""Dynamics of bodies and links: reads them, and changes them while the world runs."""
+"""Reads and changes the dynamics of bodies and links while the world runs."""
 
 import math
 from collections.abc import Sequence
@@ -26,9 +26,9 @@ class LinkDynamics(NamedTuple):
         restitution: Bounciness.
         rolling_friction: Friction against rolling.
         spinning_friction: Friction about the contact normal.
-        contact_damping: Damping of contacts [N s/m], -1 as long as it is not set.
-        contact_stiffness: Stiffness of contacts [N/m], -1 as long as it is not set.
-        body_type: PyBullet's: 1 rigid (in maximal coordinates), 2 multi, 3 soft.
+        contact_damping: Damping of contacts [N s/m], -1 if it is not set.
+        contact_stiffness: Stiffness of contacts [N/m], -1 if it is not set.
+        body_type: PyBullet's body type: 1 rigid body (in maximal coordinates), 2 multi-body, 3 soft body.
         collision_margin: Margin around the shape [m].
     """
 
@@ -51,10 +51,14 @@ _UNCHANGEABLE = ("local_inertia_pos", "local_inertia_orn", "body_type")
 
 
 def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
-    """Returns the values to change, by PyBullet's name; empty lists change nothing.
+    """Returns the values that differ between present and wanted dynamics, indexed by PyBullet's argument names.
+
+    Args:
+        wanted: The wanted dynamics; an empty sequence leaves the field unchanged.
 
     Raises:
-        ValueError: If a value is not finite, negative, or cannot be changed; it names all such fields.
+        ValueError: If a value has the wrong length, is not finite, is negative, or cannot be changed; the message names
+            all such fields.
     """
     changed: dict[str, Any] = {}
     problems: list[str] = []
@@ -117,27 +121,28 @@ def link_index(body: Body, link: str) -> int:
 
 
 def read_dynamics(body: Body, link: str) -> LinkDynamics:
-    """Returns the present dynamics of a link.
+    """Returns the present dynamics of the link with a given name, empty for the root link.
 
     Raises:
         UnknownNameError: If the body has no such link.
+        ValueError: If the body is soft.
     """
     return LinkDynamics(*body.dynamics_info(link_index(body, link)))
 
 
 def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
-    """Changes the dynamics of a link; when it raises, nothing has changed.
+    """Changes the dynamics of a link; if this raises an error, the dynamics are unchanged.
 
-    Moments of inertia change in proportion to the mass, unless they are set too: PyBullet would replace those of the
-    URDF by those of the collision shape.
+    Moments of inertia change in proportion to the mass, unless they are given too. PyBullet alone would replace the
+    moments of inertia from the URDF with moments computed from the collision shape.
 
     Args:
         link: Name of the link; empty for the root link.
 
     Raises:
         UnknownNameError: If the body has no such link.
-        ValueError: If keys are invalid for this link; it names all of them.
-        PhysicsError: If PyBullet refuses.
+        ValueError: If the body is soft, or keys are invalid for this link; the message names all such keys.
+        PhysicsError: If PyBullet reports an error.
     """
     index = link_index(body, link)
     present = LinkDynamics(*body.dynamics_info(index))
@@ -157,7 +162,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
 
 
 def _renew_contacts(body: Body, index: int) -> None:
-    """Makes PyBullet create the contacts of a link anew: existing ones keep their friction."""
+    """Makes PyBullet create the contacts of a link anew, since existing contacts would keep their old friction."""
     ends = {((touch[1], touch[3]), (touch[2], touch[4])) for touch in body.pb.getContactPoints(body.body_id)}
     for (body_a, link_a), (body_b, link_b) in sorted(ends):
         if (body.body_id, index) in ((body_a, link_a), (body_b, link_b)):
@@ -166,7 +171,7 @@ def _renew_contacts(body: Body, index: int) -> None:
 
 
 def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
-    """Returns the problems of changes of a link."""
+    """Returns a message for each argument of `changeDynamics` that is invalid for a link."""
     what = body.name if index < 0 else f"{body.name}/{body.link_name(index)}"
     problems = []
     if not present.mass:

@@ -1,4 +1,4 @@
-"""Files that a configuration names, checked before PyBullet reads them: some would crash the process."""
+"""Checks files that a configuration names before PyBullet reads them, since faulty files can crash the process."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -31,10 +31,10 @@ _PARTS: dict[str, type[PybulletModel]] = {
 
 
 def check_files(config: BodyConfig) -> None:
-    """Checks the meshes and the URDF of a body; new files take a while.
+    """Checks the meshes and the URDF of a body; files that were not checked before take longer.
 
     Raises:
-        ConfigError: If one cannot be loaded; it lists all problems.
+        ConfigError: If a file cannot be loaded; the error lists all problems.
     """
     parts = {key: getattr(config, key) for key in type(config).model_fields}
     problems = [Problem(config.name, key, message) for key, message in file_problems(parts)]
@@ -43,12 +43,12 @@ def check_files(config: BodyConfig) -> None:
 
 
 def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dict[str, PybulletModel]:
-    """Returns the parts of an object that may name files; of an invalid object, the valid ones.
+    """Returns the parts of an object that may name files, indexed by their keys; parts that are not valid are left out.
 
     Args:
-        data: Its YAML.
+        data: Content of the object's YAML file.
         file: Name of the YAML file.
-        context: As for `load_object`.
+        context: The same as for `load_object`.
     """
     parts = {}
     for key, model in _PARTS.items():
@@ -59,7 +59,11 @@ def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dic
 
 
 def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yields key and message of each fault in the files that parts of an object name, by their keys."""
+    """Yields a key and a message for each fault in the files that the parts of an object name.
+
+    Args:
+        parts: The parts of the object, indexed by their keys.
+    """
     meshes: dict[Mesh, str] = {}
     for key, part in parts.items():
         if isinstance(part, (CreateVisualShape, CreateCollisionShape)):
@@ -87,7 +91,7 @@ def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDecomposition) -> str:
-    """Divides a shape into convex parts; returns the reason if that fails, else an empty text."""
+    """Divides a shape into convex parts; returns an error message if that fails, else an empty text."""
     if shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
         return "expected a createCollisionShape of GEOM_MESH with a fileName"
     if (shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH:
@@ -100,7 +104,7 @@ def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDec
 
 
 def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:
-    """Returns the use of a shape's file, None if PyBullet does not read it."""
+    """Returns how PyBullet uses the file of a shape, None if PyBullet does not read the file."""
     if shape.shapeType == pybullet.GEOM_MESH:
         return Use.VISUAL if isinstance(shape, CreateVisualShape) else Use.COLLISION
     is_field = shape.shapeType == pybullet.GEOM_HEIGHTFIELD and isinstance(shape, CreateCollisionShape)

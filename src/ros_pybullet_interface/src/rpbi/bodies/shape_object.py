@@ -1,4 +1,4 @@
-"""Objects of one visual shape and an optional collision shape."""
+"""Objects with one visual shape and an optional collision shape."""
 
 from typing import Annotated, Any
 
@@ -22,7 +22,7 @@ MaximalCoordinates = Annotated[
 
 
 class ConvexDecomposition(PybulletModel):
-    """V-HACD's division of a concave mesh into convex parts, each of which collides as its hull."""
+    """Parameters of V-HACD, which divides a concave mesh into convex parts; each part collides as its convex hull."""
 
     resolution: Annotated[int, Field(ge=10_000, le=64_000_000)] = Field(
         100_000, description="Voxels that the mesh is filled with: more take longer, and show finer parts."
@@ -51,12 +51,12 @@ class ShapeObject(Body):
     """An object whose shape comes from `createVisualShape` and `createCollisionShape`.
 
     Args:
-        collision: Collision shape, None for an object that nothing can touch.
-        decomposition: Division of its mesh into convex parts, None for one hull.
-        multi_body: Other arguments of `createMultiBody`; without `baseMass`, the body is static.
+        collision: Collision shape, None for an object without contacts.
+        decomposition: How to divide the collision mesh into convex parts; None for a single convex hull.
+        multi_body: Further arguments of `createMultiBody`; without `baseMass`, the body is static.
 
     Raises:
-        PhysicsError: If PyBullet refuses.
+        PhysicsError: If PyBullet does not create the body.
     """
 
     def __init__(
@@ -78,5 +78,5 @@ class ShapeObject(Body):
         self.visual = visual
 
     def restart(self) -> bool:
-        """Restores nothing: without tracking, only commands change its state."""
+        """Returns whether the body needs no reset of its own state, which is so unless it is a tracked body."""
         return not isinstance(self.pose_follower, TrackedBase)

@@ -52,12 +52,12 @@ class SoftObjectConfig(BodyConfig):
 class SoftObject(Body):
     """A deformable body, in a world that is configured for soft bodies.
 
-    Its base pose is the mean position and rotation of its corners. PyBullet reports no velocity, and replays do not
-    reproduce its motion.
+    The base pose is the mean position and rotation of the mesh nodes. PyBullet does not report a correct velocity, and
+    replays do not reproduce the motion.
 
     Raises:
-        ConfigError: If the mesh is broken, or the world is not one for soft bodies.
-        PhysicsError: If PyBullet refuses.
+        ConfigError: If the mesh cannot be loaded, or the world is not configured for soft bodies.
+        PhysicsError: If PyBullet does not create the body.
     """
 
     Config = SoftObjectConfig
@@ -67,7 +67,7 @@ class SoftObject(Body):
 
     @classmethod
     def prepare(cls, config: SoftObjectConfig, has_window: bool) -> None:
-        """Prepares the files that PyBullet reads instead of the URDF, if there is one."""
+        """If the body comes from a URDF, prepares the files that PyBullet reads instead of the URDF."""
         if config.loadURDF is not None:
             prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
@@ -78,18 +78,20 @@ class SoftObject(Body):
         super().__init__(pb, config.name, _load(pb, config))
         self.config = config
         self.inertial_pose_in_base = self._base_pose_in_inertial = Pose()  # PyBullet's value is meaningless
-        # A soft body that sleeps feels nothing, and bodies that poses move go through it.
+        # A sleeping soft body does not react to contacts, and bodies that follow poses would pass through it.
         pb.changeDynamics(self.body_id, -1, activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)
         self._anchors: list[tuple[str | None, int]] = []
-        """Name of the body that each anchor ties to, None for the world, and PyBullet's id of the anchor."""
+        """For each anchor, the name of the body that it ties to (None for the world), and PyBullet's id of the anchor.
+        """
         if config.changeVisualShape is not None:
             pb.changeVisualShape(self.body_id, -1, **config.changeVisualShape.kwargs())
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Creates its anchors.
+        """Creates the configured anchors.
 
         Raises:
-            ConfigError: If an anchor names a body, link or node that does not exist.
+            ConfigError: If an anchor names a body, link or node that does not exist, or a soft body. No anchors exist
+                then.
         """
         problems = []
         for index, anchor in enumerate(self.config.createSoftBodyAnchor):
@@ -102,19 +104,19 @@ class SoftObject(Body):
             raise ConfigError(problems)
 
     def detach(self, name: str | None = None) -> None:
-        """Removes the anchors to a body, or all."""
+        """Removes the anchors to the body `name`, or all anchors if it is None."""
         for body, anchor_id in self._anchors:
             if name is None or body == name:
                 self.pb.removeConstraint(anchor_id)
         self._anchors = [each for each in self._anchors if name is not None and each[0] != name]
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its surface, and its contacts, if they are asked for."""
+        """Returns the sensors of the surface and of the contacts, each only if it is configured."""
         surface = (SurfaceSensor(self, self.config.surface_hz),) if self.config.surface_hz else ()
         return surface + contact_sensors(self, self.config.contacts)
 
     def base_twist(self) -> Twist:
-        """Raises an error, since PyBullet reports a wrong velocity.
+        """Raises an error, since the velocity that PyBullet reports for soft bodies is wrong.
 
         Raises:
             PhysicsError: Always.
@@ -122,17 +124,17 @@ class SoftObject(Body):
         raise PhysicsError(f"{self.name}: a soft body has no twist")
 
     def motion_state(self) -> tuple[float, ...]:
-        """Returns an empty state: soft bodies are not deterministic."""
+        """Returns an empty tuple, since the motion of soft bodies is not deterministic."""
         return ()
 
     def state(self) -> BodyState:
-        """Returns where its simulated corners are."""
+        """Returns the base pose, and the positions of the nodes of the simulated mesh."""
         position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
         _, nodes = self.pb.getMeshData(self.body_id, -1, flags=pybullet.MESH_DATA_SIMULATION_MESH)
         return BodyState(self.name, position + quat, (), nodes)
 
     def remove(self) -> None:
-        """Removes it from the world, its anchors first."""
+        """Removes the anchors, then the body, from the world."""
         self.detach()
         super().remove()
 
@@ -156,7 +158,7 @@ class SoftObject(Body):
 
 
 def _load(pb: Client, config: SoftObjectConfig) -> int:
-    """Loads a soft body."""
+    """Loads a soft body and returns PyBullet's id of the body."""
     if (load := config.loadSoftBody) is not None:
         if load.useNeoHookean and Path(load.simFileName or load.fileName).suffix.lower() != ".vtk":
             message = "a solid needs tetrahedra (.vtk); for a surface use useMassSpring"

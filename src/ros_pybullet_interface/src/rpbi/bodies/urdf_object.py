@@ -1,4 +1,4 @@
-"""URDF objects: bodies with links and joints, but without motors."""
+"""URDF objects: bodies with links and joints but without motors."""
 
 import pybullet
 from pydantic import Field
@@ -37,13 +37,13 @@ class UrdfObjectConfig(BodyConfig):
 
 
 class UrdfObject(Body):
-    """An object that others push or open, such as a cup, a door or a drawer.
+    """A passive object that a robot can push or open, such as a cup, a door or a drawer.
 
-    Its joints move freely within their limits, but for the damping and the friction of the URDF's `dynamics`.
+    The joints move freely within their limits, except for the damping and friction in the `dynamics` of the URDF.
 
     Raises:
         ConfigError: If the URDF cannot be loaded.
-        PhysicsError: If PyBullet refuses.
+        PhysicsError: If PyBullet does not create the body.
     """
 
     Config = UrdfObjectConfig
@@ -58,7 +58,7 @@ class UrdfObject(Body):
 
     @classmethod
     def prepare(cls, config: UrdfObjectConfig, has_window: bool) -> None:
-        """Prepares the files that PyBullet reads instead of the URDF."""
+        """Prepares the files that PyBullet reads in place of the URDF."""
         prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
     def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
@@ -75,7 +75,7 @@ class UrdfObject(Body):
         self._start_base(config.resetBaseVelocity, config.object_tf, is_fixed)
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """The poses of its links, the state of its base and its contacts, each if configured."""
+        """Returns the sensors of the link poses, base state and contacts, each only if it is configured."""
         config = self.config
         sensors: list[Sensor] = []
         if config.broadcast_hz:
@@ -85,10 +85,10 @@ class UrdfObject(Body):
         return (*sensors, *contact_sensors(self, config.contacts))
 
     def _couple(self) -> None:
-        """Couples the URDF's mimic joints.
+        """Couples the mimic joints of the URDF to the joints that they mimic.
 
         Raises:
-            ConfigError: If one cannot.
+            ConfigError: If a mimic joint cannot be coupled.
         """
         try:
             model = JointModel(Joint.all_of(self.pb, self.body_id), mimics=mimics_of(self.config.loadURDF.fileName))
@@ -99,10 +99,10 @@ class UrdfObject(Body):
         couple(self.pb, self.body_id, model.couplings)
 
     def _release(self, index: int) -> None:
-        """Limits the motor that PyBullet adds to each joint to the URDF's friction.
+        """Limits the effort of the motor that PyBullet adds to a joint to the joint friction in the URDF.
 
-        PyBullet applies a URDF's damping, but not its friction. A motor that holds velocity 0 with at most the
-        friction's force or torque is Coulomb friction.
+        PyBullet applies the joint damping of a URDF, but not the joint friction. A motor that holds velocity 0 with at
+        most the friction force or torque acts as Coulomb friction.
         """
         info = self.pb.getJointInfo(self.body_id, index)
         kind, friction = info[2], info[7]

@@ -18,11 +18,11 @@ from .shape_object import ShapeObject
 
 PLANE_SIZE_M = 40.0
 PLANE_THICKNESS_M = 0.001
-"""Thickness of the box that shows an infinite plane, just below its surface [m]."""
+"""Thickness of the box that shows an infinite plane [m]; the top of the box is the plane."""
 
 
 class ShapeKind(enum.Enum):
-    """Kind of a shape."""
+    """Kind of a visual shape, which decides the meaning of the fields of `BodyShape`."""
 
     BOX = enum.auto()
     SPHERE = enum.auto()
@@ -36,14 +36,14 @@ class BodyShape(NamedTuple):
 
     Attributes:
         link_index: PyBullet's index of the link, -1 for the root.
-        link: Its name.
-        kind: Its kind; a cylinder stands along z.
-        size: Extents along x, y and z [m]; factors on what MESH and TRIANGLES have.
-        pose_in_link: Its pose in the link's URDF frame.
+        link: Name of the link.
+        kind: Kind of the shape; the axis of a cylinder is z.
+        size: Extents along x, y and z [m]; for MESH and TRIANGLES, scale factors along x, y and z.
+        pose_in_link: Pose of the shape in the link's URDF frame.
         rgba: Colour and opacity, each from 0 to 1.
-        mesh_file: File of a MESH.
-        is_textured: Whether a MESH has a picture on it, which its colour is multiplied with.
-        corners: Corners of TRIANGLES, three for each [m].
+        mesh_file: Mesh file of a MESH.
+        is_textured: Whether a MESH has a texture, whose colours are multiplied with `rgba`.
+        corners: Corners of TRIANGLES [m], three for each triangle.
     """
 
     link_index: int
@@ -58,26 +58,30 @@ class BodyShape(NamedTuple):
 
 
 def body_shapes(body: Body) -> list[BodyShape]:
-    """Returns the visual shapes of a body; a capsule is a cylinder and two spheres, a soft body has none that stays.
+    """Returns the visual shapes of a body; for a soft body, an empty list, since its surface changes.
 
-    PyBullet returns their poses in the URDF frames of the links, unlike those of the links themselves. Only the
-    simulation thread may call it.
+    A capsule is returned as a cylinder and two spheres. PyBullet gives the poses of visual shapes in the URDF frame of
+    their link, not in its inertial frame. Only the simulation thread may call this function.
     """
     if body.is_soft:
-        return []  # it reports its surface itself
+        return []  # its surface has a sensor of its own
     rows = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
     return [part for data in rows for part in _parts(body, data)]
 
 
 def link_pose(body: Body, link_index: int) -> Pose:
-    """Returns the pose of a link's URDF frame in the world, -1 the root; only the simulation thread may ask."""
+    """Returns the pose of a link's URDF frame in the world; only the simulation thread may call this function.
+
+    Args:
+        link_index: PyBullet's index of the link, -1 for the root.
+    """
     if link_index == -1:
         return body.base_pose()
     return Pose(*body.pb.getLinkState(body.body_id, link_index, computeForwardKinematics=1)[4:6])
 
 
 def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
-    """Returns the shapes in a row of PyBullet's visual shapes."""
+    """Converts a row of PyBullet's `getVisualShapeData` to shapes."""
     _, index, kind, size, file, position, quat, rgba, texture = data
     link, frame = body.link_name(index), Pose(position, quat)
     visual = body.visual if isinstance(body, ShapeObject) else None  # from the object's own file
@@ -114,7 +118,10 @@ def _cube(edge_m: float) -> Vector:
 
 
 def turned_to(normal: Vector) -> Quaternion:
-    """Returns the shortest rotation that turns z to a direction: about their cross product, `1 + cos` as its w."""
+    """Returns the quaternion of the shortest rotation that turns the z axis to a given direction.
+
+    Before normalisation, its vector part is the cross product of both directions, and its w is `1 + cos(angle)`.
+    """
     length = math.hypot(*normal)
     x, y, z = (component / length for component in normal)
     if z < -1.0 + 1e-9:
@@ -124,9 +131,10 @@ def turned_to(normal: Vector) -> Quaternion:
 
 
 def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
-    """Returns the TF frame of a link from this node, such as `rpbi/NAME/LINK`; None if there is none.
+    """Returns the name of a link's TF frame, such as `rpbi/NAME/LINK`; None if this node publishes no link frames.
 
-    A robot with the root link alone on TF leaves the others to robot_state_publisher: they are assumed to exist.
+    If this node publishes only the root link of a robot, the frames of the other links are expected to come from
+    robot_state_publisher.
     """
     for sensor in sensors:
         if isinstance(sensor, LinkPoseSensor):
@@ -138,7 +146,7 @@ def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
 
 
 def followed_frame(body: Body) -> str | None:
-    """Returns the frame that the whole body follows, None if it follows none or moves by itself as well."""
+    """Returns the TF frame that a body of one shape follows; None if it follows none, or physics moves it as well."""
     if body.object_tf is None or not isinstance(body, ShapeObject) or isinstance(body.pose_follower, TrackedBase):
         return None
     return body.object_tf.tf_id

@@ -1,4 +1,4 @@
-"""Parts of actions: numbers in [-1, 1] that move joints or a hand within their limits."""
+"""Parts of actions: numbers in [-1, 1] that move joints or a link within limits."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from .parts import link_index, robot_of
 Values = npt.NDArray[np.float64]
 
 DAMPING = 1e-4 * np.eye(6)
-"""Damping of the inverse of the Jacobian [m^2]: near singular configurations the hand is slower than asked."""
+"""Damping of the Jacobian's inverse [m^2]: near singular configurations, the hand moves more slowly than commanded."""
 
 
 class ActionPart(Protocol):
-    """Some of the numbers of an action.
+    """A part of an action: consecutive numbers of the action's array.
 
     Attributes:
-        size: Their count.
+        size: Number of values that belong to the part.
     """
 
     size: int
 
     def reset(self) -> None:
-        """Starts from the present state of the world, which was just reset."""
+        """Takes the present state of the world, which was just reset, as the start of an episode."""
 
     def apply(self, values: Values) -> None:
-        """Acts by numbers in [-1, 1]."""
+        """Applies the values of the part, in [-1, 1], shape (size,)."""
 
 
 class JointAction:
-    """Moves joints of a robot: -1 to 1 is the share of their largest change in the time of an action.
+    """Moves joint targets of a robot: each value is a share, from -1 to 1, of the joint's largest change per action.
 
     Args:
-        joints: Their names; all that have motors by default.
-        speed: Largest speed, as a share of the velocity limits of the URDF.
-        period_s: Time of an action [s].
+        joints: Names of the joints that move; by default all joints with motors.
+        speed: Largest speed, as a share of the URDF's velocity limits.
+        period_s: Duration of an action [s].
     """
 
     def __init__(self, world: World, robot: str, joints: Sequence[str], speed: float, period_s: float) -> None:
@@ -60,28 +60,28 @@ class JointAction:
         self.size = len(chosen)
 
     def reset(self) -> None:
-        """Begins at the present positions."""
+        """Sets the targets to the present joint positions."""
         positions = robot_of(self._world, self._robot).joint_positions()
         self._targets = np.array([positions[index] for index in self._indices])
 
     def apply(self, values: Values) -> None:
-        """Moves the targets, which stay within the limits."""
+        """Moves the targets within the joint limits, and commands them."""
         self._targets = np.minimum(np.maximum(self._targets + values * self._steps, self._lower), self._upper)
         self._world.put(self._slot, JointCommand(self._names, position=self._targets.tolist()))
 
 
 class PoseAction:
-    """Moves the target of a controller of a link, by translations along and rotations about x, y and z of the world.
+    """Moves the target pose of a link's controller: translations along, then rotations about x, y and z of the world.
 
-    It starts at the controlled point. While the controller is not active, actions have no effect.
+    The target starts at the controlled point. While the controller is not active, actions have no effect.
 
     Args:
-        controller: The controller, as `ROBOT/CONTROLLER`; it has a `point` of the link, and its `target` is a pose.
-        link: The link.
-        low: Lower corner of the box that the target stays in [m].
-        high: Upper corner [m].
-        step: Largest change in an action along each axis [m].
-        turn: Largest change in an action about each axis [rad].
+        controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
+        link: Name of the controlled link.
+        low: Lower corner of the box that the target stays in, in the world [m].
+        high: Upper corner of that box [m].
+        step: Largest translation per action along each axis [m].
+        turn: Largest rotation per action about each axis [rad].
     """
 
     size = 6
@@ -103,14 +103,14 @@ class PoseAction:
         self._link, self._point = link_index(robot, link), Pose(config.point)
         self._low, self._high, self._step, self._turn = low, high, step, turn
         self.goal = Pose()
-        """Target of the point, in the world."""
+        """Target pose of the controlled point, in the world."""
 
     def reset(self) -> None:
-        """Begins at the present pose."""
+        """Sets the target to the present pose of the controlled point."""
         self.goal = robot_of(self._world, self._robot).link_pose(self._link) @ self._point
 
     def apply(self, values: Values) -> None:
-        """Moves the target, which stays in the box."""
+        """Moves the target within the box; while the controller is not active, resets the target."""
         if not robot_of(self._world, self._robot).controllers.is_active(self._controller):
             self.reset()
             return
@@ -122,14 +122,15 @@ class PoseAction:
 
 
 class HandAction:
-    """Moves a link of a robot in the axes of the world, and keeps its orientation.
+    """Moves a robot's link along axes of the world, and keeps the link's orientation.
 
     Args:
-        link: The link; its URDF frame moves.
-        axes: Axes along which it is moved, such as `xy`; along the others it stays where it began.
-        low: Lower corner of the box that it stays in [m].
-        high: Upper corner [m].
-        step: Largest translation of an action along each axis [m].
+        link: Name of the link, whose URDF frame moves.
+        axes: Axes along which the link moves, such as `xy`; along the remaining axes, the link keeps its start
+            position.
+        low: Lower corner of the box that the link's target stays in, in the world [m].
+        high: Upper corner of that box [m].
+        step: Largest translation per action along each axis [m].
     """
 
     def __init__(
@@ -152,16 +153,16 @@ class HandAction:
         self._names = [joint.name for joint, moves in zip(driven, self._moves) if moves]
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in driven]).T
         self.goal = [0.0, 0.0, 0.0]
-        """Target of the link [m]."""
+        """Target position of the link, in the world [m]."""
         self.size = len(axes)
 
     def reset(self) -> None:
-        """Begins at the present pose."""
+        """Takes the present pose of the link as start and target."""
         self._start = robot_of(self._world, self._robot).link_pose(self._link)
         self.goal = list(self._start.position)
 
     def apply(self, values: Values) -> None:
-        """Moves the goal, and the joints towards it by the damped inverse of the Jacobian."""
+        """Moves the target, and the joints towards the target with a damped inverse of the Jacobian."""
         for axis, value in zip(self._axes, values.tolist()):
             self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])
         robot = robot_of(self._world, self._robot)
@@ -175,7 +176,7 @@ class HandAction:
         self._world.put(self._slot, JointCommand(self._names, position=targets.tolist()))
 
     def _columns(self) -> npt.NDArray[np.bool_]:
-        """Returns which driven joints move the link."""
+        """Returns, for each driven joint, whether it moves the link."""
         robot = robot_of(self._world, self._robot)
         positions = [state[0] for state in robot.drive.measured().values()]
         moves: npt.NDArray[np.bool_] = robot.robot_model.jacobian(robot.base_pose(), positions, self._link).any(axis=0)
@@ -183,11 +184,11 @@ class HandAction:
 
 
 class GripperAction:
-    """Opens (1) and closes (-1) fingers: a number is the velocity of all of them, as a share of their largest change.
+    """Opens (1) or closes (-1) the fingers of a gripper: one value, the share of the largest change of their target.
 
     Args:
-        joints: Joints of the fingers, whose targets are the same.
-        step: Largest change of an action [m or rad].
+        joints: Finger joints, which all get the same target.
+        step: Largest change of the target per action [m or rad].
     """
 
     size = 1
@@ -200,10 +201,10 @@ class GripperAction:
         self._target = 0.0
 
     def reset(self) -> None:
-        """Begins at the present opening."""
+        """Sets the target to the present position of the first finger joint."""
         self._target = robot_of(self._world, self._robot).joint_positions()[self._index]
 
     def apply(self, values: Values) -> None:
-        """Moves the target, which stays within the limits."""
+        """Moves the target within the limits of the first finger joint, and commands it to all fingers."""
         self._target = min(max(self._target + self._step * float(values[0]), self._lower), self._upper)
         self._world.put(self._slot, JointCommand(self._names, position=(self._target,) * len(self._names)))

@@ -1,4 +1,4 @@
-"""Calls of tasks with checked results: a task of another package may fail, or return invalid values."""
+"""Calls to tasks, with checks of their results: a task from another package may fail or return invalid values."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ from .task import WorldTask
 
 
 class CheckedTask:
-    """A task; an error of one from another package becomes a PluginError that names class, method and action.
+    """Wraps a task and checks the values that it returns.
+
+    An error of a task from another package becomes a PluginError that names class, method and action.
 
     Args:
-        task: The task.
+        task: The wrapped task.
 
     Raises:
-        PluginError: By all methods.
+        PluginError: From all methods, if a task from another package fails or returns an invalid value.
     """
 
     def __init__(self, task: WorldTask) -> None:
         self.task = task
         self.count = 0
-        """Number of actions in the episode."""
+        """Number of actions in the episode so far."""
         self._checks_space = is_foreign(task) or type(task).observation is not WorldTask.observation
         self.action_space = self._call("action_space", lambda: _space(task.action_space))
         self.observation_space = self._call("observation_space", lambda: _space(task.observation_space))
@@ -40,7 +42,7 @@ class CheckedTask:
         self._call("reset", self.task.reset, random)
 
     def act(self, action: Any) -> None:
-        """Acts in the world."""
+        """Applies an action to the world."""
         self._call("act", self.task.act, action)
 
     @property
@@ -54,11 +56,11 @@ class CheckedTask:
         return type(self.task).has_ended is not WorldTask.has_ended
 
     def after_tick(self) -> None:
-        """Calls the task after a tick."""
+        """Lets the task evaluate the last tick."""
         self._call("after_tick", self.task.after_tick)
 
     def observation(self) -> Any:
-        """Returns the present observation, which is in its space."""
+        """Returns the present observation, which is in the observation space."""
         return self._call("observation", self._observation)
 
     def reward(self) -> float:
@@ -103,7 +105,7 @@ class CheckedTask:
 
 
 def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> list[str]:
-    """Returns where a value is not in a space: key, expected and got."""
+    """Returns a message for each entry of a value that is not in a space: key, expected and actual value."""
     if isinstance(space, spaces.Dict):
         if not isinstance(value, dict) or value.keys() != space.spaces.keys():
             got = sorted(value) if isinstance(value, dict) else type(value).__name__
@@ -115,10 +117,11 @@ def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> 
 
 
 def check_action(space: spaces.Space[Any], action: Any, key: str = "action") -> None:
-    """Checks an action, before anything acts. Numbers beyond the bounds of a box are allowed, since tasks clip them.
+    """Checks that an action fits an action space; numbers beyond the bounds of a box are allowed, since tasks clip
+    them.
 
     Raises:
-        ValueError: If its type or shape is not that of the space, or a number in it is not finite.
+        ValueError: If the type or shape of the action does not fit the space, or a number in the action is not finite.
     """
     if isinstance(space, spaces.Dict) and isinstance(action, Mapping) and action.keys() == space.spaces.keys():
         for name, one in space.spaces.items():

@@ -33,24 +33,25 @@ ARGUMENTS = ("world", "task", "randomization", "cameras", "render_mode")
 
 
 class WorldEnv(gymnasium.Env[Any, Any]):
-    """A world in which a task is to be done.
+    """A Gymnasium environment: a world, and a task to be done in it.
 
     Args:
         world: Main YAML file of the world.
-        task: The task: a YAML file or a mapping with its `type` and options, a name of `TASKS`, `module:Class`, or a
+        task: A YAML file or a mapping with the task's `type` and options, a name in `TASKS`, `module:Class`, or a
             class.
         randomization: YAML file, or mapping, of what varies from episode to episode; nothing by default.
-        cameras: Cameras of the world whose images are in observations.
+        cameras: Names of the world's cameras whose images are part of observations.
         render_mode: `rgb_array` for images of the world's first camera, `human` for PyBullet's window.
 
     Attributes:
-        world: The world; with full access.
-        task: The task.
+        world: The simulated world, for direct access.
+        task: The task object.
 
     Raises:
-        ConfigError: If a file is wrong; it lists all problems.
-        PluginError: If a task of another package fails.
+        ConfigError: If a file is not valid; the error lists all problems.
+        PluginError: If a task from another package fails.
         UnknownNameError: If there is no such task, camera or argument.
+        ValueError: If the render mode is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES)}
@@ -87,14 +88,14 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         self._step = self._watched_step if self._task.watches else self.world.step
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Starts an episode; the same seed and actions lead to the same observations, to the last bit.
+        """Starts an episode; the same seed and actions lead to bit-identical observations.
 
         Args:
-            seed: Seed of all that is random from now on; without one, the random sequence continues.
-            options: None are known.
+            seed: Seed of all random numbers from now on; without a seed, the random sequence continues.
+            options: Not used.
 
         Returns:
-            The observation, and `is_success`.
+            The observation, and an information dictionary with `is_success`.
         """
         super().reset(seed=seed)
         self.world.reset(rebuild=False)
@@ -105,14 +106,15 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         return first, {"is_success": self._task.has_succeeded()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Acts for some ticks.
+        """Applies an action, and advances the world by the ticks of an action.
 
         Returns:
-            Observation, reward, whether the episode is over, whether all of its actions are used, and `is_success`.
+            Observation, reward, whether the episode is over, whether all of its actions are used, and an information
+            dictionary with `is_success`.
 
         Raises:
-            ValueError: If the action has another type or shape than the space, or a number that is not finite. Then
-                nothing has happened.
+            ValueError: If the type or shape of the action does not fit the action space, or a number in the action is
+                not finite. The world is then unchanged.
         """
         if action is not None or self.task.needs_action:
             check_action(self.action_space, action)
@@ -128,12 +130,13 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     def render(self) -> Image | None:
         """Returns the image of the world's first camera, uint8, shape (height, width, 3).
 
-        With PyBullet's window it waits until the time of an action has passed since the last call, and returns nothing.
+        With PyBullet's window, waits instead until the duration of an action has passed since the last call, and
+        returns None.
         """
         return self._views.render()
 
     def close(self) -> None:
-        """Ends the world."""
+        """Closes the renderer and the world."""
         self._views.close()
         self.world.close()
 
@@ -154,7 +157,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
 
 
 def require_arguments(given: Iterable[str], further: Iterable[str] = ()) -> None:
-    """Raises an UnknownNameError if a name is none of ARGUMENTS and of further ones."""
+    """Raises an UnknownNameError if a name is neither in ARGUMENTS nor in `further`."""
     known = [*ARGUMENTS, *further]
     for name in given:
         if name not in known:
@@ -165,9 +168,9 @@ def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) ->
     """Makes a task for a world, see `WorldEnv`.
 
     Raises:
-        ConfigError: If its options are wrong or do not fit the world.
+        ConfigError: If the task's options are wrong or do not fit the world.
         UnknownNameError: If there is no such task.
-        PluginError: If its class is of another package and fails.
+        PluginError: If the task's class is from another package and fails.
     """
     file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"
     if isinstance(given, type):
@@ -190,21 +193,21 @@ def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) ->
 class DelayLine:
     """Runs the ticks of an action, with delayed actions and delayed observations.
 
-    An observation with delay d is made d ticks before the end of an action; before the episode, it is that of its
-    start.
+    An observation with delay d is made d ticks before the end of an action. If that is before the start of the episode,
+    the first observation is used instead.
 
     Args:
-        ticks: Ticks of an action.
-        observation_ticks: Age of observations.
-        action_ticks: Time until an action begins to act.
-        first: The observation of the start.
+        ticks: Number of ticks per action.
+        observation_ticks: Age of observations [ticks].
+        action_ticks: Delay until an action takes effect [ticks].
+        first: Observation at the start of the episode.
     """
 
     def __init__(self, ticks: int, observation_ticks: int, action_ticks: int, first: Any) -> None:
         self._ticks, self._action_ticks = ticks, action_ticks
         self._has_delay = bool(observation_ticks or action_ticks)
         self._observed_at = (-observation_ticks) % ticks or ticks
-        """Tick of each action, counted from 1, after which an observation is made."""
+        """Tick within each action, counted from 1, after which an observation is made."""
         self._observations = deque(deepcopy(first) for _ in range(observation_ticks // ticks))
         self._actions: deque[tuple[int, Any]] = deque()
         self._tick = 0
@@ -213,9 +216,9 @@ class DelayLine:
         """Runs one action, and returns the observation that is due at its end.
 
         Args:
-            action: The action.
-            act: Applies an action.
-            step: Advances by a tick.
+            action: New action, which is applied after its delay.
+            act: Applies an action to the world.
+            step: Advances the world by one tick.
             observe: Returns the present observation.
         """
         if not self._has_delay:
@@ -236,16 +239,16 @@ class DelayLine:
 
 
 def register(name: str, world: str, task: Any, **options: Any) -> None:
-    """Registers an environment, so that `gymnasium.make` and `gymnasium.make_vec` make it.
+    """Registers an environment, so that `gymnasium.make` and `gymnasium.make_vec` can make it.
 
     Args:
-        name: Its id, such as `rpbi/Reach-v0`.
+        name: Id of the environment, such as `rpbi/Reach-v0`.
         world: Main YAML file of the world.
         task: The task, see `WorldEnv`.
-        options: Further options of `WorldEnv`; those of `gymnasium.make` override them.
+        options: Further arguments of `WorldEnv`; arguments given to `gymnasium.make` override them.
 
     Raises:
-        UnknownNameError: If there is no such option.
+        UnknownNameError: If an option is not an argument of `WorldEnv`.
     """
     require_arguments(options)
     gymnasium.register(

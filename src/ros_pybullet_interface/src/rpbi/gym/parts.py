@@ -1,4 +1,4 @@
-"""Parts of observations: numbers read from a world, with bounds from its robots, sensors and limits."""
+"""Parts of observations: numbers read from a world, each with a lower and an upper bound."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ except ImportError:
 Observation = dict[str, npt.NDArray[np.float32]]
 
 FARTHEST = 1e3
-"""Bound of a position [rad or m] or velocity [rad/s or m/s] that the URDF does not limit; values are clipped to it."""
+"""Largest bound of joint positions [rad or m] and velocities [rad/s or m/s], also without a limit in the URDF."""
 LARGEST_FORCE_N, LARGEST_TORQUE_NM = 1e3, 1e2
-"""Bounds of measured forces and torques; larger ones are clipped."""
+"""Bounds of measured forces and torques; larger values are clipped."""
 
 
 class ObservationPart(NamedTuple):
     """An entry of an observation.
 
     Attributes:
-        name: Its key.
-        low: Lower bound of each of its n numbers.
-        high: Upper bound of each.
+        name: Key of the entry.
+        low: Lower bounds of the n numbers.
+        high: Upper bounds of the n numbers.
         read: Returns the n numbers.
     """
 
@@ -49,7 +49,7 @@ class Parts:
     """All parts of an observation, read together.
 
     Attributes:
-        space: A dictionary of boxes, float32.
+        space: Space of the observation: a dictionary of float32 boxes.
     """
 
     def __init__(self, parts: Sequence[ObservationPart]) -> None:
@@ -66,7 +66,7 @@ class Parts:
         """Returns the present observation, clipped to its space.
 
         Raises:
-            PhysicsError: If a number is not finite any more.
+            PhysicsError: If a number is not finite.
         """
         numbers = np.array([each for part in self._parts for each in part.read()])
         if not math.isfinite(numbers.sum()):
@@ -77,7 +77,7 @@ class Parts:
 
 
 def joint_part(world: World, robot: str) -> ObservationPart:
-    """Returns positions [rad or m], then velocities [rad/s or m/s] of a robot's driven joints, within their limits."""
+    """Returns the part for a robot's driven joints: positions [rad or m], then velocities [rad/s or m/s]."""
     joints = robot_of(world, robot).model.driven
     indices = [joint.index for joint in joints]
     speeds = [min(joint.max_velocity, FARTHEST) for joint in joints]
@@ -93,7 +93,7 @@ def joint_part(world: World, robot: str) -> ObservationPart:
 
 
 def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
-    """Yields force [N] and torque [N m] of each force-torque sensor of a robot; 0 before its first measurement."""
+    """Yields a part for each force-torque sensor of a robot: force [N], then torque [N m]; 0 before a measurement."""
     high = (LARGEST_FORCE_N,) * 3 + (LARGEST_TORQUE_NM,) * 3
 
     def read(number: int) -> Sequence[float]:
@@ -105,7 +105,7 @@ def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
 
 
 def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> ObservationPart:
-    """Returns the pose of a body's base in the world: position [m] within bounds, then quaternion x, y, z, w."""
+    """Returns the part for a body's base pose in the world: position [m] within bounds, then quaternion x, y, z, w."""
 
     def read() -> Sequence[float]:
         position, quat = world.bodies[name].base_pose()
@@ -115,10 +115,10 @@ def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[floa
 
 
 def robot_of(world: World, name: str) -> Robot:
-    """Returns a robot with motors.
+    """Returns the robot with motors of a given name.
 
     Raises:
-        UnknownNameError: If the world has none of that name.
+        UnknownNameError: If the world has no such robot.
     """
     found = world.bodies.get(name)
     if not isinstance(found, Robot):

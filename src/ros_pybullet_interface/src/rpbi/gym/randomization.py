@@ -1,4 +1,4 @@
-"""Random variation of a world from episode to episode, by YAML."""
+"""Random variation of a world from episode to episode, configured in YAML."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PositiveRange = Annotated[
 
 
 class DynamicsVariation(ConfigModel):
-    """Dynamics of a body or a link; each number is uniform in its range, with the same value for an episode."""
+    """Random dynamics of a body or a link; each number is drawn uniformly from its range once per episode."""
 
     object: Text = Field(description="`NAME`, or `NAME/LINK` for one of its links.")
     mass: PositiveRange | None = Field(None, description="Mass [kg].")
@@ -45,7 +45,7 @@ class DynamicsVariation(ConfigModel):
     jointDamping: PositiveRange | None = Field(None, description="Damping of the joint.")
 
     def apply(self, world: World, random: np.random.Generator) -> None:
-        """Changes the dynamics."""
+        """Sets the dynamics to random values."""
         ranges = {key: each for key in type(self).model_fields if key != "object" and (each := getattr(self, key))}
         values = {key: float(random.uniform(*each)) for key, each in ranges.items()}
         if "mass_factor" in values:
@@ -54,7 +54,7 @@ class DynamicsVariation(ConfigModel):
 
 
 class PoseVariation(ConfigModel):
-    """Start pose of a body, by offsets from the configured one."""
+    """Random start pose of a body: offsets from the configured pose."""
 
     object: Name = Field(description="The body.")
     position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
@@ -70,7 +70,7 @@ class PoseVariation(ConfigModel):
 
 
 class JointVariation(ConfigModel):
-    """Start positions of a robot's driven joints, by offsets from the configured ones, within their limits."""
+    """Random start positions of a robot's driven joints: offsets from the configured positions, within the limits."""
 
     robot: Name = Field(description="The robot.")
     offset: Annotated[NonNegative, Unit("rad or m")] = Field(description="Largest offset, either way.")
@@ -87,14 +87,14 @@ class JointVariation(ConfigModel):
 
 
 class CameraVariation(ConfigModel):
-    """Pose of a camera, by offsets from the one that it had at first."""
+    """Random pose of a camera: offsets from the camera's first pose."""
 
     camera: Name = Field(description="The camera.")
     position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
     rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn, about a random axis.")
 
     def drawn(self, pose: Pose, random: np.random.Generator) -> Pose:
-        """Returns a pose near another one."""
+        """Returns a random pose near a given pose."""
         offset, angle = random.uniform(-1.0, 1.0, 3) * self.position, random.uniform(-self.rotation, self.rotation)
         axis = random.normal(size=3)
         axis *= math.sin(angle / 2) / np.linalg.norm(axis)
@@ -104,13 +104,13 @@ class CameraVariation(ConfigModel):
 
 
 class Delays(ConfigModel):
-    """Delays, rounded to ticks; each is uniform in its range, with the same value for an episode."""
+    """Random delays, rounded to ticks; each is drawn uniformly from its range once per episode."""
 
     observation_s: PositiveRange = Field((0.0, 0.0), description="Age of observations [s].")
     action_s: PositiveRange = Field((0.0, 0.0), description="Time until an action begins to act [s].")
 
     def drawn(self, random: np.random.Generator, tick_s: float) -> tuple[int, int]:
-        """Returns the delays of observations and actions [ticks]."""
+        """Draws the delays of observations and of actions [ticks]."""
         observation_s, action_s = (random.uniform(*each) for each in (self.observation_s, self.action_s))
         return round(observation_s / tick_s), round(action_s / tick_s)
 
@@ -126,10 +126,10 @@ class Randomization(ConfigModel):
 
     @classmethod
     def read(cls, given: str | Mapping[str, Any] | None) -> Randomization:
-        """Returns the variation that a YAML file, or a mapping of its keys, describes; none without one.
+        """Reads the variation from a YAML file or from a mapping of its keys; None means that nothing varies.
 
         Raises:
-            ConfigError: If something in it is wrong.
+            ConfigError: If a key or value is not valid.
         """
         if given is None:
             return cls()
@@ -139,15 +139,15 @@ class Randomization(ConfigModel):
 
 
 class Randomizer:
-    """Varies a world.
+    """Varies a world from episode to episode.
 
     Args:
         world: The world, before its first tick.
-        config: The variation.
-        file: Its file, for messages.
+        config: What varies, and how much.
+        file: File of the configuration, for messages.
 
     Raises:
-        ConfigError: If something that it names is not in the world, or it cannot be varied in that way.
+        ConfigError: If a configured object is not in the world, or cannot be varied as configured.
     """
 
     def __init__(self, world: World, config: Randomization, file: str) -> None:

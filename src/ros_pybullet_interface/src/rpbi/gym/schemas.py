@@ -26,5 +26,5 @@ def _of_task(name: str, schema: Schema) -> Schema:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file of a workspace."""
+    """Returns the text of each schema file of a workspace, indexed by path."""
     return schema_texts(root / "src/ros_pybullet_interface/schema", schemas())

@@ -21,10 +21,10 @@ ALIGNMENT = 64
 
 
 def leaves(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], spaces.Box]]:
-    """Yields the boxes of a space of observations, with their keys.
+    """Yields each box of an observation space, preceded by the dictionary keys that lead to it.
 
     Raises:
-        InterfaceError: If it is neither a box nor a dictionary of such.
+        InterfaceError: If the space contains anything but boxes and dictionaries.
     """
     if isinstance(space, spaces.Dict):
         for key, inner in space.spaces.items():
@@ -36,16 +36,16 @@ def leaves(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 class SharedArrays:
-    """The results of n environments in memory that processes share: observations, rewards and ends.
+    """The results of n environments in memory that processes share: observations, rewards and ends of episodes.
 
     Args:
         space: Space of the observations of one environment.
         count: Number n of environments.
-        file: File descriptor of the memory, which belongs to this object then; it is made without one.
+        file: File descriptor of the memory, which this object then owns; by default, new memory is allocated.
 
     Attributes:
         file: File descriptor of the memory.
-        observations: Arrays of all environments, shape (n, ...), by the keys of each box.
+        observations: Array of each box for all environments, shape (n, ...), indexed by the keys that lead to the box.
         rewards: Shape (n,), float64.
         terminations: Shape (n,), bool.
         truncations: Shape (n,), bool.
@@ -66,7 +66,7 @@ class SharedArrays:
         self.terminations, self.truncations = self._array((count,), np.bool_), self._array((count,), np.bool_)
 
     def write(self, index: int, observation: Any) -> None:
-        """Stores the observation of an environment."""
+        """Stores the observation of one environment."""
         for path, array in self.observations.items():
             value = observation
             for key in path:
@@ -74,7 +74,7 @@ class SharedArrays:
             array[index] = value
 
     def read(self) -> Any:
-        """Returns copies of the observations of all environments, as a space of n of them has them."""
+        """Returns copies of the observations of all environments, with the structure of the batched space."""
         nested: dict[str, Any] = {}
         for path, array in self.observations.items():
             if not path:

@@ -20,7 +20,7 @@ from .parts import ObservationPart, Parts, joint_part, sensor_parts
 
 
 class WorldTaskConfig(ConfigModel):
-    """Keys of every task."""
+    """Options of every task."""
 
     action_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="Ticks of the world in an action.")
     max_actions: Annotated[int, Field(ge=1, le=10_000_000)] = Field(
@@ -31,27 +31,27 @@ class WorldTaskConfig(ConfigModel):
 class WorldTask(ABC):
     """A task in a world: observation, action, reward, end and success.
 
-    A new one is a subclass with a `Config`, `actions`, `reward` and `has_succeeded`; the rest may stay as it is. Bodies
-    are looked up in the world each time, since a reset may make them anew.
+    A new task is a subclass with a `Config`, `actions`, `reward` and `has_succeeded`; the other members have defaults.
+    Look up bodies in the world each time they are needed, since a reset may recreate them.
 
     Args:
         world: The world, before its first tick.
-        config: Its options.
+        config: Options of the task.
 
     Raises:
-        ConfigError, UnknownNameError or ValueError: If they do not fit the world.
+        ConfigError, UnknownNameError or ValueError: If the options do not fit the world.
     """
 
     Config: ClassVar[type[WorldTaskConfig]] = WorldTaskConfig
     needs_action: ClassVar[bool] = True
-    """Whether every step needs an action of the action space. Otherwise `act` may get None, too."""
+    """Whether every step needs an action from the action space; otherwise the action may also be None."""
 
     def __init__(self, world: World, config: Any) -> None:
         self.world, self.config = world, config
 
     @property
     def period_s(self) -> float:
-        """Time of an action [s]."""
+        """Duration of an action [s]."""
         return float(self.config.action_ticks * self.world.clock.dt_s)
 
     # --- Spaces
@@ -61,7 +61,7 @@ class WorldTask(ABC):
         """Returns the parts of an action, in their order."""
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of an observation: joints and force-torque sensors of all robots, and what others add."""
+        """Yields the parts of an observation: by default joints and force-torque sensors of all robots."""
         for name, body in self.world.bodies.items():
             if isinstance(body, Robot):
                 yield joint_part(self.world, name)
@@ -82,22 +82,24 @@ class WorldTask(ABC):
 
     @cached_property
     def observation_space(self) -> spaces.Space[Any]:
-        """Space of observations, without images: by default that of the parts."""
+        """Space of observations, without images: by default the space of the parts."""
         return self._parts.space
 
     # --- An episode
 
     def reset(self, random: np.random.Generator) -> None:
-        """Prepares an episode in the world, which was just reset; calls this one last, after bodies were placed.
+        """Prepares an episode in the world, which was just reset.
+
+        A subclass calls this method last, after it has placed bodies.
 
         Args:
-            random: Source of all that is random.
+            random: Source of all random numbers.
         """
         for part in self._actions:
             part.reset()
 
     def act(self, action: Any) -> None:
-        """Acts in the world, by `world.put` and `world.act`, before the ticks of the action."""
+        """Applies an action with `world.put` and `world.act`, before the first tick of the action."""
         values = np.minimum(np.maximum(np.asarray(action, np.float64), -1.0), 1.0)
         begin = 0
         for part in self._actions:
@@ -105,7 +107,7 @@ class WorldTask(ABC):
             begin += part.size
 
     def after_tick(self) -> None:  # noqa: B027 (most tasks need nothing)
-        """Notes what happened in a tick."""
+        """Evaluates the last tick, if the task needs every tick."""
 
     def observation(self) -> Any:
         """Returns the present observation."""
@@ -113,11 +115,11 @@ class WorldTask(ABC):
 
     @abstractmethod
     def reward(self) -> float:
-        """Returns the reward of the last action, in the present state; it is asked once for each action."""
+        """Returns the reward of the last action, from the present state; called once per action."""
 
     @abstractmethod
     def has_succeeded(self) -> bool:
-        """Returns whether the task is done, from the state of the simulation, never from the reward."""
+        """Returns whether the task is done, judged from the simulation state, never from the reward."""
 
     def has_ended(self) -> bool:
         """Returns whether the episode is over: by default when the task is done."""

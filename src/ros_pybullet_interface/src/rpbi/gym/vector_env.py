@@ -33,13 +33,13 @@ Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[
 
 
 class WorldVectorEnv(VectorEnv[Any, Any, Any]):
-    """Environments in processes of their own, several in each; a step of all is one request to each process.
+    """Environments in worker processes, one or more in each; a step of all is one request to each process.
 
-    Processes are started anew, not forked, so scripts need no `if __name__ == "__main__"`, and this process may have
-    threads. Observations come by shared memory.
+    Processes are started anew, not forked, so scripts need no `if __name__ == "__main__"`, and the calling process may
+    have threads. Observations come through shared memory.
 
     Args:
-        makers: A function for each environment, which makes it; those of a script may be lambdas.
+        makers: Functions that make one environment each; lambdas of a script are allowed.
         workers: Number of processes; by default one for each processor, at most one for each environment.
         autoreset_mode: When an environment whose episode has ended is reset, see docs/gym.md.
 
@@ -47,7 +47,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         workers: Number of processes.
 
     Raises:
-        InterfaceError: If spaces differ, observations are no boxes, or an environment cannot be made.
+        InterfaceError: If spaces differ, observations are not made of boxes, or an environment cannot be made.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         self._parts = [slice(*ends) for ends in _parts(self.num_envs, self.workers)]
         self._processes = [_Process(index) for index in range(self.workers)]
         processors = sorted(os.sched_getaffinity(0))
-        if self.workers == len(processors):  # else Linux may wake two on one, while another one idles
+        if self.workers == len(processors):  # else Linux may wake two on one processor while another idles
             for process, processor in zip(self._processes, processors):
                 process.stay_on(processor)
         try:
@@ -77,17 +77,18 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
             raise
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None) -> tuple[Any, Info]:
-        """Starts episodes.
+        """Starts episodes in all environments, or in the environments that a mask selects.
 
         Args:
-            seed: A seed for each environment; of a single number, each has it plus its index.
-            options: `reset_mask`, an array of a bool for each environment, resets only some; others go to each.
+            seed: A seed for each environment, or one number to which each environment's index is added.
+            options: `reset_mask`, bool, shape (n,), selects the environments to reset; other options are passed on.
 
         Returns:
-            Observations of all, and information of those that were reset.
+            Observations of all environments, and information from the environments that were reset.
 
         Raises:
-            ValueError: If there are more or fewer seeds than environments, or the mask does not fit.
+            ValueError: If there are more or fewer seeds than environments, or the mask is not n bools, one true at
+                least.
         """
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
         seeds = [None] * self.num_envs if seeds is None else list(seeds)
@@ -111,13 +112,13 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
             actions: Shape (n, ...).
 
         Returns:
-            Observations, rewards, ends, truncations, and information.
+            Observations, rewards, terminations, truncations, and information.
 
         Raises:
-            ValueError: If there are more or fewer actions than environments, or one is refused by `WorldEnv.step`. Then
-                nothing has happened.
-            PluginError: If a task of another package fails.
-            InterfaceError: If a process has ended.
+            ValueError: If there are more or fewer actions than environments, or an action does not fit its space; no
+                environment has then changed. Also if an episode has ended and autoreset is disabled.
+            PluginError: If a task from another package fails.
+            InterfaceError: If a worker process has ended.
         """
         each = actions if isinstance(actions, np.ndarray) else list(iterate(self.action_space, actions))
         if len(each) != self.num_envs:
@@ -140,7 +141,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call("render")
 
     def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
-        """Returns an attribute of each environment, or what it returns if it can be called."""
+        """Returns an attribute of each environment; a callable attribute is called and its result returned."""
         answers = self._ask_all("call", [(name, arguments, options)] * self.workers)
         return tuple(each for answer in answers for each in answer)
 
@@ -149,14 +150,14 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Sets an attribute of each environment, to a value for each in a list, or to one for all."""
+        """Sets an attribute of each environment: from a list with a value for each, or to a single value."""
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ValueError(f"expected {self.num_envs} values, got {len(each)}")
         self._ask_all("set", [(name, each[part]) for part in self._parts])
 
     def close_extras(self, **_: Any) -> None:
-        """Ends the processes."""
+        """Ends the worker processes and closes the shared memory."""
         for process in self._processes:
             process.close()
         if self._shared is not None:
@@ -190,7 +191,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return mask
 
     def _ask_all(self, name: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
-        """Returns the answers of all processes, which work at the same time; raises the first error."""
+        """Sends a request to each process, then returns all answers, or raises the first error among them."""
         requests = [request(name, *each) for each in arguments or [()] * self.workers]
         for process, each in zip(self._processes, requests):  # all requests first, so that no process starts late
             process.send(each)
@@ -202,7 +203,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
 
 
 class _Process:
-    """A worker process, from this side."""
+    """A worker process, as the calling process sees it."""
 
     def __init__(self, index: int) -> None:
         self._index = index
@@ -217,7 +218,7 @@ class _Process:
         self._connection: Connection = ours
 
     def stay_on(self, processor: int) -> None:
-        """Restricts it to one processor."""
+        """Restricts the process to one processor."""
         with suppress(ProcessLookupError):  # `answer` reports that it has ended
             os.sched_setaffinity(self._process.pid, {processor})
 
@@ -232,7 +233,7 @@ class _Process:
         os.set_blocking(self._connection.fileno(), True)  # a default timeout of sockets may have changed it
 
     def answer(self) -> tuple[bool, Any]:
-        """Returns whether a request succeeded, and its result or error."""
+        """Waits for the answer to a request, and returns whether the request succeeded, and its result or error."""
         try:
             is_good, answer = pickle.loads(self._connection.recv_bytes())
         except (EOFError, OSError) as error:
@@ -241,7 +242,7 @@ class _Process:
         return is_good, answer
 
     def receive(self) -> Any:
-        """Returns the result of a request, or raises its error."""
+        """Waits for the answer to a request, and returns the result or raises the error."""
         is_good, answer = self.answer()
         if not is_good:
             raise answer
@@ -257,13 +258,13 @@ class _Process:
 
 
 def request(name: str, *arguments: Any) -> bytes:
-    """Returns a request to a worker; those of steps hold arrays alone, so a faster way is enough for them."""
+    """Serializes a request to a worker; requests for steps only hold arrays, so the faster `pickle` is enough."""
     dumps = pickle.dumps if name == "step" else cloudpickle.dumps
     return dumps((name, arguments), pickle.HIGHEST_PROTOCOL)
 
 
 def _parts(count: int, workers: int) -> list[tuple[int, int]]:
-    """Returns the first and the last environment plus 1 of each worker, as evenly as possible."""
+    """Divides environments evenly among workers; returns each worker's first index, and its last index plus 1."""
     ends = [count * each // workers for each in range(workers + 1)]
     return list(zip(ends, ends[1:]))
 
@@ -275,10 +276,10 @@ def make_vector(
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     **options: Any,
 ) -> WorldVectorEnv:
-    """Makes a vector of equal environments, for `gymnasium.make_vec`; the options are those of `WorldEnv`.
+    """Makes a vector of equal environments, for `gymnasium.make_vec`; `options` are arguments of `WorldEnv`.
 
     Raises:
-        UnknownNameError: If there is no such option.
+        UnknownNameError: If an option is not an argument of `WorldEnv`.
     """
     require_arguments(options, ("workers", "autoreset_mode"))
     return WorldVectorEnv([partial(WorldEnv, **options)] * num_envs, workers, autoreset_mode)

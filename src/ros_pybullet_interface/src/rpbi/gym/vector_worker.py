@@ -28,12 +28,12 @@ class StepResult(NamedTuple):
     """Outcome of a step.
 
     Attributes:
-        observation: The observation that the next action is for.
-        reward: The reward.
+        observation: Observation before the next action.
+        reward: Reward of the action.
         terminated: Whether the episode is over.
-        truncated: Whether it was truncated.
+        truncated: Whether the episode was truncated.
         info: Further information.
-        final: With resets in the same step, the last observation and information of the episode that has ended.
+        final: In mode `SAME_STEP`, last observation and information of an episode that has just ended; otherwise None.
     """
 
     observation: Any
@@ -45,12 +45,12 @@ class StepResult(NamedTuple):
 
 
 class Slot:
-    """An environment that is reset when its episode has ended, by one of Gymnasium's three modes.
+    """An environment that is reset when its episode has ended, according to one of Gymnasium's three modes.
 
     Args:
         env: The environment.
-        mode: `NEXT_STEP` resets it instead of the next step, whose action is ignored; `SAME_STEP` in the step that ends
-            the episode; `DISABLED` leaves it to the caller.
+        mode: `NEXT_STEP` resets in place of the next step, whose action is ignored; `SAME_STEP` resets in the step that
+            ends the episode; `DISABLED` leaves resets to the caller.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], mode: AutoresetMode) -> None:
@@ -63,10 +63,10 @@ class Slot:
         return self.env.reset(seed=seed, options=options)
 
     def step(self, action: Any) -> StepResult:
-        """Takes a step or resets.
+        """Takes a step, or resets the environment as the mode requires.
 
         Raises:
-            ValueError: If the episode has ended and nobody has reset it.
+            ValueError: If the episode has ended, and in mode `DISABLED` the caller has not reset the environment.
         """
         if self._has_ended and self._mode is AutoresetMode.DISABLED:
             raise ValueError("the episode has ended: expected reset(options={'reset_mask': ...}) before the next step")
@@ -84,12 +84,12 @@ class Slot:
 
 
 class Worker:
-    """The environments of this process, which are some of n.
+    """The environments of this worker process, which are a part of all environments.
 
     Args:
-        makers: Functions that make them.
-        first: Index of the first one among all.
-        mode: When they are reset.
+        makers: Functions that make one environment each.
+        first: Index of this worker's first environment among all environments.
+        mode: When environments are reset, see `Slot`.
     """
 
     def __init__(self, makers: Sequence[Callable[[], Any]], first: int, mode: AutoresetMode) -> None:
@@ -98,7 +98,7 @@ class Worker:
         self._shared: SharedArrays | None = None
 
     def spaces(self) -> tuple[list[tuple[spaces.Space[Any], spaces.Space[Any]]], dict[str, Any], str | None]:
-        """Returns the spaces of observations and actions of each, metadata, and the way of rendering."""
+        """Returns observation and action space of each environment, and the first one's metadata and render mode."""
         env = self._slots[0].env
         each = [(slot.env.observation_space, slot.env.action_space) for slot in self._slots]
         return each, dict(env.metadata), env.render_mode
@@ -108,7 +108,7 @@ class Worker:
         self._shared = shared
 
     def reset(self, seeds: Sequence[int | None], mask: Sequence[bool], options: Info | None) -> list[Info | None]:
-        """Starts episodes where the mask is true, and returns the information of these."""
+        """Starts episodes where the mask is true; returns the information from each reset, None elsewhere."""
         assert self._shared is not None
         infos: list[Info | None] = []
         for index, (slot, seed, is_reset) in enumerate(zip(self._slots, seeds, mask), self._first):
@@ -121,7 +121,7 @@ class Worker:
         return infos
 
     def step(self, actions: Sequence[Any]) -> list[tuple[Info, Info | None]]:
-        """Takes a step with each, and returns information, with that of an episode that has ended."""
+        """Takes a step with each environment; returns `info` and `final` of each `StepResult`."""
         shared = self._shared
         assert shared is not None
         infos = []
@@ -134,25 +134,25 @@ class Worker:
         return infos
 
     def call(self, name: str, arguments: tuple[Any, ...], options: Mapping[str, Any]) -> list[Any]:
-        """Returns an attribute of each, or what it returns if it can be called."""
+        """Returns an attribute of each environment; a callable attribute is called and its result returned."""
         found = [slot.env.get_wrapper_attr(name) for slot in self._slots]
         return [each(*arguments, **options) if callable(each) else each for each in found]
 
     def set(self, name: str, values: Sequence[Any]) -> None:
-        """Sets an attribute of each."""
+        """Sets an attribute of each environment, from a value for each."""
         for slot, value in zip(self._slots, values):
             slot.env.set_wrapper_attr(name, value)
 
     def close(self) -> None:
-        """Closes all."""
+        """Closes all environments."""
         for slot in self._slots:
             slot.env.close()
 
 
 def main() -> None:
-    """Answers requests until the other end is closed."""
+    """Answers requests until the calling process closes the connection."""
     connection = Connection(int(sys.argv[1]))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that uses it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the calling process handles Ctrl-C
     worker: Worker | None = None
     while True:
         try:
@@ -180,11 +180,11 @@ def main() -> None:
 
 
 def as_sent(error: Exception) -> Exception:
-    """Returns an error that another process can read: itself, or an InterfaceError with its text."""
+    """Returns the given error if another process can unpickle it, otherwise an InterfaceError with its text."""
     try:
         if str(pickle.loads(pickle.dumps(error))) == str(error):
             return error
-    except Exception:  # whatever its class does
+    except Exception:  # the error's class may raise anything
         pass
     return InterfaceError(f"{type(error).__name__}: {error}")
 

@@ -23,7 +23,7 @@ class Views:
     Args:
         world: The world.
         names: Cameras whose images are in observations.
-        mode: Way of rendering: `rgb_array`, `human`, or None.
+        mode: Render mode: `rgb_array`, `human`, or None.
         period_s: Time between two renderings in a window [s].
 
     Attributes:
@@ -31,7 +31,7 @@ class Views:
             `CAMERA/depth` [m], float32, shape (height, width).
 
     Raises:
-        ConfigError: If images are asked for, and no camera has a pose.
+        ConfigError: If images are needed, and no camera has a pose.
         UnknownNameError: If the world has no such camera.
     """
 
@@ -52,7 +52,7 @@ class Views:
             self.spaces[f"{name}/depth"] = spaces.Box(0.0, float(intrinsics.range[1]), shape, np.float32)
 
     def read(self) -> dict[str, Image]:
-        """Returns the present images by name."""
+        """Returns the present images, indexed by the keys of `spaces`."""
         images: dict[str, Image] = {}
         for name in self._names:
             frame = self._drawn(name)
@@ -62,7 +62,7 @@ class Views:
     def render(self) -> Image | None:
         """Returns what the first camera of the world sees, uint8, shape (height, width, 3).
 
-        With a window, it waits until the time since the last call has passed, and returns nothing.
+        With a window, waits instead until `period_s` has passed since the last call, and returns None.
         """
         if self._mode == "rgb_array":
             colour: Image = self._drawn("").colour
@@ -73,7 +73,7 @@ class Views:
         return None
 
     def close(self) -> None:
-        """Ends the renderer, if there is one."""
+        """Closes the renderer, if there is one."""
         if self._images is not None:
             self._images.close()
             self._images = None

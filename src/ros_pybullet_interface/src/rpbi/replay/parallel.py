@@ -1,4 +1,6 @@
-"""Work on recordings in forks of this process: parts by several at once, or the whole with limited processor time."""
+"""Work on recordings in forks of this process: several parts at once, or a whole recording with limited
+processor time.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ Result = TypeVar("Result")
 
 
 def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[RecordedPart]]:
-    """Returns parts in at most `jobs` groups of neighbours of about the same size."""
+    """Splits parts into at most `jobs` groups of consecutive parts, with about the same number of parts in
+    each group.
+    """
     count = max(1, min(jobs, len(parts)))
     bounds = [len(parts) * index // count for index in range(count + 1)]
     return [parts[begin:end] for begin, end in zip(bounds, bounds[1:])]
@@ -27,16 +31,19 @@ def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[Recorde
 def in_forks(
     work: Callable[[Sequence[RecordedPart]], Result], groups: Sequence[Sequence[RecordedPart]], cpu_s: int | None = None
 ) -> list[Result]:
-    """Returns the results of a function for groups, each in a fork of this process if there are several.
+    """Calls a function with each group of parts and returns the results in the order of the groups.
+
+    Several groups are processed at the same time, each in a fork of this process. A single group is processed in this
+    process itself, without a limit of processor time.
 
     Args:
-        work: The function.
-        groups: The groups.
-        cpu_s: Processor time that each fork may use [s]; None for any.
+        work: Function that takes a group and returns a result that can be pickled.
+        groups: Groups of parts, see `groups_of`.
+        cpu_s: Processor time that each fork may use [s]; None for no limit.
 
     Raises:
-        InterfaceError: If the function raises one, or a process ends early.
-        TooSlowError: If a fork needs more time.
+        InterfaceError: If the function raises an error in a fork, or a fork ends early.
+        TooSlowError: If a fork needs more processor time than `cpu_s`.
     """
     if len(groups) == 1:
         return [work(groups[0])]
@@ -44,21 +51,23 @@ def in_forks(
 
 
 def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
-    """Returns the result of a function, called in a fork of this process.
+    """Calls a function in a fork of this process and returns its result.
 
     Args:
-        work: The function.
-        cpu_s: Processor time that it may use [s].
+        work: Function without arguments, whose result can be pickled.
+        cpu_s: Processor time that the fork may use [s].
 
     Raises:
-        InterfaceError: If the function raises one, or the process ends early.
-        TooSlowError: If it needs more time.
+        InterfaceError: If the function raises an error, or the fork ends early.
+        TooSlowError: If the fork needs more processor time than `cpu_s`.
     """
     return _results([work], cpu_s)[0]
 
 
 def limit_cpu_time(cpu_s: int) -> None:
-    """Limits the further processor time of this process [s]; beyond it, SIGXCPU ends the process."""
+    """Limits the processor time that this process may use from now on [s]; SIGXCPU ends the process beyond the
+    limit.
+    """
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -66,7 +75,7 @@ def limit_cpu_time(cpu_s: int) -> None:
 
 
 class TooSlowError(InterfaceError):
-    """A process needs more processor time than it may use; its argument is that time [s]."""
+    """A process needed more processor time than allowed; the error's argument is the allowed time [s]."""
 
     def __str__(self) -> str:
         return (
@@ -75,7 +84,7 @@ class TooSlowError(InterfaceError):
 
 
 def _results(calls: Sequence[Callable[[], Result]], cpu_s: int | None) -> list[Result]:
-    context = get_context("fork")  # which has the recording already
+    context = get_context("fork")  # a fork has the recording in its memory already
     running = []
     for call in calls:
         ours, theirs = context.Pipe(duplex=False)
@@ -95,7 +104,7 @@ def _results(calls: Sequence[Callable[[], Result]], cpu_s: int | None) -> list[R
 
 
 def merged(results: Sequence[ReplayResult]) -> ReplayResult:
-    """Returns the results of groups as that of the whole."""
+    """Combines the results of replaying consecutive groups of parts into the result of the whole recording."""
     return ReplayResult(
         sum(each.agreed for each in results),
         sum(each.ticks for each in results),

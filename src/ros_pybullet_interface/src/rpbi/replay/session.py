@@ -1,4 +1,4 @@
-"""Runs a recorded session again and compares the hashes of its states."""
+"""Simulates a recorded session again and compares the hashes of its states with the recorded hashes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from rpbi.world.saved.values import from_text
 
 
 class Checkpoint(NamedTuple):
-    """A recorded state; checkpoints sort by time.
+    """Hash of the state of a recorded world at a given time; the fields are ordered so that checkpoints sort by time.
 
     Attributes:
-        resets: Number of resets of the world before.
-        tick: The world's tick.
-        commands: Number of commands since the reset.
-        state_hash: The hash.
+        resets: Number of resets of the world before the checkpoint.
+        tick: Tick of the world.
+        commands: Number of commands since the last reset, or since the start if there was none.
+        state_hash: Hash of the world's state.
     """
 
     resets: int
@@ -38,8 +38,9 @@ class Recording:
 
     Attributes:
         description: Description of the world.
-        commands: By number of resets and index the commands.
-        checkpoints: The states, in any order.
+        commands: For each number of resets before them, the commands, indexed by their position since the last reset
+            (or since the start).
+        checkpoints: The recorded states, in any order.
     """
 
     description: WorldDescription
@@ -47,7 +48,9 @@ class Recording:
     checkpoints: set[Checkpoint] = field(default_factory=set)
 
     def parts(self) -> list[RecordedPart]:
-        """Returns the parts that can be replayed by themselves, in their order."""
+        """Splits the recording into parts that can be replayed independently, and returns the parts in order
+        of time.
+        """
         parts = []
         start = Checkpoint(0, 0, 0, self.description.start_hash)
         checkpoints = sorted({start, *self.checkpoints})
@@ -65,14 +68,17 @@ class Recording:
 
 
 class RecordedPart(NamedTuple):
-    """A stretch of a recording, from a start of the world or a keyframe to the next keyframe or the last state.
+    """A part of a recording.
+
+    It begins at a start of the world (when the world was built or reset) or at a keyframe, and ends at the next
+    keyframe or at the last recorded state.
 
     Attributes:
-        resets: Number of resets of the world before.
-        first: Index of its first command.
-        keyframe: The command of the keyframe that it begins at; None for a start.
-        checkpoints: The recorded states in it, in their order.
-        end: Index of the command of the keyframe that it ends with, None if it ends with the last state.
+        resets: Number of resets of the world before the part.
+        first: Index of the part's first command.
+        keyframe: Command of the keyframe at which the part begins; None if the part begins at a start of the world.
+        checkpoints: The recorded states of the part, in order of time.
+        end: Index of the command of the keyframe with which the part ends; None if it ends with the last state.
     """
 
     resets: int
@@ -83,12 +89,13 @@ class RecordedPart(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A state that differs from the recorded one.
+    """A state of the replay that differs from the recorded state.
 
     Attributes:
         checkpoint: The recorded state.
-        state_hash: Its hash in the replay.
-        last_agreement: The last state that agreed, None if there was none since the world was built or reset.
+        state_hash: Hash of the state in the replay.
+        last_agreement: The last earlier state that agreed; None if none has agreed since the replay last began at a
+            start of the world or at a keyframe.
     """
 
     checkpoint: Checkpoint
@@ -100,10 +107,11 @@ class ReplayResult(NamedTuple):
     """Outcome of a replay.
 
     Attributes:
-        agreed: Number of states that agreed.
+        agreed: Number of states that agreed with the recording.
         ticks: Number of ticks replayed.
-        difference: The first state that differs, if one does; the replay ends there.
-        left_out: Commands that could not be replayed, with reasons.
+        difference: The first state that differs from the recording, at which the replay ended; None if no state
+            differs.
+        left_out: For each stretch of the recording that could not be replayed, a text with where it begins and why.
     """
 
     agreed: int
@@ -113,16 +121,16 @@ class ReplayResult(NamedTuple):
 
 
 class Replay:
-    """Builds the world of a recording and runs it through its commands.
+    """Builds the world of a recording and replays the recorded commands in it.
 
     Args:
-        recording: The recording.
-        progress: Called with the number of ticks since the last call.
-        observe: Called with the world, the number of resets before in the recording, and the samples, at every start
-            and after every tick.
+        recording: The recording to replay.
+        progress: Called with the number of ticks replayed since the last call.
+        observe: Called where a part begins at a start of the world or at a keyframe, and after every tick. Its
+            arguments are the world, the number of resets so far in the recording, and the samples.
 
     Raises:
-        ConfigError: If the world cannot be built here.
+        ConfigError: If the world cannot be built on this machine.
     """
 
     def __init__(
@@ -139,13 +147,14 @@ class Replay:
         self._left_out: list[str] = []
 
     def run(self, parts: Sequence[RecordedPart] | None = None) -> ReplayResult:
-        """Replays the recording up to the first difference; each reset is a new start.
+        """Replays parts of the recording up to the first difference, and returns the outcome.
 
         Args:
-            parts: Parts of the recording in their order, all by default. A part that follows the previous one continues
-                from there; others begin at their recorded keyframes. Every part but the last one before a reset
-                ends with a keyframe that is compared with the recorded one: if all parts agree, wherever they were
-                replayed, so does the whole.
+            parts: Consecutive parts of the recording; all parts by default. The first part begins at its start of the
+                world or at its recorded keyframe, and so does a part after a reset or after a part that could not be
+                replayed. Every other part continues where the previous part ended. A part that another part follows
+                before the next reset ends with a keyframe, which is compared with the recorded keyframe. Thus if all
+                parts agree, even if replayed by different processes, the whole recording agrees.
         """
         difference, continues = None, False
         try:
@@ -172,7 +181,9 @@ class Replay:
         self._observe(self._world, part.resets, self._world.read_rest())
 
     def _run_part(self, part: RecordedPart) -> tuple[Difference | None, bool]:
-        """Runs through a part; returns the first state that differs, and whether the next part can continue there."""
+        """Replays a part; returns the first state that differs, if any, and whether the next part can continue from
+        its end.
+        """
         commands = self._recording.commands.get(part.resets, {})
         done = part.first
         ends = [] if part.end is None else [Checkpoint(part.resets, commands[part.end].tick, part.end + 1, "")]
@@ -201,7 +212,7 @@ class Replay:
         return None, part.end is not None
 
     def _advance(self, to: Checkpoint, commands: Mapping[int, RecordedCommand], done: int) -> int:
-        """Applies commands and steps up to a checkpoint; returns how many commands were applied since the start."""
+        """Applies commands and steps up to a checkpoint; returns the index of the next command to be applied."""
         world, start = self._world, self._world.clock.tick
         while True:
             tick = world.clock.tick

@@ -1,4 +1,4 @@
-"""Loading URDFs into PyBullet, and faults of those that cannot be loaded."""
+"""Loads URDF files into PyBullet, and finds the faults of files that cannot be loaded."""
 
 import logging
 import math
@@ -33,18 +33,25 @@ from rpbi.meshes.trial import Mesh, Use, faults_in
 log = logging.getLogger(__name__)
 
 MAX_JOINTS = 127
-"""Largest number of joints that PyBullet reports of a robot, fixed ones included; beyond it, fixed ones are merged."""
+"""Largest number of joints, including fixed joints, that PyBullet reports for a robot.
+
+Fixed joints of a robot with more joints are merged.
+"""
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
-"""Formats of robots that are not read, by the element at the top of their files."""
+"""Names of robot formats that cannot be read, indexed by the tag of the file's root element."""
 PLACEHOLDER_FACTOR = 10.0
-"""Ratio of moments of inertia to those possible for a link's size above which they are placeholders."""
+"""Moments of inertia are taken for placeholders above this multiple of the largest possible for the link's size."""
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Returns a sentence for each fault of a URDF file that PyBullet would refuse, or that would crash it.
+    """Checks a URDF file for faults with which PyBullet would refuse to load the file, or would crash.
 
-    Meshes that this machine has not loaded before are tried in another process.
+    Meshes that this machine has not loaded before are loaded in another process as a trial.
+
+    Returns:
+        A sentence for each fault; empty if none was found. The structure, the number of joints, and the files are
+        checked in turn; a later check is made only if the earlier checks have found nothing.
     """
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
@@ -72,7 +79,7 @@ def check_joints(file: str, robot: Element) -> None:
     """Checks that PyBullet can load all joints of a robot, if necessary with its fixed joints merged.
 
     Raises:
-        ConfigError: If there are too many.
+        ConfigError: If more than `MAX_JOINTS` joints are not fixed.
     """
     moving = sum(joint.get("type") != "fixed" for joint in robot.findall("joint"))
     if moving > MAX_JOINTS:
@@ -81,7 +88,7 @@ def check_joints(file: str, robot: Element) -> None:
 
 
 def _mesh_problems(document: UrdfDocument) -> list[str]:
-    """Returns a sentence for each mesh that PyBullet would not find, would leave out, or that would crash it."""
+    """Returns a sentence for each mesh that PyBullet would not find, would leave out, or would crash on."""
     problems: dict[str, None] = {}
     meshes: dict[Mesh, str] = {}
     for part, use in (("visual", Use.URDF_VISUAL), ("collision", Use.URDF_COLLISION)):
@@ -108,10 +115,10 @@ class PreparedUrdf(NamedTuple):
     """Text that PyBullet loads instead of a URDF file.
 
     Attributes:
-        text: Only the parts that PyBullet reads, so that its reader and ours find the same. PyBullet's reader stops at
-            null characters, cuts long lines and ignores errors.
-        joints: Number of joints.
-        without_inertial: Names of the links without inertial.
+        text: URDF with only the parts that PyBullet reads, written so that PyBullet's reader finds the same as ours.
+            PyBullet's reader stops at null characters, cuts long lines and ignores errors.
+        joints: Number of joints in the text, including fixed joints.
+        without_inertial: Names of the links that do not have an `<inertial>` element.
     """
 
     text: str
@@ -120,7 +127,7 @@ class PreparedUrdf(NamedTuple):
 
 
 Prepare = Callable[[UrdfDocument, Files], Element]
-"""Returns the elements of a URDF for PyBullet; they depend on the arguments alone."""
+"""A function that returns the elements of a URDF for PyBullet; its result depends on its arguments alone."""
 
 
 def prepared_urdf(
@@ -131,12 +138,12 @@ def prepared_urdf(
     The result is cached, so another thread can prepare a large file before the thread of the simulation loads it.
 
     Args:
-        arguments: Those of `loadURDF`.
-        prepare: Returns the URDF for PyBullet.
-        has_window: Whether PyBullet draws it.
+        arguments: Arguments of PyBullet's `loadURDF`.
+        prepare: Function that returns the elements of the URDF for PyBullet.
+        has_window: Whether PyBullet has a window, in which the robot will be drawn.
 
     Raises:
-        ConfigError: If it cannot be loaded; it names the problem of the file.
+        ConfigError: If the file cannot be read, its structure is wrong, or it has too many joints.
     """
     document = UrdfDocument(arguments["fileName"])
     check_structure(document)
@@ -165,13 +172,15 @@ def load_urdf(
     """Loads a URDF file in which `urdf_problems` finds nothing, and returns PyBullet's id of the body.
 
     Args:
+        pb: Client into which the file is loaded.
         name: Name of the body, for messages.
-        arguments: Those of `loadURDF`.
-        prepare: Returns the URDF for PyBullet.
-        inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` are set.
+        arguments: Arguments of PyBullet's `loadURDF`.
+        prepare: Function that returns the elements of the URDF for PyBullet.
+        inertia_from_urdf: Whether to use the URDF's moments of inertia. Otherwise PyBullet guesses them from the
+            shapes, unless `flags` in the arguments say otherwise.
 
     Raises:
-        ConfigError: If it cannot be loaded; it names the problem of the file.
+        ConfigError: If the file cannot be loaded; the message names the problem.
     """
     file: str = arguments["fileName"]
     try:
@@ -199,15 +208,23 @@ def load_urdf(
 
 
 def flags_for(joints: int, flags: int) -> int:
-    """Returns flags with which PyBullet can use a URDF: fixed joints are merged if there are too many joints.
+    """Returns flags of `loadURDF`, to which the flag that merges fixed joints is added if there are too many joints.
 
-    PyBullet loads more than 127, but then does not report where joints and links are.
+    PyBullet loads more than 127 joints, but then does not report where joints and links are.
+
+    Args:
+        joints: Number of joints in the URDF.
+        flags: Flags asked for.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
-    """Sets moments of inertia of links without any in the URDF, and those of a scaled body."""
+    """Sets the moments of inertia of links for which the URDF has none or impossible ones, and scales them for a scaled
+    body.
+
+    Logs warnings of moments of inertia that are impossible or far too large.
+    """
     links = {index: pb.getJointInfo(body_id, index)[12] for index in range(pb.getNumJoints(body_id))}
     unusable, too_large = [], []
     for index, link in {-1: pb.getBodyInfo(body_id)[0], **links}.items():
@@ -216,7 +233,7 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
         if not mass:
             continue
         if link in without or 0.0 in moments:  # PyBullet sets impossible moments to 0
-            pb.changeDynamics(body_id, index, mass=mass)  # with its guess, from the collision shape
+            pb.changeDynamics(body_id, index, mass=mass)  # lets PyBullet guess them from the collision shape
             unusable += [] if link in without else [link]
             continue
         if scaling != 1.0:
@@ -232,9 +249,9 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of the distance of the collision shape from the centre of mass [m].
+    """Returns an upper bound of the distance between the centre of mass and points of the collision shape [m].
 
-    It is inf without a shape, and in maximal coordinates, where PyBullet reports no shapes.
+    The bound is inf for a link without a shape, and in maximal coordinates, where PyBullet reports no shapes.
     """
     if pb.getDynamicsInfo(body_id, link)[10] == MAXIMAL_COORDINATES or not pb.getCollisionShapeData(body_id, link):
         return math.inf

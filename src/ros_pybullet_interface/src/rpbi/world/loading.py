@@ -1,4 +1,4 @@
-"""Reading a world: the main YAML file and all files that it names, with all of their problems at once."""
+"""Reads the main YAML file of a world and all files that it names, and reports all of their problems at once."""
 
 import contextlib
 import logging
@@ -36,15 +36,15 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 CAMERAS = "rgbd_sensors"
-"""List of the main file that names the files of cameras."""
+"""Key of the main file whose value lists the files of further cameras."""
 
 
 class CameraConfig(NamedTuple):
     """A camera to be put into a world.
 
     Attributes:
-        config: Its configuration.
-        file: The file it came from, as the user wrote it.
+        config: Configuration of the camera.
+        file: File from which the configuration was read, as the user wrote its name.
     """
 
     config: RgbdSensorConfig
@@ -56,10 +56,11 @@ class LoadedWorld:
     """The validated configuration of a world; picklable.
 
     Attributes:
-        config: Keys of the main file.
-        objects: The objects, in the order of loading.
-        cameras: The cameras, the first one first.
-        file: The main file, `"~config"` if it came from the parameter server.
+        config: Configuration from the main file.
+        objects: Configurations of the objects, in the order of loading.
+        cameras: Configurations of the cameras: first the camera under the key `rgbd_sensor`, if there is one, then the
+            cameras listed under `rgbd_sensors`, in the order of their list.
+        file: Name of the main file; `"~config"` if its content came from the parameter server.
     """
 
     config: WorldConfig
@@ -75,34 +76,42 @@ def load_world(
 
     Args:
         path: The main file; `{package}/path` and `package://package/path` are resolved.
-        robot_description: File that the word `robot_description` stands for; without it, the word stays.
-        overrides: Keys and values that replace those of the main file; mappings are merged key by key.
+        robot_description: URDF file to be used where a file name is the word `robot_description`; None leaves the word.
+        overrides: Keys and values that replace keys of the main file; mappings are merged key by key.
 
     Raises:
-        ConfigError: With all problems of all files.
+        ConfigError: If there are problems; the error lists all problems of all files.
     """
     data = ObjectEntry(path, overrides).apply_overrides(load_main_file(path))
     return _Reader(data, path, replace_package(path), robot_description).read()
 
 
 def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:
-    """Does the same as `load_world` with the content of a main file, which is not changed.
+    """Reads a world as `load_world` does, but from the content of a main file that was read already.
 
-    A file of the name `"~config"`, which has no folder, came from the parameter server.
+    Args:
+        data: Content of the main file; it is not changed.
+        file: Name of the main file; `"~config"`, which has no folder, if the content came from the parameter server.
+        robot_description: See `load_world`.
+
+    Raises:
+        ConfigError: If there are problems; the error lists all problems of all files.
     """
     return _Reader(data, file, file, robot_description).read()
 
 
 def robots_description(path: str, names: Sequence[str]) -> str:
-    """Returns the text of one URDF with robots of a world, where their bases are at its start.
+    """Returns the text of a single URDF that holds given robots of a world at the poses where their bases start.
+
+    The URDF's root is the link `world`. Names of links and joints begin with the robot's name and an underscore.
 
     Args:
         path: The world's main file.
-        names: The robots. Names of links and joints have `NAME_` before them; the root is the link `world`.
+        names: Names of the robots.
 
     Raises:
-        ConfigError: If the world is wrong.
-        UnknownNameError: If it has no such robot.
+        ConfigError: If the world cannot be loaded.
+        UnknownNameError: If the world does not have a robot of a given name.
     """
     configs = (each.config for each in load_world(path).objects)
     bases = {each.name: each.loadURDF for each in configs if isinstance(each, RobotConfig)}
@@ -117,7 +126,7 @@ def robots_description(path: str, names: Sequence[str]) -> str:
 
 
 class _Reader:
-    """Reads one world and collects the problems."""
+    """Reads one world and collects the problems of its files."""
 
     def __init__(self, data: Mapping[str, Any], file: str, path: str, robot_description: str | None) -> None:
         self._data = data
@@ -127,13 +136,13 @@ class _Reader:
         self._problems: list[Problem] = []
         self._owner_of: dict[str, str] = {}
         self._parts: list[tuple[str, Mapping[str, Any]]] = []
-        """Parts of objects that may name files, with the file that they are in."""
+        """Pairs of an object's file and the parts of its configuration that may name further files."""
 
     def read(self) -> LoadedWorld:
-        """Returns the world.
+        """Reads all files and returns the configuration of the world.
 
         Raises:
-            ConfigError: With all problems.
+            ConfigError: If there are problems; the error lists all of them.
         """
         if isinstance(self._data, Mapping):
             check_is_world(self._data, self._file)
@@ -145,7 +154,7 @@ class _Reader:
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
         further_cameras = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
-            # Without problems so far, these are reported when the world is built
+            # If there were no problems so far, problems of these files would be reported when the world is built
             for file, parts in self._parts:
                 self._problems += [Problem(file, key, message) for key, message in file_problems(parts)]
             raise ConfigError(self._problems)
@@ -175,7 +184,9 @@ class _Reader:
                 yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
 
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yields content, name and context of each file of a list; checks that object names are unique."""
+        """Yields content, name and context of each file in the list of a section; notes names of objects that are not
+        unique.
+        """
         search_paths = self._search_paths()
         for index, entry in _object_entries(self._data.get(section)):
             key = f"{section}[{index}]"
@@ -199,7 +210,7 @@ class _Reader:
             self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
-        """Notes the name of an object; reports a name that another object has."""
+        """Notes the name of an object as taken, or notes a problem if another object has the name already."""
         name = name_in(data)
         if name in self._owner_of:
             message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
@@ -208,7 +219,7 @@ class _Reader:
             self._owner_of[name] = file
 
     def _search_paths(self) -> tuple[str, ...]:
-        """Returns the search paths that exist, also when something else in the main file is wrong."""
+        """Returns the search paths whose folders exist, even if other keys of the main file are wrong."""
         given = self._data.get("setAdditionalSearchPath")
         folders: list[str] = []
         for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
@@ -218,7 +229,9 @@ class _Reader:
 
 
 def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
-    """Yields the entries of a list of objects with their indices; others are reported by the model."""
+    """Yields the valid entries of a list of objects with their indices; the model of the main file reports invalid
+    ones.
+    """
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
             yield index, parse_object_entry(entry)

@@ -1,4 +1,4 @@
-"""The job of a farm, which determines its episodes, and the outcome of each."""
+"""The job of a farm, which determines the farm's episodes, and the outcome of an episode."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rpbi_data.episodes.folder import FARM
 from .policy import Policy
 
 LOG = "farm.log"
-"""File of a folder of episodes with all that policies print."""
+"""File in a folder of episodes that contains the output of the processes that make episodes."""
 _CHANGED = {"world_sha256": "the world, or a file that it names", "policy_sha256": "the file of the policy"}
 
 
@@ -33,13 +33,13 @@ class FarmJob:
     Attributes:
         world: The main YAML file.
         policy: `module:Class` of the policy.
-        seed: Seed of the farm; that of episode n is (seed, n).
-        ticks: Length of an episode that its policy does not end.
+        seed: Seed of the farm; the seed of episode n is `(seed, n)`.
+        ticks: Number of ticks after which an episode ends if its policy has not ended it.
         world_sha256: SHA-256 of the description of the world, see `World.describe`.
-        policy_sha256: SHA-256 of the file of the policy.
+        policy_sha256: SHA-256 of the file that defines the policy; empty if there is no such file.
         images: Whether the colour images of cameras are recorded.
-        python_path: Folders in which the policy is looked for, too.
-        facts: Further attributes of each `Episode`.
+        python_path: Additional folders in which the module of the policy is searched for.
+        facts: Further attributes of each `Episode`; they are not part of the identity of the job.
     """
 
     world: str
@@ -53,10 +53,11 @@ class FarmJob:
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def claim(self, folder: Path) -> None:
-        """Writes the job into a folder, or compares it with the existing one.
+        """Writes this job into a folder, or checks that the job that the folder already has is the same.
 
         Raises:
-            EpisodeError: If the folder has episodes of another job; the message names the differences.
+            EpisodeError: If the folder has another job, an unreadable job, or other files but no job.
+            OSError: If the job cannot be written.
         """
         path, own = folder / FARM, self._identity()
         if os.path.lexists(path):
@@ -75,7 +76,10 @@ class FarmJob:
         return {key: getattr(self, key) for key in keys}
 
     def _changes(self, there: Mapping[str, Any]) -> list[str]:
-        """Returns sentences on the differences; of files whose names differ, the contents are not compared."""
+        """Returns messages about differences from the job that is already in the folder.
+
+        Changed file contents are reported only if nothing else differs.
+        """
         own, defaults = self._identity(), {each.name: each.default for each in fields(self)}
         changed = [key for key in own if there.get(key, defaults[key]) != own[key]]
         values = [
@@ -91,11 +95,11 @@ class EpisodeOutcome(NamedTuple):
     """Outcome of an episode.
 
     Attributes:
-        number: Its number; -1 if it concerns none.
-        label: Its label, if it is there.
-        fault: Reason why it was not made.
-        is_lost: Whether its process has ended meanwhile, so that it is worth another try.
-        stops: Whether no other episode can be made, either.
+        number: Number of the episode; -1 if the outcome does not concern a particular episode.
+        label: Label of the episode; empty if the episode was not made.
+        fault: Reason why the episode was not made; empty if it was made.
+        is_lost: Whether the process that made the episode ended before completing it, so that a retry is worthwhile.
+        stops: Whether the fault prevents all further episodes, too.
     """
 
     number: int
@@ -106,12 +110,12 @@ class EpisodeOutcome(NamedTuple):
 
 
 def digest(text: str) -> str:
-    """Returns the SHA-256 of a text."""
+    """Returns the SHA-256 of a text encoded in UTF-8, in hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def policy_digest(policy: type[Policy]) -> str:
-    """Returns the SHA-256 of the file of a policy; empty without a file."""
+    """Returns the SHA-256 of the file that defines a policy, or an empty string if there is no such file."""
     file = inspect.getsourcefile(policy)
     return hashlib.sha256(read_file(file)).hexdigest() if file else ""
 

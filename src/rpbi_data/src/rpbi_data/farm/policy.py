@@ -14,27 +14,27 @@ own_folders.append(str(Path(__file__).parent))
 
 
 class Policy:
-    """Acts in the world of one episode, by `World.put` and `World.act` alone; a new one is made for each episode.
+    """Acts in the world of one episode, only through `World.put` and `World.act`. Each episode has a new policy object.
 
-    A constructor of a subclass may change how the episode starts, for instance by `world.act("box", "teleport", pose)`.
-    All that is random comes from `rng`. An exception ends the episode, which is then not written.
+    The constructor of a subclass may change the initial state, for instance with `world.act("box", "teleport", pose)`.
+    All random values must come from `rng`. An exception ends the episode, which is then not written.
 
     Args:
-        world: The world, as its files describe it, at tick 0.
-        rng: Random numbers of the episode: by the seed of the farm and the number of the episode.
+        world: The world at tick 0, as its files describe it.
+        rng: Random number generator, seeded with the seed of the farm and the number of the episode.
     """
 
     def __init__(self, world: World, rng: np.random.Generator) -> None:
         self.world, self.rng = world, rng
 
     def act(self) -> str | None:
-        """Acts before a tick.
+        """Acts on the world; it is called before each tick.
 
         Returns:
-            The label with which the episode ends before that tick, such as `success`; None to continue.
+            None to continue; a label, such as `success`, to end the episode before that tick.
         """
         raise NotImplementedError
 
 
 POLICIES: PluginTable[Policy] = PluginTable("policy", "rpbi_data.farm.policy:Policy", {}, suggests=False)
-"""Policies are those of users, by `module:Class`."""
+"""Policies, which users provide and name as `module:Class`; none are built in."""

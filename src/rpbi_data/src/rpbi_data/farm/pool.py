@@ -1,4 +1,4 @@
-"""Processes that make episodes, and their replacement after a crash."""
+"""Processes that make episodes, and their replacement after crashes."""
 
 from __future__ import annotations
 
@@ -22,20 +22,23 @@ from rpbi_data.episodes.folder import EpisodeFolder
 from .job import LOG, EpisodeOutcome, FarmJob
 
 MAX_LOSSES = 3
-"""Number of processes that an episode may end before it is left out."""
+"""Number of times that an episode may be lost before it is left out."""
 END_S = 5.0
-"""Time from the end of the connection to a process until it is killed [s]."""
+"""Time that a process has to end after its connection is closed, before it is killed [s]."""
 
 
 class Child:
-    """A process that makes episodes. It ends with this one.
+    """A child process that makes episodes. It is killed when the present process ends.
 
     Args:
-        module: Its program, which takes the number of a file handle and reads the job from there.
-        job: The job.
+        module: Module that the child process runs; it gets the number of a file handle, from which it reads the job.
+        job: Job that determines the episodes.
         folder: Folder of the episodes.
-        slots: Largest number of episodes that it is asked for at a time.
-        arguments: Further arguments of the program.
+        slots: Maximum number of episodes requested from the child process at the same time.
+        arguments: Further command-line arguments of the module.
+
+    Raises:
+        EpisodeError: If the log file is not an ordinary file.
     """
 
     def __init__(
@@ -43,7 +46,7 @@ class Child:
     ) -> None:
         self._slots = slots
         self.numbers: set[int] = set()
-        """Episodes that it is asked for."""
+        """Numbers of the episodes that are requested from the process and not finished."""
         self.connection, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
         path = path_below(folder.path, LOG)
@@ -62,16 +65,16 @@ class Child:
 
     @property
     def is_free(self) -> bool:
-        """Whether another episode can be requested from it."""
+        """Whether another episode can be requested from the process."""
         return len(self.numbers) < self._slots
 
     def start(self, number: int) -> None:
-        """Requests an episode from it."""
+        """Requests an episode from the process."""
         self.numbers.add(number)
         self._send(number)
 
     def receive(self) -> EpisodeOutcome | None:
-        """Returns the outcome of an episode; None if the process has ended."""
+        """Waits for the outcome of an episode and returns it, or None if the process has ended."""
         try:
             outcome: EpisodeOutcome = self.connection.recv()
         except (EOFError, OSError):
@@ -80,13 +83,13 @@ class Child:
         return outcome
 
     def close(self, grace_s: float = 0.0) -> str:
-        """Ends the process.
+        """Closes the connection, and kills the process if it does not end by itself.
 
         Args:
-            grace_s: Time in which it may end by itself [s].
+            grace_s: Time that the process has to end by itself [s].
 
         Returns:
-            The signal that ended it, or its exit code, in words.
+            The name of the signal that ended the process, or a text with the exit code.
         """
         self.connection.close()
         with suppress(subprocess.TimeoutExpired):
@@ -98,18 +101,18 @@ class Child:
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
     def _send(self, message: Any) -> None:
-        with suppress(BrokenPipeError, ConnectionResetError):  # it has died, as `receive` finds
+        with suppress(BrokenPipeError, ConnectionResetError):  # the process has died, which `receive` reports
             self.connection.send(message)
 
 
 class Pool:
-    """Processes that make the episodes of a job. A process that dies is replaced; its episode is made again.
+    """Processes that make the episodes of a job. A process that dies is replaced, and its episode is made again.
 
     Args:
         folder: Folder of the episodes.
-        new_child: Starts a process.
-        size: Number of processes.
-        is_replaced: Whether a process that dies is replaced; without it, that is the end.
+        new_child: Function that starts a process.
+        size: Maximum number of processes.
+        is_replaced: Whether a process that dies is replaced; if not, its death ends `run` with an error.
     """
 
     def __init__(
@@ -121,12 +124,13 @@ class Pool:
         self._losses: Counter[int] = Counter()
 
     def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields their outcomes, in any order.
+        """Makes episodes, and yields their outcomes in the order of completion.
 
-        If it ends early, also by an exception, no process and no temporary folder remains.
+        When this generator ends, even early or with an exception, all processes have ended and the temporary folders
+        of the episodes are removed.
 
         Raises:
-            EpisodeError: If no further episode can be made; those that are complete stay.
+            EpisodeError: If no further episode can be made; complete episodes are kept.
         """
         self._waiting.extend(numbers)
         for number in numbers:
@@ -143,7 +147,7 @@ class Pool:
                 self._drop_part(number)
 
     def _employ(self) -> None:
-        """Assigns episodes to free processes, and starts processes while there are further episodes."""
+        """Assigns waiting episodes to free processes, and starts further processes if none is free."""
         while self._waiting:
             free = next((child for child in self._children if child.is_free), None)
             if free is None:
@@ -171,10 +175,10 @@ class Pool:
             yield outcome
 
     def _again(self, lost: EpisodeOutcome) -> Iterator[EpisodeOutcome]:
-        """Schedules a lost episode again, unless it exists, or was lost too often."""
+        """Schedules a lost episode again, or yields its outcome if it is complete or has been lost too often."""
         number = lost.number
         self._drop_part(number)
-        if self._folder.folder_of(number).exists():  # the process ended just after it
+        if self._folder.folder_of(number).exists():  # the process ended just after completing the episode
             yield EpisodeOutcome(number, self._folder.read(number).label)
             return
         self._losses[number] += 1

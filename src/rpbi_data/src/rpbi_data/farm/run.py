@@ -17,7 +17,7 @@ from .job import FarmJob
 from .policy import Policy
 
 TIMEOUT = "timeout"
-"""Label of an episode that its policy did not end."""
+"""Label of an episode that its policy did not end within the given number of ticks."""
 _WORD = re.compile(r"\w[\w.-]{0,59}")
 
 
@@ -38,13 +38,13 @@ class EpisodeWriter(Protocol):
 
 
 class EpisodeRun:
-    """An episode: a policy in a new world.
+    """Runs one policy in a new world.
 
     Args:
-        job: The job.
+        job: Job of the farm, for the seed and the maximum number of ticks.
         policy: Class of the policy.
-        number: Number of the episode.
-        world: The world, at tick 0.
+        number: Number of the episode, which is part of the seed.
+        world: The world at tick 0.
     """
 
     def __init__(self, job: FarmJob, policy: type[Policy], number: int, world: World) -> None:
@@ -52,11 +52,12 @@ class EpisodeRun:
         self._seed = (job.seed, number)
 
     def run(self, writer: EpisodeWriter) -> str:
-        """Runs the episode to its end, and returns the label.
+        """Runs the episode to its end, and returns its label.
 
         Raises:
-            PluginError: If the policy fails; it names class, method, tick and seed.
-            InterfaceError: If the world fails.
+            PluginError: If the policy raises an exception, steps or resets the world, or returns a wrong label. The
+                message names the class, method, tick and seed.
+            InterfaceError: If the world cannot be simulated or written.
         """
         with self._policy_errors("__init__"):
             policy = self._class(self._world, np.random.default_rng(self._seed))
@@ -85,7 +86,7 @@ class EpisodeRun:
 
     @contextmanager
     def _policy_errors(self, method: str) -> Iterator[None]:
-        """Converts errors of the policy into an error that names it."""
+        """Converts exceptions from the policy to a `PluginError` that names the policy."""
         world = self._world
         tick, resets = world.clock.tick, world.resets
         doing = f"{method} at tick {tick} with the seed {self._seed}"

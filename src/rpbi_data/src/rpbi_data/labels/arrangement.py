@@ -1,4 +1,4 @@
-"""Random arrangements of the objects of a world, and random views of them."""
+"""Random arrangements of the objects of a world, and random camera views of these arrangements."""
 
 from __future__ import annotations
 
@@ -19,41 +19,42 @@ from rpbi.world import World
 from .models import ObjectModel, models_of
 
 GAP_M = 0.005
-"""Distance of objects that are about to fall."""
+"""Minimum distance of an object from the bodies around it before the objects fall [m]."""
 LIFT_M = 0.02
-"""Step by which an object is lifted until it has no contact."""
+"""Height by which an object is lifted at a time until it does not touch another body [m]."""
 REST_SPEED, REST_TURN = 0.005, 0.1
-"""Speeds below which an object is at rest [m/s, rad/s]."""
+"""Linear speed [m/s] and angular speed [rad/s] below which an object is at rest."""
 LOOK_S = 0.1
-"""Time between two checks of rest."""
+"""Simulated time between two checks whether the objects are at rest [s]."""
 PATIENCE_S = 10.0
-"""Longest time for objects to come to rest."""
+"""Maximum simulated time for the objects to come to rest [s]."""
 ATTEMPTS = 5
-"""Largest number of arrangements until one comes to rest."""
+"""Maximum number of arrangements that are tried until the objects come to rest."""
 ELEVATION_DEG = (25.0, 75.0)
-"""Least and largest elevation of the camera."""
+"""Minimum and maximum elevation of the camera above the horizontal [deg]."""
 DISTANCE = (0.6, 1.2)
-"""Least and largest distance of the camera, relative to that at which the area fills the image."""
+"""Minimum and maximum distance of the camera, relative to the distance at which the area fills the image."""
 CLEAR_M = 0.1
-"""Least distance of the camera from the boxes around the links of robots [m]."""
+"""Minimum distance of the camera from the bounding boxes of robot links [m]."""
 MAX_VIEWS = 100
-"""Largest number of random views until no robot obstructs one."""
+"""Maximum number of random views that are tried until robots do not obstruct the view."""
 SHIFT = 0.25
-"""Largest shift of the point that the camera looks at, as a share of the area's radius."""
+"""Maximum shift of the point that the camera looks at along x and y, as a fraction of the area's radius."""
 
 Array = npt.NDArray[np.float64]
 
 
 class Arrangement:
-    """The objects of a world that can lie anywhere: rigid, without joints, moved by physics.
+    """Arranges the objects of a world: its rigid bodies without joints that are moved by physics.
 
-    Objects fall into the area that their starts span, and the camera looks at its middle.
+    The objects fall into a rectangular area that contains their initial positions. The camera looks at a random point
+    near the middle of this area.
 
     Args:
-        world: The world, at its start.
+        world: The world in its initial state.
 
     Raises:
-        InterfaceError: If it has no such object, or a mesh of one cannot be read.
+        InterfaceError: If the world has no such object, or the visible surface of an object cannot be read.
     """
 
     def __init__(self, world: World) -> None:
@@ -64,7 +65,7 @@ class Arrangement:
                 "there is nothing to label: expected `dynamic_objects`, or `urdfs` without joints whose base is free"
             )
         self.models: Mapping[str, ObjectModel] = models_of(objects)
-        """Models of the objects, by name."""
+        """Models of the objects, indexed by object name."""
         placed = [_placed(self.models[body.name].points, Pose(*body.base_pose())) for body in objects]
         centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2.0 for each in placed])
         largest = max(model.radius for model in self.models.values())
@@ -76,16 +77,16 @@ class Arrangement:
 
     @property
     def middle(self) -> Array:
-        """Middle of the lower side of the area [m], shape (3,)."""
+        """Middle of the area, at the height of the lowest point of the initial objects, shape (3,) [m]."""
         return np.array([*(self._low + self._high) / 2.0, self._bottom])
 
     def settle(self, random: np.random.Generator) -> None:
         """Resets the world, lets the objects fall from random poses, and simulates until they are at rest.
 
-        Objects that leave the area by more than its radius are not waited for.
+        An object counts as at rest when it is farther than two radii of the area from the middle of the area.
 
         Raises:
-            InterfaceError: If they do not come to rest.
+            InterfaceError: If the objects do not come to rest in any of `ATTEMPTS` attempts.
         """
         world = self._world
         looks = math.ceil(PATIENCE_S / LOOK_S)
@@ -107,12 +108,12 @@ class Arrangement:
         )
 
     def view(self, random: np.random.Generator, intrinsics: Intrinsics) -> Pose:
-        """Returns a random pose of the optical frame of a camera, above the objects and looking at them.
+        """Returns a random pose of a camera's optical frame in the world, above the objects and directed at them.
 
-        No robot is within `CLEAR_M` of the camera, or between the camera and the point that it looks at.
+        No robot is within `CLEAR_M` of the camera, or between the camera and the point that the camera looks at.
 
         Raises:
-            InterfaceError: If robots obstruct each of `MAX_VIEWS` views.
+            InterfaceError: If robots obstruct all of `MAX_VIEWS` views.
         """
         for _ in range(MAX_VIEWS):
             eye, target = self._line_of_sight(random, intrinsics)
@@ -121,7 +122,7 @@ class Arrangement:
         raise InterfaceError(f"robots are in the way of the camera in each of {MAX_VIEWS} views of the objects")
 
     def _line_of_sight(self, random: np.random.Generator, intrinsics: Intrinsics) -> tuple[Array, Array]:
-        """Returns a random place of a camera, and the point that it looks at [m]."""
+        """Returns a random position of a camera, and the point that the camera looks at, each of shape (3,) [m]."""
         sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # so that all directions are equally likely
         azimuth = random.uniform(-math.pi, math.pi)
         cosine = math.sqrt(1.0 - sine**2)
@@ -133,7 +134,7 @@ class Arrangement:
         return target + distance * direction, target
 
     def _is_clear(self, eye: Array, target: Array) -> bool:
-        """Returns whether no robot is near a camera or between it and the point that it looks at."""
+        """Returns whether no robot is near the camera, or between the camera and the point that it looks at."""
         pb, robots = self._world.pb, {body.body_id: body for body in self._world.bodies.values() if body.joint_indices}
         for body_id, body in robots.items():
             for link in (-1, *body.joint_indices):
@@ -144,7 +145,9 @@ class Arrangement:
         return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
-        """Puts the objects at random places of the area, each as low as possible without contact."""
+        """Puts the objects at random places of the area in random orientations, each at the first height without
+        contact.
+        """
         names = [str(name) for name in random.permutation(list(self.models))]
         there = [body for body in self._world.bodies.values() if body.name not in self.models]
         for name in names:
@@ -166,7 +169,9 @@ class Arrangement:
         return bool(self._world.pb.getClosestPoints(body.body_id, other.body_id, GAP_M))
 
     def _motion(self, name: str) -> float:
-        """Returns the motion of an object; 1 is the largest at rest."""
+        """Returns the speed of an object relative to the limit below which an object is at rest; 0 if it is
+        far away.
+        """
         body = self._world.bodies[name]
         if np.linalg.norm(np.subtract(body.base_pose().position, self.middle)) > 2.0 * self._radius:
             return 0.0

@@ -1,8 +1,8 @@
 """The folder of a data set in the BOP format.
 
-BOP is the format of the Benchmark for 6D Object Pose Estimation (Hodan et al., ECCV 2018); its description is
-`docs/bop_datasets_format.md` of https://github.com/thodan/bop_toolkit. Labels for detectors are in
-`scene_gt_coco.json`, in the format of COCO, as that toolkit makes them.
+BOP is the format of the Benchmark for 6D Object Pose Estimation (Hodan et al., ECCV 2018). The format is described in
+`docs/bop_datasets_format.md` of https://github.com/thodan/bop_toolkit. Labels for object detectors are in
+`scene_gt_coco.json`, in the COCO format, as the BOP toolkit writes them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from .models import MM, ObjectModel
 from .silhouettes import Bounds, Mask, Silhouette, bounds
 
 DEPTH_SCALE_MM = 0.1
-"""Unit of the depth images [mm]."""
+"""Depth that a pixel value of 1 in a depth image stands for [mm]."""
 SCENE = Path("train/000000")
-"""Folder of the images."""
+"""Folder of the images, relative to the folder of the data set."""
 QUICK, USUAL = 1, 3
-"""Levels of PNG's compression, for masks and for images."""
+"""PNG compression levels for masks and for images."""
 
 Array = npt.NDArray[np.float64]
 
@@ -35,10 +35,10 @@ class Label(NamedTuple):
     """An object in an image.
 
     Attributes:
-        model: Its model.
-        T: Pose of its base link in the optical frame [m], shape (4, 4).
-        visible: The pixels at which it is seen, shape (height, width).
-        whole: Its silhouette without other objects.
+        model: Model of the object.
+        T: Pose of the object's base link in the optical frame, shape (4, 4) [m].
+        visible: Mask of the pixels in which the object is visible, shape (height, width).
+        whole: Silhouette of the object without occlusion.
     """
 
     model: ObjectModel
@@ -48,7 +48,7 @@ class Label(NamedTuple):
 
     @property
     def visible_fraction(self) -> float:
-        """Visible share of its silhouette; parts beyond the image are not visible."""
+        """Visible fraction of the object's silhouette; parts outside the image are not visible."""
         return float(self.visible.sum()) / self.whole.pixels
 
 
@@ -57,9 +57,9 @@ class LabelledImage(NamedTuple):
 
     Attributes:
         colour: Red, green and blue, uint8, shape (height, width, 3).
-        depth: Distances along the optical axis [m], 0 without depth, shape (height, width).
-        camera: Pose of the world in the optical frame [m], shape (4, 4).
-        labels: The objects with a pixel or more.
+        depth: Distances along the optical axis, shape (height, width) [m]; 0 in pixels without depth.
+        camera: Pose of the world in the optical frame, shape (4, 4) [m].
+        labels: Labels of the objects that are visible in at least one pixel.
     """
 
     colour: npt.NDArray[np.uint8]
@@ -69,13 +69,16 @@ class LabelledImage(NamedTuple):
 
 
 class BopFolder:
-    """A data set that grows.
+    """A BOP data set to which images are added.
 
     Args:
-        path: Its folder, which exists and is empty.
-        name: Its name.
-        models: The models.
-        intrinsics: Those of its camera.
+        path: Folder of the data set, which must exist and be empty.
+        name: Name of the data set.
+        models: Models of the labelled objects.
+        intrinsics: Intrinsics of the camera of all images.
+
+    Raises:
+        OSError: If the models cannot be written.
     """
 
     def __init__(self, path: Path, name: str, models: Iterable[ObjectModel], intrinsics: Intrinsics) -> None:
@@ -95,10 +98,10 @@ class BopFolder:
         (path / "camera.json").write_text(json.dumps(self._camera()) + "\n")
 
     def add(self, image: LabelledImage) -> None:
-        """Adds an image.
+        """Writes an image with its depth image and masks, and keeps its labels for `close`.
 
         Raises:
-            OSError: If it cannot be written.
+            OSError: If a file cannot be written.
         """
         number = len(self._cameras)
         depth = np.rint(image.depth * (MM / DEPTH_SCALE_MM))
@@ -126,10 +129,13 @@ class BopFolder:
             self._write(255 * label.visible.astype(np.uint8), f"mask_visib/{mask}", QUICK)
 
     def close(self, told: str) -> None:
-        """Writes the labels, and a text about the data set.
+        """Writes the labels, and a description of the data set.
+
+        Args:
+            told: Text of the description, in Markdown.
 
         Raises:
-            OSError: If they cannot be written.
+            OSError: If a file cannot be written.
         """
         scene = self._path / SCENE
         for name, rows in (
@@ -182,7 +188,10 @@ class BopFolder:
 
 
 def run_lengths(mask: Mask) -> list[int]:
-    """Returns the lengths of the runs of a mask, column by column; the first one, of pixels outside, may be 0."""
+    """Returns the lengths of runs of equal pixels in a mask, column by column, as COCO's uncompressed run lengths.
+
+    The first run is of pixels outside the mask; its length may be 0.
+    """
     pixels = mask.ravel(order="F")
     changes = np.flatnonzero(np.diff(pixels)) + 1
     lengths = np.diff([0, *changes, pixels.size]).tolist()
@@ -190,7 +199,10 @@ def run_lengths(mask: Mask) -> list[int]:
 
 
 def _info(label: Label, depth: npt.NDArray[Any]) -> dict[str, Any]:
-    """Returns the entry of `scene_gt_info.json`; sides of boxes are differences of pixels, as in the BOP toolkit."""
+    """Returns the entry of a label in `scene_gt_info.json`.
+
+    The side lengths of boxes are differences of pixel indices, as in the BOP toolkit.
+    """
     return {
         "bbox_obj": _corner_and_sides(label.whole.box),
         "bbox_visib": _corner_and_sides(bounds(label.visible)),
@@ -211,5 +223,5 @@ def _rounded(matrix: Array) -> list[float]:
 
 
 def _lines(entries: dict[str, Any]) -> str:
-    """Returns JSON with an entry a line."""
+    """Returns JSON text of a dictionary with one entry per line."""
     return "{\n" + ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in entries.items()) + "\n}\n"

@@ -1,4 +1,4 @@
-"""Labelled images of a world, in one call."""
+"""Writes a data set of labelled images of a world."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from .bop import BopFolder, Label, LabelledImage
 from .silhouettes import Silhouettes
 
 VIEWS = 20
-"""Largest number of views of an arrangement until one shows an object."""
+"""Maximum number of views of an arrangement that are tried until an object is visible."""
 
 
 class Written(NamedTuple):
-    """Content of a data set.
+    """Summary of a data set that was written.
 
     Attributes:
         images: Number of images.
-        kinds: Number of kinds of objects.
-        labels: Number of labels, of all images.
-        visible_fraction: Mean share of a labelled object that is seen.
+        kinds: Number of different object models.
+        labels: Number of labels in all images.
+        visible_fraction: Mean of the visible fractions of the labelled objects.
     """
 
     images: int
@@ -53,24 +53,24 @@ def write_labelled_images(
 ) -> Written:
     """Writes images of random arrangements of a world's objects, each from a random view, in the BOP format.
 
-    For each image, the world is reset, its objects fall, and a camera at a random place above them looks at them once
-    they are at rest. Image n depends on the world, the seed and n alone. The data set gets its name when it is
-    complete.
+    For each image, the world is reset, and its objects fall. When the objects are at rest, a camera at a random place
+    above them takes the image. Image n depends only on the world, the seed and n. The data set is written to a
+    temporary folder, which is renamed to `out` when the data set is complete.
 
     Args:
-        world: The world, or its main file. A world is reset: objects added at run time are removed.
-        out: Folder of the data set; it is empty, or does not exist.
-        count: Number of images.
-        seed: Seed, at least 0.
-        camera: Name of the camera; the first one by default.
-        report: Is called after each image.
+        world: The world, or its main YAML file. A world is reset: objects added at run time are removed.
+        out: Folder of the data set, which must be empty or not exist.
+        count: Number of images, at least 1.
+        seed: Seed of the random numbers, at least 0.
+        camera: Name of the camera; by default, the first camera of the world is used.
+        report: Function that is called after each image.
 
     Raises:
-        ConfigError: If the file or one that it names is wrong.
-        UnknownNameError: If there is no such camera.
-        InterfaceError: If the world has no camera or nothing to label, objects do not come to rest or are never seen,
-            or the data set cannot be written; there is none then.
-        ValueError: If a number is out of its range.
+        ConfigError: If the main file, or a file that it names, is wrong.
+        UnknownNameError: If the world has no camera with the name `camera`.
+        InterfaceError: If the world has no camera or no object to label, objects do not come to rest or are not
+            visible from any view, or the data set cannot be written. No data set is left then.
+        ValueError: If `count` or `seed` is out of range.
     """
     if count < 1 or seed < 0:
         raise ValueError(f"count and seed: expected at least 1 and 0, got {count} and {seed}")
@@ -125,10 +125,10 @@ def _write(
 
 
 class _Photographer:
-    """Takes labelled images of a world.
+    """Takes labelled images of a world with a given camera.
 
     Raises:
-        InterfaceError: If there is nothing to label.
+        InterfaceError: If the world has no object to label.
     """
 
     def __init__(self, world: World, camera: str) -> None:
@@ -142,10 +142,10 @@ class _Photographer:
         self._silhouettes = Silhouettes(world, self._models)
 
     def image(self, random: np.random.Generator) -> LabelledImage:
-        """Returns an image of a new arrangement from a new view.
+        """Arranges the objects, takes an image from a random view, and returns it with its labels.
 
         Raises:
-            InterfaceError: If objects do not come to rest, or are not seen.
+            InterfaceError: If objects do not come to rest, or no object is visible from any of `VIEWS` views.
         """
         self._arrangement.settle(random)
         for _ in range(VIEWS):

@@ -1,4 +1,4 @@
-"""Kinds of objects, with their surfaces as models of a data set."""
+"""Models of the surfaces of objects, for a data set; identical objects share a model."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from rpbi.render import surfaces
 
 Array = npt.NDArray[np.float64]
 MM = 1000.0
-"""Millimetres in a metre."""
+"""Number of millimetres in a metre."""
 
 
 class ObjectModel(NamedTuple):
-    """The visible surface of a kind of objects.
+    """The visible surface of objects that have the same shapes and colours.
 
     Attributes:
-        obj_id: Number of the kind, from 1.
-        name: Name of the first object of it.
-        points: Corners in the frame of the object's base link [m], shape (n, 3).
-        triangles: Numbers of three corners each, shape (m, 3).
-        rgb: Colour of each corner from 0 to 255, shape (n, 3); pictures on the surface are left out.
+        obj_id: Number of the model, starting at 1.
+        name: Name of the first object with this model.
+        points: Corners in the frame of the object's base link, shape (n, 3) [m].
+        triangles: Indices of the three corners of each triangle, shape (m, 3).
+        rgb: Colour of each corner, from 0 to 255, shape (n, 3); textures are ignored.
     """
 
     obj_id: int
@@ -42,17 +42,17 @@ class ObjectModel(NamedTuple):
 
     @property
     def centre(self) -> Array:
-        """Centre of its bounding box [m], shape (3,)."""
+        """Centre of the model's bounding box, shape (3,) [m]."""
         middle: Array = (self.points.min(axis=0) + self.points.max(axis=0)) / 2.0
         return middle
 
     @property
     def radius(self) -> float:
-        """Radius of the ball about the centre that encloses it [m]."""
+        """Radius of the smallest ball around `centre` that encloses the model [m]."""
         return float(np.linalg.norm(self.points - self.centre, axis=1).max())
 
     def info(self) -> dict[str, float]:
-        """Returns its entry of `models_info.json`: diameter and bounding box [mm]."""
+        """Returns the model's entry in `models_info.json`: diameter and bounding box [mm]."""
         low, size = MM * self.points.min(axis=0), MM * np.ptp(self.points, axis=0)
         entry = {"diameter": MM * _diameter(self.points)}
         entry |= {f"min_{axis}": value for axis, value in zip("xyz", low)}
@@ -60,7 +60,7 @@ class ObjectModel(NamedTuple):
         return {key: round(float(value), 4) for key, value in entry.items()}
 
     def as_ply(self) -> str:
-        """Returns the text of a PLY file [mm]."""
+        """Returns the model as the text of a PLY file with corners [mm], normals, colours and triangles."""
         properties = [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
         properties += [f"property uchar {name}" for name in ("red", "green", "blue")]
         text = io.StringIO()
@@ -72,7 +72,9 @@ class ObjectModel(NamedTuple):
         return text.getvalue()
 
     def _normals(self) -> Array:
-        """Returns the unit normal at each corner, the mean of its triangles by area, shape (n, 3)."""
+        """Returns the unit normal at each corner: the area-weighted mean of adjacent triangles' normals, shape
+        (n, 3).
+        """
         a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
         across = np.cross(b - a, c - a)
         normals = np.zeros_like(self.points)
@@ -83,10 +85,10 @@ class ObjectModel(NamedTuple):
 
 
 def models_of(bodies: Iterable[Body]) -> dict[str, ObjectModel]:
-    """Returns the models of objects, by name of the object; objects with the same shapes and colours share one.
+    """Returns the models of objects, indexed by object name; objects with the same shapes and colours share a model.
 
     Raises:
-        InterfaceError: If a mesh cannot be read.
+        InterfaceError: If a mesh cannot be read, or an object has no visual shape that a file describes.
     """
     kinds: dict[Any, ObjectModel] = {}
     found = {}
@@ -113,7 +115,7 @@ def _model(obj_id: int, name: str, shapes: list[BodyShape]) -> ObjectModel:
 
 
 def _triangles(shape: BodyShape) -> Array:
-    """Returns the corners of the triangles of a shape in the link's frame [m], three rows each, shape (3 n, 3)."""
+    """Returns the corners of the n triangles of a shape in the link's frame, shape (3 n, 3) [m]."""
     x, y, z = shape.size
     if shape.kind is ShapeKind.MESH:
         corners = np.concatenate(read_triangles(shape.mesh_file)) * shape.size
@@ -132,9 +134,9 @@ def _triangles(shape: BodyShape) -> Array:
 
 
 def _diameter(points: Array) -> float:
-    """Returns the largest distance of two points."""
+    """Returns the largest distance between two of the points."""
     try:
         points = points[ConvexHull(points).vertices]
     except QhullError:
-        pass  # flat, and usually few
+        pass  # the points lie in a plane, and are usually few
     return float(pdist(points).max())

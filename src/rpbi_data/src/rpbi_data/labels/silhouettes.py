@@ -1,4 +1,4 @@
-"""Silhouettes of objects, as if nothing else were in the world."""
+"""Silhouettes of objects, each drawn as if nothing else were in the world."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rpbi.world.load_log import LoadLogReader
 from .models import ObjectModel
 
 MARGIN_PX = 2
-"""Width of the border of a window around what is drawn in it."""
+"""Width of the border of a window around the object that is drawn in the window [px]."""
 
 Mask = npt.NDArray[np.bool_]
 Bounds = tuple[int, int, int, int]
@@ -30,11 +30,11 @@ NOWHERE: Bounds = (0, -1, 0, -1)
 
 @dataclass(frozen=True)
 class ImageWindow(Intrinsics):
-    """Intrinsics of a window of an image, which may reach beyond it.
+    """Intrinsics of a rectangular window of an image; the window may extend beyond the image.
 
     Attributes:
-        left_px: Column of the image at which it begins.
-        top_px: Row of the image at which it begins.
+        left_px: Column of the image at which the window begins; it may be negative.
+        top_px: Row of the image at which the window begins; it may be negative.
         whole: Intrinsics of the image.
     """
 
@@ -44,14 +44,14 @@ class ImageWindow(Intrinsics):
 
     @classmethod
     def of(cls, whole: Intrinsics, left: int, top: int, right: int, bottom: int) -> ImageWindow:
-        """Returns the window from a column and a row to others, exclusive."""
+        """Returns the window from column `left` and row `top` to column `right` and row `bottom`, both exclusive."""
         given = {field.name: getattr(whole, field.name) for field in fields(Intrinsics)}
         size = {"width_px": right - left, "height_px": bottom - top}
         return cls(**{**given, **size}, left_px=left, top_px=top, whole=whole)
 
     @property
     def projection(self) -> Array:
-        """The 4x4 matrix of the image, with its scale and its middle moved so that the window fills clip space."""
+        """The image's projection matrix, shape (4, 4), scaled and shifted so that the window fills clip space."""
         matrix, K = self.whole.projection, self.whole.K
         matrix[0, 0] *= self.whole.width_px / self.width_px
         matrix[1, 1] *= self.whole.height_px / self.height_px
@@ -61,12 +61,12 @@ class ImageWindow(Intrinsics):
 
 
 class Silhouette(NamedTuple):
-    """The outline of an object without the others, filled.
+    """The pixels that an object covers if nothing else is in the world.
 
     Attributes:
-        mask: The part within the image, bool, shape (height, width).
-        pixels: Number of pixels, also beyond the image.
-        box: Its bounds, also beyond the image.
+        mask: Mask of the pixels within the image, shape (height, width).
+        pixels: Number of pixels, including pixels outside the image.
+        box: Bounds of the silhouette, including its part outside the image.
     """
 
     mask: Mask
@@ -74,7 +74,10 @@ class Silhouette(NamedTuple):
     box: Bounds
 
     def including(self, visible: Mask) -> Silhouette:
-        """Returns it with all pixels at which the object is seen; at edges, two drawings may differ by rounding."""
+        """Returns this silhouette, extended to all pixels in which the object is visible.
+
+        Without this, the edges of two drawings of an object may differ because of rounding.
+        """
         missing = visible & ~self.mask
         if not missing.any():
             return self
@@ -86,11 +89,11 @@ class Silhouette(NamedTuple):
 
 
 class Silhouettes:
-    """Draws objects alone, each kind in a PyBullet client of its own.
+    """Draws single objects, with a separate PyBullet client for each model.
 
     Args:
-        world: The world.
-        models: Models of the objects by name.
+        world: World of the objects.
+        models: Models of the objects, indexed by object name.
     """
 
     def __init__(self, world: World, models: Mapping[str, ObjectModel]) -> None:
@@ -106,12 +109,12 @@ class Silhouettes:
             self._drawn[name] = renderer, mirror
 
     def draw(self, model: ObjectModel, state: BodyState, T: Array, camera: Pose, whole: Intrinsics) -> Silhouette:
-        """Returns the silhouette of an object.
+        """Draws an object alone, and returns its silhouette.
 
         Args:
-            model: Its model.
-            state: Its state.
-            T: Pose of its base link in the optical frame, shape (4, 4).
+            model: Model of the object.
+            state: State of the object.
+            T: Pose of the object's base link in the optical frame, shape (4, 4) [m].
             camera: Pose of the optical frame in the world.
             whole: Intrinsics of the image.
         """
@@ -132,25 +135,25 @@ class Silhouettes:
         return Silhouette(mask, int(drawn.sum()), (left + first, left + last, top + upper, top + lower))
 
     def close(self) -> None:
-        """Disconnects from PyBullet and deletes the files that were made."""
+        """Disconnects from PyBullet and deletes temporary files."""
         for renderer, mirror in self._drawn.values():
             mirror.close()
             renderer.pb.disconnect()
 
 
 def bounds(mask: Mask) -> Bounds:
-    """Returns the bounds of the pixels of a mask that has one at least."""
+    """Returns the bounds of the pixels in a mask, which must have at least one pixel."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return int(columns[0]), int(columns[-1]), int(rows[0]), int(rows[-1])
 
 
 def _window(points: Array, whole: Intrinsics) -> ImageWindow | None:
-    """Returns the window that points of the optical frame are in; None if it is empty.
+    """Returns the window that contains given points of the optical frame, or None if the window is empty.
 
-    It reaches at most the image's own size beyond it on each side.
+    On each side, the window extends beyond the image by at most the size of the image.
     """
     width, height = whole.width_px, whole.height_px
-    if points[:, 2].min() < whole.near_m:  # it reaches behind the camera
+    if points[:, 2].min() < whole.near_m:  # the object extends behind the camera
         return ImageWindow.of(whole, -width, -height, 2 * width, 2 * height)
     u, v, _ = whole.K @ (points / points[:, 2:]).T
     left, right = _clipped(u, width)

@@ -35,9 +35,9 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
     """Returns the scene of an episode, built with the files that are stored with it.
 
     Raises:
-        EpisodeError: If there is no such episode, or it has no bag.
-        BagError: If its bag cannot be read.
-        ConfigError: If its world cannot be built.
+        EpisodeError: If the folder has no such episode, or the episode has no bag.
+        BagError: If the bag cannot be read.
+        ConfigError: If the recorded world cannot be built.
     """
     episode = folder.read(number)
     with recorded_episode(folder, episode, any_size, is_replayed=False) as (bag, recording):
@@ -49,8 +49,8 @@ def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> 
     """Returns the scene of a bag with `rpbi/world_description`, built with the files that are on the disk.
 
     Raises:
-        BagError: If it cannot be read, or lacks the description.
-        ConfigError: If its world cannot be built.
+        BagError: If the bag cannot be read, or lacks the description.
+        ConfigError: If the recorded world cannot be built.
     """
     return _scene(bag.name, bag, namespace, read_recording(bag, namespace, any_size, needs_states=False), any_size)
 
@@ -99,7 +99,10 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
 
 
 def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[float, Array]:
-    """Returns the start [s], and at most so many evenly spaced times since then [s], up to the last message."""
+    """Returns the time of the first message [s], and at most `most` evenly spaced times up to the last message.
+
+    The evenly spaced times are relative to the first message [s].
+    """
     stamps = [table.index for table in tables.values() if len(table) > 1]
     start_s = min((float(each[0]) for each in stamps), default=0.0)
     seconds = max((float(each[-1]) for each in stamps), default=0.0) - start_s

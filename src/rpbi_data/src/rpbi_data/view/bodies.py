@@ -18,14 +18,14 @@ from .frames import Frames
 from .scene import Array, Poses, ShownLink
 
 Commands = Mapping[int, Mapping[int, RecordedCommand]]
-"""Commands by number of resets and index, as `Recording` has them."""
+"""Commands, indexed by the number of preceding resets and the index of the command, as in `Recording`."""
 
 
 def add_later_bodies(world: World, commands: Commands) -> list[str]:
-    """Adds the bodies that were added to a world after its start, for their shapes.
+    """Adds to a world the bodies that were added after the start of the recording, so that their shapes are known.
 
     Returns:
-        Sentences on those that cannot be added.
+        Messages about bodies that cannot be added.
     """
     notes = []
     for command in _in_order(commands):
@@ -48,15 +48,15 @@ def links_of(
     """Returns all links with visible shapes.
 
     Args:
-        world: The world, with all bodies that it ever had.
-        at_start: Names of the bodies at its start.
-        commands: Its commands.
+        world: The world, with all bodies that were in it at any time of the recording.
+        at_start: Names of the bodies that were in the world at the start of the recording.
+        commands: The recorded commands.
         states: Table of `rpbi/state`, which has the times of ticks.
-        frames: TF, at the times of the scene.
-        joints: Tables of joint states by the name of the body, for links that are not on TF.
+        frames: TF frames at the times of the scene.
+        joints: Tables of joint states, indexed by body name, for links that are not on TF.
 
     Returns:
-        The links, and sentences on bodies that are not shown, or not where they were.
+        The links, and messages about bodies that are not shown, or are shown at their initial poses.
     """
     links: list[ShownLink] = []
     notes: list[str] = []
@@ -95,7 +95,7 @@ class _Presence:
                     self._changes.append((at_s, command.name, command.what == "add"))
 
     def of(self, name: str) -> Array:
-        """Returns for each time whether a body is present, shape (n,); always without data."""
+        """Returns for each time whether a body is present, shape (n,); without recorded states, this is always True."""
         is_there = np.ones(len(self._times), bool)
         for at_s, changed, comes in self._changes:
             if changed == name:
@@ -104,7 +104,11 @@ class _Presence:
 
 
 class _LinkPoses:
-    """Poses of the links of a body: from TF, else from its joint states and its base pose, else the initial poses."""
+    """Poses of the links of a body.
+
+    They are read from TF, or else computed from joint states and the base pose; without both, they are the initial
+    poses.
+    """
 
     def __init__(self, world: World, body: Body, frames: Frames, joints: pd.DataFrame | None) -> None:
         self._body, self._frames, self._joints = body, frames, joints
@@ -119,7 +123,7 @@ class _LinkPoses:
         self._by_joints: dict[int, Poses] = {}
 
     def of(self, index: int) -> Poses:
-        """Returns the poses of a link by PyBullet's index, -1 for the base."""
+        """Returns the poses of the link with a given PyBullet index; the index of the base is -1."""
         if index < 0:
             return self._base
         return self._on_tf(self._body.link_name(index)) or self._base @ self._in_base(index)

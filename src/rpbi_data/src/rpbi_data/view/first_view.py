@@ -18,9 +18,9 @@ from .scene import Array, ShownLink, TriangleMesh
 FOV_RAD = math.radians(45.0)
 """Vertical angle of view [rad]."""
 YAW_DEG, PITCH_DEG = 45.0, -30.0
-"""Direction of the camera where the world has none [deg]."""
+"""Direction of the camera if the world does not configure a camera [deg]."""
 LARGE_M = 3.0
-"""Extent from which on a shape, such as a floor, need not be seen as a whole [m]."""
+"""Extent above which a shape, such as a floor, need not be entirely visible [m]."""
 MARGIN = 1.15
 """Factor on the distance at which all links just fit."""
 MIN_DISTANCE_M = 0.8
@@ -33,12 +33,12 @@ Camera = tuple[Vector, Vector]
 def first_view(
     own: ResetDebugVisualizerCamera, links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]
 ) -> Camera:
-    """Returns the camera of the world; if the world names none, one that sees all links where they are at first.
+    """Returns the camera that the world configures, or a camera that sees all links at their initial poses.
 
     Args:
-        own: That of PyBullet's window. PyBullet's default, which is below a floor, counts as none.
-        links: The links.
-        meshes: Meshes by shape.
+        own: Configured camera of PyBullet's window. The default counts as not configured, as it is below a floor.
+        links: Links to be seen.
+        meshes: Meshes of the shapes that are meshes.
     """
     if own != ResetDebugVisualizerCamera():
         target = np.array(own.cameraTargetPosition)
@@ -55,7 +55,7 @@ def first_view(
 
 
 def _forward(yaw_deg: float, pitch_deg: float) -> Array:
-    """Returns the direction in which PyBullet's camera looks, a unit vector."""
+    """Returns the viewing direction of PyBullet's camera as a unit vector."""
     yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
     return np.array([-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)])
 
@@ -65,7 +65,10 @@ def _camera(target: Array, distance: float, forward: Array) -> Camera:
 
 
 def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]) -> Array:
-    """Returns points to be seen, shape (n, 3) [m]: corners of small shapes, and the nearest point of each large one."""
+    """Returns points to be seen, shape (n, 3) [m].
+
+    These are the corners of small shapes, and for each large shape the point nearest to the middle of the small ones.
+    """
     corners = [each for link in links for each in _corners(link, meshes)]
     if not corners:
         return np.zeros((1, 3))
@@ -77,7 +80,7 @@ def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]
 
 
 def _corners(link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> Iterator[Array]:
-    """Yields the corners of the box around each shape of a link, shape (8, 3) [m], when it is first there."""
+    """Yields the corners of the box around each shape of a link when the link first appears, shape (8, 3) [m]."""
     first = int(np.argmax(link.is_there))
     position, rotation = link.poses.position[first], link.poses.rotation[first]
     for shape in link.shapes:

@@ -13,19 +13,19 @@ from .frames import Frames
 from .scene import Array, Arrows
 
 MAX_AGE_S = 0.2
-"""Time after a message from which on its forces have no arrows [s]."""
+"""Age of a message above which its forces are not drawn [s]."""
 FORCE = [f"wrench/force/{axis}" for axis in "xyz"]
 FRAME = "header/frame_id"
 _NOTHING = np.empty((0, 3))
 
 
 def contact_arrows(topic: str, table: pd.DataFrame, times: Array) -> Arrows:
-    """Returns the contact forces on a body at some times: those of the newest message.
+    """Returns the contact forces on a body at given times, each from the newest message at that time.
 
     Args:
         topic: Topic of the contacts.
-        table: Its table.
-        times: The times [s].
+        table: Table of the messages of the topic.
+        times: Times of the arrows, in ROS time [s].
     """
     points, forces = (_columns(table, "position"), _contact_forces(table)) if "position/x" in table else (None, None)
     arrows = Arrows(topic, True, [], [])
@@ -37,12 +37,12 @@ def contact_arrows(topic: str, table: pd.DataFrame, times: Array) -> Arrows:
 
 
 def wrench_arrows(topic: str, table: pd.DataFrame, frames: Frames) -> Arrows | str:
-    """Returns the forces of stamped wrenches at the origin of their frame, or a sentence why they have no arrows.
+    """Returns the forces of stamped wrenches at the origin of their frame, or the reason why they cannot be drawn.
 
     Args:
         topic: Topic of the wrenches.
-        table: Its table.
-        frames: TF, at the times of the scene.
+        table: Table of the messages of the topic.
+        frames: TF frames at the times of the scene.
     """
     names = list(table[FRAME].dropna().unique()) if FRAME in table else []
     if len(names) != 1:
@@ -60,11 +60,11 @@ def wrench_arrows(topic: str, table: pd.DataFrame, frames: Frames) -> Arrows | s
 
 
 def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str, Mapping[str, pd.Series]]:
-    """Returns lines of forces and torques over time since the start [s], by the title of their panel.
+    """Returns the panels of plots of forces and torques, indexed by title; each has lines over time from the start [s].
 
     Args:
-        tables: Tables of contacts and stamped wrenches by topic.
-        start_s: The start [s].
+        tables: Tables of contacts and stamped wrenches, indexed by topic.
+        start_s: ROS time of the start [s].
     """
     found: dict[str, Mapping[str, pd.Series]] = {}
     for topic, table in tables.items():
@@ -74,7 +74,7 @@ def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str
 
 
 def _contact_forces(table: pd.DataFrame) -> Array:
-    """Returns the force of each row, shape (n, 3) [N]; NaN in rows without contact."""
+    """Returns the contact force of each row, shape (n, 3) [N]; rows without contact have NaN."""
     return np.asarray(
         _columns(table, "normal") * table[["normal_force"]].to_numpy()
         + _columns(table, "friction_direction_1") * table[["friction_force_1"]].to_numpy()
@@ -87,7 +87,7 @@ def _columns(table: pd.DataFrame, vector: str) -> Array:
 
 
 def _newest(stamps: Array, times: Array) -> Iterator[slice]:
-    """Yields for each time the rows of the newest message, no row if it is too old."""
+    """Yields for each time the rows of the newest message, or an empty slice if that message is too old."""
     for time_s in times:
         end = int(np.searchsorted(stamps, time_s, side="right"))
         is_new = end > 0 and time_s - stamps[end - 1] <= MAX_AGE_S

@@ -15,11 +15,11 @@ from .scene import Array, Poses
 
 
 class Frames:
-    """Poses of frames in the world.
+    """Poses of TF frames in the world at given times.
 
     Args:
-        tables: Tables of a bag, of which `/tf` and `/tf_static` count.
-        own: Frames of the simulator, without prefix: the prefix is the one with which most of them are on TF.
+        tables: Tables of a bag, of which only `/tf` and `/tf_static` are read.
+        own: Frames of the simulator without their TF prefix. The prefix with which most of them are on TF is used.
         times: Times of the poses, ascending, shape (n,) [s].
     """
 
@@ -36,9 +36,9 @@ class Frames:
         self._found: dict[str, Poses | None] = {}
 
     def poses(self, frame: str) -> Poses | None:
-        """Returns the poses of a frame, with or without the prefix in its name; None if it is not on TF.
+        """Returns the poses of a frame, given with or without the TF prefix, or None if the frame is not on TF.
 
-        Before its first and after its last transform it is where it was then.
+        Before its first transform, the frame has its first pose; after its last transform, it has its last pose.
         """
         name = self._prefix + frame if self._prefix + frame in self._known else frame
         if name not in self._found:

@@ -20,23 +20,23 @@ except ImportError as error:
     raise MissingDependency(error.name or "trimesh", "./rpbi setup html") from None
 
 MAX_TRIANGLES = 18_000
-"""Number of triangles of all meshes of a page; with more, all are simplified."""
+"""Total number of triangles on a page above which the meshes are simplified."""
 MIN_TRIANGLES = 200
-"""Number of triangles below which no mesh is simplified."""
+"""Smallest number of triangles to which a mesh is reduced; smaller meshes are not simplified."""
 CREASE_RAD = 0.6
-"""Angle between two triangles above which there is an edge to be seen [rad]."""
+"""Angle between two triangles above which their common edge is visible [rad]."""
 _SAME_M = 1e-6
-"""Distance below which two corners of a mesh are one [m, in the units of the file]."""
+"""Grid to which corners of a mesh are rounded, in the units of the file; corners at the same grid point are merged."""
 
 
 def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, TriangleMesh], list[str]]:
-    """Returns the meshes of shapes, simplified together if they have too many triangles.
+    """Returns the meshes of shapes, all simplified if their total number of triangles is too large.
 
     Args:
-        shapes: The shapes; those that are no meshes are left out.
+        shapes: Shapes of any kind; shapes that are not meshes are left out.
 
     Returns:
-        Meshes by shape, and sentences on those that cannot be read, and on the simplification.
+        The meshes, indexed by shape, and messages about unreadable meshes and about simplification.
     """
     read: dict[object, Trimesh | None] = {}
     notes = []
@@ -67,14 +67,14 @@ def _key(shape: BodyShape) -> object:
 
 
 def _corners(shape: BodyShape) -> Array:
-    """Returns the corners of the triangles of a shape, shape (n, 3, 3)."""
+    """Returns the triangle corners of a mesh, shape (n, 3, 3)."""
     if shape.kind is ShapeKind.MESH:
         return np.concatenate(read_triangles(shape.mesh_file))
     return np.reshape(shape.corners, (-1, 3, 3))
 
 
 def _merged(corners: Array) -> Trimesh:
-    """Returns a mesh whose triangles share their corners."""
+    """Returns a mesh in which adjacent triangles share their corners."""
     numbers = np.round(corners.reshape(-1, 3) / _SAME_M).astype(np.int64)
     _, first, inverse = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
     faces = inverse.reshape(-1, 3)

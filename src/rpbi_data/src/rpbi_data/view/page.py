@@ -1,4 +1,4 @@
-"""A scene as one HTML page, by viser."""
+"""Writes a scene as one HTML page with viser."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ except ImportError as error:
     raise MissingDependency(error.name or "viser", "./rpbi setup html") from None
 
 MAX_BYTES = 2_000_000
-"""Size of a page above which it has fewer times [bytes]."""
+"""Size above which a page is made again with fewer times [bytes]."""
 MIN_TIMES = 10
-"""Number of times that a page has at least."""
+"""Number of times below which a page is not reduced."""
 STILL = 1e-5
-"""Smallest motion between two times that is shown [m, and parts of a quaternion]."""
+"""Change of a position component [m] or a quaternion component above which it is shown."""
 POSE_STEP, ARROW_STEP = 2.0**-15, 2.0**-12
-"""Steps to which poses and arrows are rounded, since numbers of few digits need less space [m]."""
+"""Steps to which poses [m, or without unit in quaternions] and arrows [m] are rounded, so that pages are smaller."""
 LONG_ARROW_M, MAX_ARROW_M = 0.4, 0.8
-"""Length of an arrow that only one in twenty exceeds, and the length at which arrows are cut off [m]."""
+"""Approximate 95th percentile of arrow lengths, and length to which longer arrows are shortened [m]."""
 CONTACT_RGB, SENSOR_RGB = (214, 39, 40), (31, 119, 180)
 SHAFT_M, HEAD_M, HEAD_LENGTH_M = 0.006, 0.014, 0.035
 """Radii of shaft and head of an arrow, and length of its head [m]."""
 MAX_LINE_POINTS, MAX_POINTS = 1500, 30_000
-"""Number of points of a line in a plot, and of all; with more, the smallest and largest of short ranges are drawn."""
+"""Maximum number of points of a line, and of all lines together; longer lines are reduced to extremes of intervals."""
 _WXYZ = [3, 0, 1, 2]
 
 
 def page_of(scene: PageScene) -> tuple[str, PageScene]:
-    """Returns the text of a page and the scene that it shows, which has fewer times if the page would be too large."""
+    """Returns the HTML text of a page, and the scene on that page, with fewer times if the page would be too large."""
     while len((text := _page(scene)).encode()) > MAX_BYTES and len(scene.times) > MIN_TIMES:
         scene = scene.coarser(max(MIN_TIMES, len(scene.times) // 2))
     return text, scene
@@ -75,7 +75,7 @@ def _record(server: Any, recording: Any, scene: PageScene, metres_per_newton: fl
 
 
 class _LinkPlayer:
-    """Shows a link at the times of the scene."""
+    """Shows the poses of a link at the times of the scene."""
 
     def __init__(self, api: Any, link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
         name = f"/{link.body}/{link.name}"
@@ -122,14 +122,17 @@ class _ArrowPlayer:
 
 
 def _segments(points: Array, arrows: Array) -> Array:
-    """Returns start and end of arrows, shape (k, 2, 3) [m]; those that are too long are cut off."""
+    """Returns start and end of arrows, shape (k, 2, 3) [m].
+
+    Arrows longer than `MAX_ARROW_M` are shortened; arrows no longer than their head are left out.
+    """
     length = np.linalg.norm(arrows, axis=1, keepdims=True)
     cut = arrows * np.minimum(1.0, MAX_ARROW_M / np.maximum(length, 1e-9))
     return np.stack([points, points + cut], axis=1)[length[:, 0] > HEAD_M]
 
 
 def _arrow_scale(arrows: list[Arrows]) -> float:
-    """Returns the length of arrows: 1, 2 or 5 times a power of ten [m/N]."""
+    """Returns the scale of arrows, rounded to 1, 2 or 5 times a power of ten [m/N]."""
     forces = np.concatenate([np.empty((0, 3)), *(each for of_topic in arrows for each in of_topic.forces)])
     sizes = np.linalg.norm(forces, axis=1)
     sizes = sizes[sizes > 0.0]
@@ -185,7 +188,10 @@ def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
 
 
 def _points(line: pd.Series, count: int) -> dict[str, list[float]]:
-    """Returns about so many points of a line as lists x and y; of long lines the extremes of short ranges."""
+    """Returns the points of a line as lists `x` and `y`; a line of more than `count` points is reduced to extremes.
+
+    The extremes are the smallest and the largest value of each of `count // 2` intervals.
+    """
     values = line.dropna()
     x, y = values.index.to_numpy(float), values.to_numpy(float)
     if len(y) > count:

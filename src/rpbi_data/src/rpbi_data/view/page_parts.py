@@ -1,4 +1,4 @@
-"""HTML of the plots below viser's view, whose time line they follow."""
+"""HTML of the plots below viser's view; the plots follow viser's time line."""
 
 HEAD = """<style>
 body { display: flex; flex-direction: column; }

@@ -1,4 +1,4 @@
-"""Content of a page, free of the libraries that draw it."""
+"""Content of a page, independent of the libraries that draw it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[Any]
 MAX_HZ = 25.0
 """Largest rate of poses and arrows on a page [Hz]."""
 MAX_POSES = MAX_ARROWS = 25_000
-"""Number of poses of all links of a page, and of its arrows; a longer recording has fewer a second."""
+"""Maximum total number of link poses, and of arrows, on a page; long recordings are shown at lower rates."""
 
 
 class Poses(NamedTuple):
@@ -35,16 +35,16 @@ class Poses(NamedTuple):
 
     @classmethod
     def still(cls, pose: Pose, count: int) -> Poses:
-        """Returns one pose many times."""
+        """Returns the same pose for each of `count` times."""
         return cls(np.tile(pose.position, (count, 1)), Rotation.from_quat(np.tile(pose.quat_xyzw, (count, 1))))
 
     @classmethod
     def from_numbers(cls, numbers: Array) -> Poses:
-        """Returns poses of rows of position and quaternion x, y, z, w, shape (n, 7)."""
+        """Returns poses from an array of shape (n, 7), whose rows are a position [m] and a quaternion x, y, z, w."""
         return cls(numbers[:, :3], Rotation.from_quat(numbers[:, 3:]))
 
     def __matmul__(self, other: Poses) -> Poses:
-        """Chains poses, time by time."""
+        """Composes the poses of each time with the poses of another frame at the same time."""
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 
@@ -53,7 +53,7 @@ class TriangleMesh(NamedTuple):
 
     Attributes:
         corners: Shape (n, 3) [m].
-        triangles: Numbers of three corners each, shape (m, 3).
+        triangles: Indices of the three corners of each triangle, shape (m, 3).
     """
 
     corners: Array
@@ -62,14 +62,14 @@ class TriangleMesh(NamedTuple):
 
 @dataclass
 class ShownLink:
-    """A link with something to be seen.
+    """A link with visible shapes.
 
     Attributes:
-        body: Name of its body.
-        name: Its name.
-        shapes: Its visible shapes.
-        poses: Its poses in the world, at the times of the scene.
-        is_there: Whether its body is in the world, at these times.
+        body: Name of the body that the link belongs to.
+        name: Name of the link.
+        shapes: Visible shapes of the link.
+        poses: Poses of the link in the world, at the times of the scene.
+        is_there: Whether the body is in the world, at each time of the scene, shape (n,).
     """
 
     body: str
@@ -84,10 +84,10 @@ class Arrows:
     """Forces that one topic reports.
 
     Attributes:
-        topic: The topic.
-        is_contact: Whether they are contact forces, else those of a sensor.
-        points: For each time of the scene where the forces act, in the world, shape (k, 3) [m].
-        forces: For each time the forces in the axes of the world, shape (k, 3) [N].
+        topic: Name of the topic.
+        is_contact: Whether the forces are contact forces; otherwise, they are measured by a sensor.
+        points: Points of application in the world frame, one array of shape (k, 3) [m] for each time of the scene.
+        forces: Forces in the world frame, one array of shape (k, 3) [N] for each time of the scene.
     """
 
     topic: str
@@ -101,15 +101,15 @@ class PageScene:
     """Content of a page.
 
     Attributes:
-        title: Its title.
-        start_s: Time of its start, in ROS time [s].
+        title: Title of the page.
+        start_s: ROS time of the start of the scene [s].
         times: Times of poses and arrows since the start, shape (n,) [s].
-        camera: Position of the camera at the start, and the point that it looks at [m].
-        links: The links.
-        meshes: Meshes by the shape that they belong to.
-        arrows: The forces.
-        panels: Lines over time since the start [s], by the title of their panel.
-        notes: Sentences on what is not shown, or otherwise than it was; see `all_notes`.
+        camera: Initial position of the camera, and the point that it looks at [m].
+        links: Visible links.
+        meshes: Meshes, indexed by the shape that they belong to.
+        arrows: Forces, with one entry for each topic.
+        panels: Lines of the plots over time since the start [s], indexed by the title of their panel.
+        notes: Messages about content that is not shown, or differs from the recording; see `all_notes`.
     """
 
     title: str
@@ -124,7 +124,7 @@ class PageScene:
 
     @property
     def all_notes(self) -> list[str]:
-        """The notes, and one on the rate of poses if it is lower than usual."""
+        """The notes, and a message about the rate of poses if that rate is lower than usual."""
         hz = (len(self.times) - 1) / self.times[-1]
         if hz >= MAX_HZ - 1.0:
             return self.notes
@@ -132,10 +132,10 @@ class PageScene:
         return [*self.notes, f"the view has {hz:.3g} poses a second, {reason}; the plots have all"]
 
     def coarser(self, count: int) -> PageScene:
-        """Returns the same with fewer times.
+        """Returns the same scene with fewer times.
 
         Args:
-            count: Their number, at least 2; the first and the last one stay.
+            count: Number of times, at least 2. The first and the last time are kept.
         """
         kept = np.linspace(0, len(self.times) - 1, count).round().astype(int)
         links = [
@@ -149,7 +149,7 @@ class PageScene:
         return replace(self, times=self.times[kept], links=links, arrows=arrows)
 
     def with_few_arrows(self) -> PageScene:
-        """Returns the same with about MAX_ARROWS arrows at most, by fewer times if there are more."""
+        """Returns the same scene, with fewer times if it has more than `MAX_ARROWS` arrows."""
         arrows = sum(len(points) for each in self.arrows for points in each.points)
         if arrows <= MAX_ARROWS:
             return self

@@ -22,9 +22,9 @@ from .tasks import AccelerationTask, Approach, Gain, capture, pull, spring
 
 LINEAR, ANGULAR, UP = slice(0, 3), slice(3, 6), slice(2, 3)
 CAPTURE_WEIGHT = 100.0
-"""Weight of the capture point; the largest, since balance matters most."""
+"""Weight of the capture point; it is the largest weight, since balance matters most."""
 HEIGHT, UPRIGHT, POSTURE = Gain(50.0, 20.0), Gain(60.0, 5.0), Gain(30.0, 0.02)
-"""Gains of the centre of mass's height, the torso and the posture. The posture has a low weight: it only resolves
+"""Gains for the height of the centre of mass, the torso and the posture. The posture has a low weight: it only resolves
 redundancy.
 """
 HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
@@ -58,9 +58,10 @@ class BalanceConfig(ControllerConfig):
 class Balance(Controller):
     """Stands on both feet, and moves a hand to a target.
 
-    Every few ticks a quadratic program finds efforts that bring the capture point over the middle of the feet and the
-    hand to its target, and keep height, an upright torso and the posture of the start. The feet stand still and neither
-    slide nor tip. `target` is a pose of the hand's point in the world; until one comes, the arm keeps its posture.
+    Every few ticks a quadratic program finds joint efforts. They bring the capture point over the middle of the feet
+    and the hand to its target, and keep the height, the upright torso and the posture of the start. The feet do not
+    move: they neither slide nor tip. `target` is the pose of the hand's point in the world; until a target arrives, the
+    arm keeps its posture.
     """
 
     Config = BalanceConfig
@@ -75,11 +76,11 @@ class Balance(Controller):
         self._program = WholeBodyProgram(robot, cone, len(self._soles))
 
     def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> Pose:
-        """Accepts finite poses."""
+        """Returns the pose of a target, and refuses poses that are not finite."""
         return check_pose(value.pose if isinstance(value, PoseTarget) else value)
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Starts from the measured posture."""
+        """Takes the measured posture, height and yaw as the ones to keep."""
         seed, period_s = self.config.noise_seed, self.config.period_ticks * self.arm.dt_s
         self._estimate = None if seed is None else BaseEstimate(state.base, period_s, seed)
         self._robot.update(state)
@@ -104,7 +105,9 @@ class Balance(Controller):
         return self._efforts
 
     def report(self) -> Mapping[str, float]:
-        """Returns how far centre of mass and hand are from their goals [m], and how often there was no solution."""
+        """Returns the distances of the centre of mass and the hand from their goals [m], and the number of solutions
+        that failed.
+        """
         return {**self._errors, "unsolved": float(self._unsolved)}
 
     def _solve(self, target: Pose | None) -> None:
@@ -146,7 +149,7 @@ class Balance(Controller):
 
 
 def _yaw_only(rotation: Array) -> Array:
-    """Returns the upright orientation with the same yaw."""
+    """Returns the upright orientation, shape (3, 3), that has the same yaw as a given one."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))

@@ -1,4 +1,4 @@
-"""The dynamics of a robot whose base floats, by Pinocchio."""
+"""The dynamics of a robot with a floating base, computed by Pinocchio."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
 FREE = 6
-"""Velocities of the base: linear and angular, in its own axes."""
+"""Number of velocities of the base: 3 linear and 3 angular ones, in the axes of the base."""
 
 
 class FrameMotion(NamedTuple):
-    """Motion of a frame or of the centre of mass, in m and rad, for n velocities of the robot.
+    """Motion of a frame or of the centre of mass, in m and rad, for a robot with n velocities.
 
     Attributes:
-        jacobian: From velocities of the robot to the frame's, linear before angular, shape (6, n) or (3, n).
+        jacobian: Maps the robot's velocities to the frame's velocity, linear before angular, shape (6, n) or (3, n).
         velocity: Velocity of the frame, shape (6,) or (3,).
-        drift: Acceleration of the frame where the robot's velocities are constant, of the same shape.
+        drift: Acceleration of the frame while the robot's velocities are constant, in the shape of `velocity`.
     """
 
     jacobian: Array
@@ -35,25 +35,26 @@ class FrameMotion(NamedTuple):
 
 
 class FloatingRobot:
-    """Mass, bias and kinematics of a robot whose base floats; n is 6 of the base and one for each joint.
+    """Mass matrix, bias and kinematics of a robot with a floating base; it has n velocities, 6 of the base and one for
+    each joint.
 
     Args:
-        urdf_filename: Its URDF.
-        joints: All of its joints, in the order of the states that it is updated with.
+        urdf_filename: The robot's URDF file.
+        joints: Names of all joints, in the order of the states that are given to `update`.
 
     Attributes:
         mass_matrix: Shape (n, n).
         bias: Gravity, Coriolis and centrifugal forces and the joints' damping, shape (n,) [N, N m].
         positions: Positions of the joints, shape (n - 6,) [rad].
         velocities: Velocities of base and joints, shape (n,) [m/s, rad/s].
-        count: n.
+        count: The number n of velocities.
         effort_limits: Largest efforts of the joints, shape (n - 6,) [N m].
         lower: Least positions of the joints, shape (n - 6,) [rad].
-        upper: Greatest ones.
+        upper: Greatest positions of the joints, shape (n - 6,) [rad].
         centre: The centre of mass in the world, shape (3,) [m].
 
     Raises:
-        ValueError: If the URDF has other joints.
+        ValueError: If the joints differ from those in the URDF.
     """
 
     def __init__(self, urdf_filename: str, joints: Sequence[str]) -> None:
@@ -72,10 +73,10 @@ class FloatingRobot:
         self.count: int = self._model.nv
 
     def frame(self, link: str, point: Sequence[float] = (0.0, 0.0, 0.0)) -> int:
-        """Returns the number of a new frame: that of a link, moved to a point of it [m].
+        """Adds a frame to a link, with its origin at a point in the link's frame [m], and returns its index.
 
         Raises:
-            UnknownNameError: If there is no such link.
+            UnknownNameError: If the robot does not have the link.
         """
         model = self._model
         if not model.existFrame(link):
@@ -88,13 +89,13 @@ class FloatingRobot:
         return int(number)
 
     def in_given_order(self, of_joints: Array) -> Array:
-        """Returns one number for each joint in the order of the states."""
+        """Reorders one value for each joint from Pinocchio's joint order to the order of `joints`."""
         ordered = np.empty_like(of_joints)
         ordered[self._order] = of_joints
         return ordered
 
     def update(self, state: RobotState) -> None:
-        """Computes everything for a state."""
+        """Sets the attributes, and the motions of all frames, from a state."""
         model, data = self._model, self._data
         turn = pin.Quaternion(np.array(state.base.quat_xyzw)).normalized()
         back = turn.matrix().T
@@ -112,15 +113,15 @@ class FloatingRobot:
         self.centre = data.com[0].copy()
 
     def placement(self, frame: int) -> Any:
-        """Returns the pose of a frame in the world, as Pinocchio has it."""
+        """Returns the pose of a frame in the world, as an `SE3` of Pinocchio."""
         return self._data.oMf[frame]
 
     def motion_of_centre(self) -> FrameMotion:
-        """Returns how the centre of mass moves, in the axes of the world."""
+        """Returns the motion of the centre of mass in the axes of the world."""
         return FrameMotion(self._jacobian_of_centre, self._data.vcom[0], self._data.acom[0])
 
     def motion(self, frame: int, own_axes: bool = False) -> FrameMotion:
-        """Returns how the origin of a frame moves, in the axes of the world or of the frame."""
+        """Returns the motion of a frame, taken at its origin, in the axes of the world or in its own axes."""
         axes = pin.LOCAL if own_axes else pin.LOCAL_WORLD_ALIGNED
         return FrameMotion(
             pin.getFrameJacobian(self._model, self._data, frame, axes),
@@ -130,18 +131,18 @@ class FloatingRobot:
 
 
 def rotation_of(quat_xyzw: Quaternion) -> Array:
-    """Returns the rotation of a unit quaternion, 3 x 3."""
+    """Returns the rotation matrix of a unit quaternion, shape (3, 3)."""
     rotation: Array = pin.Quaternion(np.array(quat_xyzw)).matrix()
     return rotation
 
 
 def turn_between(start: Array, end: Array) -> Array:
-    """Returns the rotation vector from an orientation to another [rad], both 3 x 3, in the axes of the world."""
+    """Returns the rotation vector [rad] between two orientations of shape (3, 3), in the axes of the world."""
     turn: Array = pin.log3(end @ start.T)
     return turn
 
 
 def turned(start: Array, turn: Array) -> Array:
-    """Returns an orientation, 3 x 3, turned by a rotation vector [rad] in the axes of the world."""
+    """Turns an orientation of shape (3, 3) by a rotation vector [rad] in the axes of the world."""
     end: Array = pin.exp3(turn) @ start
     return end

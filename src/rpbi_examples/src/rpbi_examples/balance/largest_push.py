@@ -1,6 +1,6 @@
 """Finds the largest push that Talos withstands in each direction: `python -m rpbi_examples.balance.largest_push`.
 
-The scene `talos` decides: both feet are where they were, the torso is upright, and the hand is back and stays.
+The scene `talos` defines success: the feet have not moved, the torso is upright, and the hand is at rest at its target.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from rpbi_examples.scenes.task import EnvStage, SceneTask, make_env
 DIRECTIONS = ("forward", "forward left", "left", "back left", "back", "back right", "right", "forward right")
 """Directions of pushes, in steps of 45 degrees to the left."""
 MOST, STEP = 80.0, 2.5
-"""Upper bound of the impulses, and resolution of the result [N s]."""
+"""Largest impulse that is tried, and resolution of the result [N s]."""
 
 
 def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
-    """Returns whether the scene succeeds with a push.
+    """Runs an episode with a given push, and returns whether the scene succeeds.
 
     Args:
         env: Environment of the scene.
         seed: Seed of the episode, except for the push.
-        angle: Direction of the push, from the robot's forward direction to its left [rad].
+        angle: Angle of the push from the robot's forward direction, counted to the left [rad].
         impulse: Impulse of the push [N s].
     """
     assert isinstance(env.task, SceneTask)
@@ -43,7 +43,9 @@ def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
 
 
 def largest_push(env: WorldEnv, seed: int, angle: float) -> float:
-    """Returns the largest impulse that the robot withstands [N s], by bisection to `STEP`; see `stands`."""
+    """Finds the largest impulse that the robot withstands [N s], by bisection with the resolution `STEP`; see
+    `stands`.
+    """
     good, bad = 0, round(MOST / STEP)
     while bad - good > 1:
         middle = (good + bad) // 2
@@ -55,7 +57,7 @@ def largest_push(env: WorldEnv, seed: int, angle: float) -> float:
 
 
 def table(seed: int) -> Iterator[str]:
-    """Yields the lines of a table in Markdown: the largest impulse by direction."""
+    """Yields the lines of a Markdown table with the largest impulse for each direction."""
     env = make_env("talos")
     yield "| push to | largest impulse [N s] |"
     yield "|---|---|"
@@ -65,7 +67,7 @@ def table(seed: int) -> Iterator[str]:
 
 
 def pushes_in(text: str) -> dict[str, float]:
-    """Returns the largest impulse by direction [N s] in a text with the lines of `table`.
+    """Reads the largest impulse for each direction [N s] from a text that contains the lines of `table`.
 
     Raises:
         ValueError: If a direction is missing.
@@ -77,7 +79,7 @@ def pushes_in(text: str) -> dict[str, float]:
 
 
 def draw(pushes: Mapping[str, float], path: Path) -> None:
-    """Draws the largest impulses by direction [N s], as seen from above the robot, which faces up."""
+    """Draws the largest impulse for each direction [N s] in a polar plot: the robot is seen from above and faces up."""
     figure = Figure(figsize=(4.8, 4.8), layout="constrained")
     axes = figure.add_subplot(projection="polar")
     axes.set_theta_zero_location("N")
@@ -96,7 +98,7 @@ def draw(pushes: Mapping[str, float], path: Path) -> None:
 
 
 def main() -> None:
-    """Prints the table, and draws it."""
+    """Prints the table, or reads a printed one from a file, and draws it if a picture is requested."""
     parser = argparse.ArgumentParser(description="Finds the largest push that Talos withstands, by direction.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the start and the target (default: 1)")
     parser.add_argument("--out", type=Path, help="picture of the table")

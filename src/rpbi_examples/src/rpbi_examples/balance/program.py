@@ -20,25 +20,26 @@ except ImportError as error:
 
 UNBOUNDED = 1e30
 EQUAL, SOFT = 5, 8
-"""Flags of daqp: an equality, and a soft bound, which may be violated if there is no other solution."""
+"""Flags of daqp for an equality and for a soft bound, which may be violated if there is no other solution."""
 LIMIT_RATE = 15.0
 """Rate at which a joint may approach its limit [1/s]."""
 WRENCH_COST = np.array((1e-5, 1e-5, 1e-6, 1e-3, 1e-3, 1e-3))
-"""Costs of the squares of contact forces [1/N^2] and torques [1/(N m)^2]: small, so that both feet share the load."""
+"""Costs of squared contact forces [1/N^2] and torques [1/(N m)^2]. They are small, and make the feet share the load."""
 FOOT_DAMPING = 20.0
 """Rate at which a moving foot is brought to rest [1/s]."""
 
 
 class WholeBodyProgram:
-    """Finds accelerations a of base and joints and wrenches w of the feet.
+    """Finds the accelerations a of base and joints, and the wrenches w on the feet.
 
     It minimises the weighted squared errors of the tasks, subject to M a + b = S' t + J' w with efforts t of the joints
     within their limits, feet that do not move, J a = -J' v, and wrenches that soles can take, C w <= 0. The efforts
-    follow from a and w, and are no unknowns. There is no warm start: a solution depends on the arguments only.
+    follow from a and w, and are not unknowns of the program. Without a warm start, a solution depends only on the
+    arguments.
 
     Args:
-        robot: The robot.
-        cone: C of a sole, shape (c, 6).
+        robot: The robot, whose attributes `solve` reads.
+        cone: The matrix C for one sole, shape (c, 6).
         feet: Number of feet.
     """
 
@@ -61,13 +62,13 @@ class WholeBodyProgram:
     def solve(
         self, tasks: Sequence[AccelerationTask], posture: Array, posture_weight: float, feet: Sequence[FrameMotion]
     ) -> Array | None:
-        """Returns the efforts of the joints, shape (n - 6,) [N m]; None if there is no solution.
+        """Returns the efforts of the joints, shape (n - 6,) [N m], or None if there is no solution.
 
         Args:
-            tasks: Tasks of parts of the robot.
-            posture: Wanted accelerations of all joints, shape (n - 6,).
-            posture_weight: Their weight, see `AccelerationTask`.
-            feet: How the soles move, in their own axes.
+            tasks: Desired accelerations of parts of the robot.
+            posture: Desired accelerations of all joints, shape (n - 6,).
+            posture_weight: Weight of `posture`, as in `AccelerationTask`.
+            feet: Motions of the soles, each in its own axes.
         """
         robot, n, matrix = self._robot, self._n, self._matrix
         jacobian = np.concatenate([foot.jacobian for foot in feet])
@@ -88,7 +89,9 @@ class WholeBodyProgram:
         return efforts
 
     def _within_limits(self) -> tuple[Array, Array]:
-        """Returns bounds of the joints' accelerations: those of critically damped springs at the position limits."""
+        """Returns lower and upper bounds of the joint accelerations, from critically damped springs at the position
+        limits.
+        """
         robot = self._robot
         damping = 2.0 * LIMIT_RATE * robot.velocities[FREE:]
         least, most = (LIMIT_RATE**2 * (limit - robot.positions) - damping for limit in (robot.lower, robot.upper))
@@ -113,9 +116,9 @@ class WholeBodyProgram:
 def wrench_cone(half_length: float, half_width: float, friction: float) -> Array:
     """Returns the matrix C of the wrenches w that a rectangular sole can take: C w <= 0.
 
-    A wrench is force [N] and torque [N m] of the floor on the middle of the sole, in the sole's axes: x along its
-    length, z up. Friction is that of a pyramid within the cone. Source: Caron, Pham and Nakamura, "Stability of
-    surface contacts for humanoid robots", ICRA 2015.
+    A wrench is the force [N] and torque [N m] of the floor on the middle of the sole, in the sole's axes: x along its
+    length, z up. The friction cone is replaced with a pyramid inside it. Source: Caron, Pham and Nakamura, "Stability
+    of surface contacts for humanoid robots", ICRA 2015.
 
     Args:
         half_length: Half the length along x [m].

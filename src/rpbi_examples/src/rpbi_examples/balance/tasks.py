@@ -1,4 +1,6 @@
-"""Tasks of a whole-body controller: desired accelerations of parts of the robot, and the motion of a hand."""
+"""Tasks of a whole-body controller: desired accelerations of parts of the robot, and the approach of a hand to its
+target.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,13 @@ from rpbi.control.controllers.controller import Array
 from .dynamics import FrameMotion, rotation_of, turn_between, turned
 
 GRAVITY = 9.81
-"""[m/s^2]."""
+"""Acceleration due to gravity [m/s^2]."""
 RATE = 6.0
 """Rate at which the remaining distance is reduced [1/s]."""
 TURN_SPEED = 1.5
 """Largest rotational speed [rad/s]."""
 LEASH_M, LEASH_RAD = 0.05, 0.3
-"""Largest lead of the moving target over the hand, in position and orientation."""
+"""Largest distance [m] and angle [rad] between the moving target and the hand."""
 
 
 class AccelerationTask(NamedTuple):
@@ -39,7 +41,7 @@ class Gain(NamedTuple):
     """Stiffness and weight of a spring.
 
     Attributes:
-        stiffness: For each unit of mass [1/s^2].
+        stiffness: Stiffness divided by mass [1/s^2].
         weight: See `AccelerationTask`.
     """
 
@@ -48,13 +50,13 @@ class Gain(NamedTuple):
 
 
 def spring(motion: FrameMotion, rows: slice, error: Array, gain: Gain, feed: Array | float = 0.0) -> AccelerationTask:
-    """Returns the task that pulls a part of a motion to its goal as a critically damped spring does.
+    """Returns the task that pulls a frame to its goal, along some axes, like a critically damped spring.
 
     Args:
-        motion: The motion.
-        rows: The part of it.
-        error: Difference from the motion to the goal [m or rad].
-        gain: Of the spring.
+        motion: Present motion of the frame.
+        rows: The rows of the motion that the spring acts on.
+        error: Goal minus present value, for these rows [m or rad].
+        gain: Stiffness and weight of the spring.
         feed: Velocity of the goal [m/s or rad/s].
     """
     wanted = pull(error, feed - motion.velocity[rows], gain)
@@ -72,16 +74,16 @@ def capture(
 ) -> AccelerationTask:
     """Returns the task that brings the capture point over a goal on the floor.
 
-    The centre of mass c moves as that of a linear inverted pendulum, c'' = w^2 (c - p), with w^2 = g / height. The
-    capture point is c + c'/w; the centre of pressure p is led beyond it by `gain` times its error, which pushes it back
+    The centre of mass c moves like a linear inverted pendulum, c'' = w^2 (c - p), with w^2 = g / height. The capture
+    point is c + c'/w. The centre of pressure p leads the capture point by `gain` times its error, which pushes it back
     (Englsberger et al., "Bipedal walking control based on capture point dynamics", IROS 2011).
 
     Args:
-        motion: How the centre of mass moves.
-        centre: Where it is, shape (3,) [m].
-        goal: Point on the floor below its desired position, shape (2,) [m].
-        height: Its height over the floor [m].
-        gain: Lead of p beyond the capture point, divided by the error.
+        motion: Motion of the centre of mass.
+        centre: Position of the centre of mass, shape (3,) [m].
+        goal: Desired x and y of the capture point, shape (2,) [m].
+        height: Height of the centre of mass above the floor [m].
+        gain: Lead of p over the capture point, divided by the error of the capture point.
         weight: See `AccelerationTask`.
     """
     w = np.sqrt(GRAVITY / height)
@@ -93,19 +95,19 @@ def capture(
 class Approach:
     """A moving pose that approaches its target at limited speed.
 
-    A critically damped spring pulls the point; its force saturates at the length that leads to the largest speed. The
-    pose waits for the hand, so that a target out of reach does not make the robot fall.
+    A critically damped spring pulls the point. Its force is limited, which limits the speed. The pose waits for the
+    hand, so that a target out of reach does not make the robot fall.
 
     Args:
-        position: Where it begins, shape (3,) [m].
-        turn: The orientation there, 3 x 3.
-        period_s: Time from one `advance` to the next [s].
+        position: Position of the first pose, shape (3,) [m].
+        turn: Orientation of the first pose, shape (3, 3).
+        period_s: Time between two calls of `advance` [s].
         speed: Largest speed [m/s].
 
     Attributes:
-        position: Of the point, shape (3,) [m].
-        turn: The orientation, 3 x 3.
-        velocity: Of the point, shape (3,) [m/s].
+        position: Position of the moving pose, shape (3,) [m].
+        turn: Orientation of the moving pose, shape (3, 3).
+        velocity: Linear velocity of the moving pose, shape (3,) [m/s].
     """
 
     def __init__(self, position: Array, turn: Array, period_s: float, speed: float) -> None:
@@ -114,12 +116,12 @@ class Approach:
         self._period_s, self._speed = period_s, speed
 
     def advance(self, target: Pose, position: Array, turn: Array) -> None:
-        """Moves towards a target for one period.
+        """Moves the pose towards a target for one period.
 
         Args:
-            target: The target in the world.
-            position: Where the hand is, shape (3,) [m].
-            turn: Its orientation, 3 x 3.
+            target: Target pose of the hand in the world.
+            position: Present position of the hand, shape (3,) [m].
+            turn: Present orientation of the hand, shape (3, 3).
         """
         way = _shortened(target.position - self.position, 2.0 * self._speed / RATE)
         self.velocity += self._period_s * (RATE * RATE * way - 2.0 * RATE * self.velocity)

@@ -43,15 +43,15 @@ TARGETS = "/rpbi/kuka_lwr/joint_states/target"
 CONTACTS, WRIST = "/rpbi/box/contacts", "/rpbi/kuka_lwr/lwr_arm_6_joint/ft_sensor"
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 REQUIRED_TOPICS = (STATES, "/tf")
-"""Topics that no slow machine may thin out; their rates count in simulated time."""
+"""Topics that must have messages even on a slow machine."""
 REPLAY_TOPICS = ("/rpbi/world_description", "/rpbi/state", "/rpbi/commands")
 CAMERA_TOPICS = (COLOUR, DEPTH, "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info")
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 30.0
 DRAW_S = 2.0
-"""Time of the measurement of the drawing rate [s]."""
+"""Duration of the measurement of the drawing rate [s]."""
 ENDINGS = (signal.SIGTERM, signal.SIGHUP)
-"""Signals that end the demo as Ctrl-C does, with all of its nodes."""
+"""Signals that end the demo and all of its nodes, as Ctrl-C does."""
 
 
 def demo(
@@ -81,7 +81,7 @@ def demo(
 
 
 def _leave(number: int, _: object) -> None:
-    """Ends the program through all `with` blocks, and ignores further signals."""
+    """Exits so that all `with` blocks clean up, and ignores further signals of this kind."""
     for each in ENDINGS:
         signal.signal(each, signal.SIG_IGN)
     sys.exit(128 + number)
@@ -112,7 +112,7 @@ def _demo(out: Path, seconds: float, headless: bool, strict: bool) -> int:
 
 @contextmanager
 def _example(headless: bool, log: Path) -> Iterator[None]:
-    """Launches the example on a separate ROS master, and ends it."""
+    """Runs the example on a ROS master of its own for the duration of the `with` block."""
     port = unused_port()
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"
@@ -136,7 +136,7 @@ def _example(headless: bool, log: Path) -> Iterator[None]:
 
 
 def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
-    """Waits until the node that sends the arm's targets is up, which starts last."""
+    """Waits until the arm's targets and the colour images are published, which start last."""
     end_s = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < end_s and process.poll() is None:
         if _is_published(TARGETS) and _is_published(COLOUR):
@@ -147,8 +147,8 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
 
 
 def _start_world() -> None:
-    """Starts the world in a separate process, since rospy swallows exceptions of signals while it waits for a
-    service.
+    """Starts the world through `rosservice` in a separate process, since rospy suppresses exceptions of signal handlers
+    while it waits for a service.
     """
     command = ["rosservice", "call", "/rpbi/start"]
     try:
@@ -168,7 +168,7 @@ def _is_published(topic: str) -> bool:
 
 
 def _expected_rates() -> dict[str, float]:
-    """Returns the rate of each topic [Hz] as configured in the files of the example."""
+    """Returns the rate of each topic [Hz] that the files of the example configure."""
     world = load_world(WORLD)
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     robot = configs["kuka_lwr"]
@@ -186,9 +186,8 @@ def _expected_rates() -> dict[str, float]:
 
 
 def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path) -> dict[str, Any]:
-    """Writes tables, pictures and the summary, and returns the summary.
-
-    Rates are those of the last seconds, since the recorder may need long to connect on a busy machine.
+    """Writes tables, pictures and the summary, and returns the summary. Rates are measured over the end of the
+    recording, since the recorder may connect late on a busy machine.
     """
     tables = bag_to_dataframes(bag, [STATES, TARGETS, WRIST, CONTACTS, "/clock", "/diagnostics"])
     states, targets, clock = tables[STATES], tables[TARGETS], tables["/clock"]["clock"]
@@ -229,13 +228,13 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
 
 def _friction(world: LoadedWorld, *names: str) -> float:
-    """Returns the coefficient of friction between two objects: the product of both coefficients, as in PyBullet."""
+    """Returns the coefficient of friction between two objects: the product of their coefficients, as in PyBullet."""
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     return math.prod(configs[name].changeDynamics.lateralFriction for name in names)
 
 
 def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
-    """Returns the state that the simulator reported once a second while it ran."""
+    """Returns the real-time factor, the overruns and the renderer, as the simulator reported them while it ran."""
     own = table[table["name"].str.endswith(": simulation") & (table["message"] != "stopped")]
     overruns = own["values/overruns_total"].astype(int)
     return {
@@ -246,13 +245,13 @@ def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _messages(bag: Path, since_s: float) -> dict[str, int]:
-    """Returns the number of messages of each topic that were recorded after a time [s of ROS time]."""
+    """Returns the number of messages of each topic that were recorded at or after a given ROS time [s]."""
     with BagReader(bag) as recording:
         return Counter(each.topic for each in recording.messages(recording.types) if each.record_time_s >= since_s)
 
 
 def _static_pose(bag: Path, frame: str) -> Pose:
-    """Returns the pose in the world of a static frame of the recording."""
+    """Returns the pose of a static frame of the recording, in the frame's parent."""
     with BagReader(bag) as recording:
         for each in recording.messages(["/tf_static"]):
             message = TFMessage()
@@ -265,7 +264,7 @@ def _static_pose(bag: Path, frame: str) -> Pose:
 
 
 def _middle_image(bag: Path, topic: str, dtype: type, channels: int) -> np.ndarray | None:
-    """Returns the image in the middle of the recording, shape (height, width, channels), None if there is none."""
+    """Returns the middle one of the recorded images, shape (height, width, channels), or None if there is not any."""
     with BagReader(bag) as recording:
         count = recording.counts.get(topic, 0)
         for number, each in enumerate(recording.messages([topic])):

@@ -36,7 +36,7 @@ from rpbi_examples.ros.running_simulators import (
 
 WORLDS = (".yaml", ".yml")
 WORLD = "world"
-"""Launch file that runs a world of the user's."""
+"""Name of the launch file that runs a user's world."""
 PRINTS = ("--files", "--args", "--nodes", "--find-node", "--dump-params", "--ros-args")
 """Options with which `roslaunch` prints something and starts no node."""
 ANNOUNCE_PERIOD_S = 0.5
@@ -106,8 +106,8 @@ def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tu
     """Returns the launch file that the first words name, and the words after them.
 
     Raises:
-        UnknownNameError: If there is no such example.
-        RLException: If a package has no such file, or there is no such package.
+        UnknownNameError: If the name is not an example.
+        RLException: If the package does not exist, or does not have the file.
     """
     if name.endswith(".launch") and Path(name).is_file():
         return Path(name), rest
@@ -119,10 +119,10 @@ def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tu
 
 
 class _Parent(ROSLaunchParent, ProcessListener):
-    """A launch that remembers whether a required node has ended with an error.
+    """A launch that records whether a required node has ended with an error.
 
     Args:
-        parents: It is appended to them.
+        parents: List that this object is appended to.
     """
 
     def __init__(self, parents: list[_Parent], *arguments: Any, **options: Any) -> None:
@@ -132,12 +132,12 @@ class _Parent(ROSLaunchParent, ProcessListener):
         parents.append(self)
 
     def start(self, *arguments: Any, **options: Any) -> None:
-        """Starts the nodes, and a thread that says so once a simulator is up."""
+        """Starts the nodes, and a thread that prints a line once a simulator is up."""
         super().start(*arguments, **options)
         threading.Thread(target=self._announce, daemon=True).start()
 
     def _announce(self) -> None:
-        """Prints the commands for a running world as soon as a simulator answers them."""
+        """Prints the commands for a running world as soon as a simulator is up."""
         nodes = {rosgraph.names.ns_join(node.namespace, node.name) for node in self.config.nodes}
         while self.pm is not None and not self.pm.is_shutdown:
             if (namespace := simulator_namespace(nodes, self.config.master.uri)) is not None:
@@ -150,14 +150,14 @@ class _Parent(ROSLaunchParent, ProcessListener):
             time.sleep(ANNOUNCE_PERIOD_S)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Records the name of a process that has ended; it consists of the node's name and a number."""
+        """Records whether a required node has ended with an error; a process name is the node's name and a number."""
         required = {f"{node.namespace}{node.name}".strip("/") for node in self.config.nodes if node.required}
         self.has_failed |= bool(exit_code) and process_name.rpartition("-")[0] in required
 
 
 def _controls_of(world: str, given: Iterable[str]) -> list[str]:
-    """Returns launch arguments for the key `controls` of a world's file, unless they are given; the node reports faults
-    of the file.
+    """Returns launch arguments for the key `controls` of a world's file. Returns none if `controls` is among the given
+    arguments, or if the file is wrong, which the simulator reports.
     """
     try:
         config = load_config(find_file(world, str(Path.cwd() / world)))
@@ -194,7 +194,7 @@ def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str])
 
 
 def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Returns the arguments of roslaunch that the options translate to."""
+    """Returns the roslaunch arguments that correspond to the options."""
     added = [] if options.port is None else ["-p", str(options.port)]
     if options.ns is None:
         return added
@@ -207,10 +207,11 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
 
 def _make_way(file: Path, options: argparse.Namespace) -> None:
-    """Refuses a launch file that would stop a running simulator, unless it shall replace the simulator.
+    """Refuses a launch file that would stop a running simulator; with the option `--replace`, stops that simulator.
 
     Raises:
-        InterfaceError: If it would stop one, or if another one already publishes the clock of this master.
+        InterfaceError: If the launch would stop a simulator, or if it is in a namespace and a node publishes the
+            master's clock.
     """
     master = master_of(options.port)
     if options.ns is not None and (clock := clocks(master)):

@@ -94,7 +94,7 @@ def _numbers(text: str) -> range:
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    """Prints the rows as a table, without hashes."""
+    """Prints the rows as a table with a result in words, without the hashes."""
     hidden = {"reason", "state_hash", "success", "done", "of"}
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in hidden]
     lines = [[*(f"{row[name]:g}" if name in row else "-" for name in names), _verdict(row)] for row in rows]

@@ -15,19 +15,19 @@ Array = NDArray[np.float64]
 CUFF = (0.86, -0.26, 1.43)
 """Initial position of the middle of the cuff [m], as in `sleeve.yaml`."""
 AHEAD_AT_START = (-1.0, 0.0, 0.0)
-"""Initial direction in which the cuff is drawn, as unit vector."""
+"""Unit vector of the initial direction in which the cuff is pulled."""
 HAND_M, BEFORE_HAND_M = 0.19, 0.05
 """Length of a hand, and distance before the hand at which the cuff is in line with the forearm [m]."""
 PAST_ELBOW_M = 0.10
-"""Distance past the elbow to which the cuff is drawn [m]."""
+"""Distance past the elbow at which the path of the cuff ends [m]."""
 BLEND_M = 0.05
 """Distance before and after the elbow over which the cuff turns [m]."""
 HELD_OUT_M = 0.25
-"""Distance from the start of the cuff to the place before the hand of a person who holds out the arm [m]."""
+"""An arm counts as held out if the point before its hand is nearer than this to the cuff's initial position [m]."""
 
 
 class ArmPosition(NamedTuple):
-    """Positions of the joints of a person's arm in the world (3 each) [m]."""
+    """Joint positions of a person's arm in the world, each of shape (3,) [m]."""
 
     shoulder: Array
     elbow: Array
@@ -35,10 +35,11 @@ class ArmPosition(NamedTuple):
 
 
 class CuffPath:
-    """Path of the cuff: from its start to before the hand, over the hand, along the forearm and past the elbow.
+    """Path of the cuff: from its initial position to a point before the hand, over the hand and the forearm, past the
+    elbow.
 
     Args:
-        arm: Where the person's arm is.
+        arm: Joint positions of the person's arm.
 
     Attributes:
         length: Length of the path [m].
@@ -52,12 +53,12 @@ class CuffPath:
         self.length = sum(math.dist(a, b) for a, b in pairwise(self._corners))
 
     def place(self, done: float) -> Array:
-        """Returns the middle of the cuff at a distance along the path (3) [m]."""
+        """Returns the middle of the cuff at a distance along the path [m], shape (3,) [m]."""
         return _along(self._corners, done)
 
     def ahead(self, done: float) -> Array:
-        """Returns the direction of the cuff at a distance along the path, as unit vector (3): along the forearm from
-        the start.
+        """Returns the direction of the cuff at a distance along the path [m], as a unit vector of shape (3,). Before
+        the hand, it is the direction of the forearm.
         """
         start = math.dist(*self._corners[:2])
         to = self.place(min(max(done, start) + BLEND_M, self.length))

@@ -1,4 +1,4 @@
-"""The robot's hand that holds the cuff, and the controller that draws the sleeve over the arm."""
+"""The robot's hand that holds the cuff, and the controller that pulls the sleeve over the arm."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from robot_model.geometry import Pose
 from .cuff_path import AHEAD_AT_START, ArmPosition, Array, CuffPath
 
 RADIUS_M = 0.085
-"""Radius of the cuff."""
+"""Radius of the cuff [m]."""
 ROBOT, BASE_LINK, HAND_LINK = "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget"
-"""A file of PyBullet's data, its root link, and the link between the fingertips."""
+"""The robot's URDF file from PyBullet's data, its root link, and its link between the fingertips."""
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
 """Base of the robot in the world, as in `panda.yaml`."""
 MAX_TURN_RAD = 0.3
-"""Largest rotation of a joint to the next target; beyond it, the joints keep their positions."""
+"""Largest rotation of a joint to the next target [rad]; solutions with a larger one are not used."""
 TARGET_HZ = 50
-"""Targets a second."""
+"""Rate of the targets."""
 SETTLING_S = 0.5
 """Time for which the cuff is held at the end of its path [s]."""
 MAX_LEAD_M = 0.02
@@ -33,11 +33,11 @@ MAX_TURN_RATE = 1.5
 
 
 class HandTarget(NamedTuple):
-    """Pose of the point between the fingertips of the robot in the world.
+    """Target pose, in the world, of the point between the robot's fingertips.
 
     Attributes:
         position: x, y, z [m].
-        quat_xyzw: Its orientation: z points at the person's arm, and x along the trailing sleeve.
+        quat_xyzw: Orientation: z points at the person's arm, and x along the trailing sleeve.
     """
 
     position: tuple[float, float, float]
@@ -45,11 +45,11 @@ class HandTarget(NamedTuple):
 
 
 def holding(cuff: Array, ahead: Array) -> HandTarget:
-    """Returns the pose of a hand that holds the cuff at its right side, level.
+    """Returns the pose of a level hand that holds the cuff at its right side.
 
     Args:
-        cuff: Middle of the cuff (3) [m].
-        ahead: Direction in which it is drawn, as unit vector (3).
+        cuff: Middle of the cuff, shape (3,) [m].
+        ahead: Unit vector of the direction in which the cuff is pulled, shape (3,).
     """
     to_arm = np.cross((0.0, 0.0, 1.0), -ahead)
     to_arm /= np.linalg.norm(to_arm)
@@ -63,7 +63,7 @@ class HandSolver:
     """Kinematics of the robot that holds the cuff.
 
     Attributes:
-        joint_names: The joints of its arm, in the order of all positions here.
+        joint_names: Names of the arm's joints, in the order of all joint positions in this class.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class HandSolver:
         self.joint_names = self._solver.joint_names
 
     def cuff(self, positions: Sequence[float]) -> Array:
-        """Returns the position of the middle of the cuff in the world (3) [m].
+        """Returns the position of the middle of the cuff in the world, shape (3,) [m].
 
         Args:
             positions: Positions of the joints [rad].
@@ -81,7 +81,7 @@ class HandSolver:
         return np.array((ROBOT_BASE @ self._solver.chain.pose(positions) @ in_hand).position)
 
     def solve(self, target: HandTarget, positions: Sequence[float]) -> dict[str, float] | None:
-        """Returns positions of the joints [rad], or None if there are none nearby.
+        """Returns joint positions [rad] by name, or None if there is no solution near the present ones.
 
         Args:
             target: Target pose of the hand.
@@ -97,8 +97,8 @@ class HandSolver:
 class Dressing:
     """Moves the cuff along a person's arm and follows the arm's motion.
 
-    The cuff slows down as a force on the arm approaches its limit, and moves back above it. It waits for a hand that
-    does not follow, so that the hand does not move far at once afterwards.
+    The cuff slows down as a force on the arm approaches its limit, and moves back while a limit is exceeded. Its target
+    waits while the hand lags behind, so that the hand does not make a large motion at once afterwards.
 
     Args:
         speed: Speed of the cuff without contact [m/s].
@@ -117,15 +117,15 @@ class Dressing:
 
     @property
     def is_done(self) -> bool:
-        """Whether the cuff's path has ended and the cuff has had time to arrive."""
+        """Whether the target has been at the end of the cuff's path for `SETTLING_S`."""
         return self._rested_s >= SETTLING_S
 
     def target(self, arm: ArmPosition, cuff: Array, force_share: float, dt: float) -> HandTarget:
-        """Returns the target of the robot's hand.
+        """Advances along the path, and returns the target of the robot's hand.
 
         Args:
-            arm: Where the person's arm is.
-            cuff: Where the middle of the cuff is (3) [m].
+            arm: Joint positions of the person's arm.
+            cuff: Present middle of the cuff, shape (3,) [m].
             force_share: Force on the arm as a share of its limit.
             dt: Time since the last target [s].
         """
@@ -144,6 +144,6 @@ class Dressing:
 
 
 def _towards(start: Array, end: Array, largest: float) -> Array:
-    """Returns the end if it is within the distance, otherwise a point on the line to it."""
+    """Moves from `start` towards `end` by at most the distance `largest`, and returns the point reached."""
     step = end - start
     return start + step * min(1.0, largest / max(float(np.linalg.norm(step)), 1e-12))

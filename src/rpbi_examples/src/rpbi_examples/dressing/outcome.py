@@ -1,4 +1,4 @@
-"""Forces that a person's arm feels against their limits, and whether the person is dressed."""
+"""Forces on a person's arm as shares of their limits, and whether the person is dressed."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .cuff_path import ArmPosition, Array
 
 ARM_SEGMENTS = tuple(REGIONS)
 MEAN_S = 0.1
-"""Contact forces of soft bodies are noisy: their mean over this time is used [s]."""
+"""Time over which contact forces are averaged [s], since the contact forces of soft bodies are noisy."""
 AROUND, RINGS = 14, 12
-"""Number of corners of each ring of the sleeve, and number of rings."""
+"""Number of corners in each ring of the sleeve, and number of rings."""
 ENOUGH_M = 0.05
-"""Distance past the elbow from which the sleeve counts as on [m]."""
+"""Least distance of the cuff past the elbow at which the person counts as dressed [m]."""
 
 
 def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Sequence[float]) -> dict[str, SegmentForce]:
@@ -28,11 +28,12 @@ def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Seque
 
     Args:
         segments: Names of n segments of the person.
-        sums: Sum of the magnitudes of all contact forces on each (n) [N].
-        largest: Largest single one on each (n) [N].
+        sums: For each segment, the sum of the magnitudes of its contact forces, shape (n,) [N].
+        largest: For each segment, the magnitude of its largest contact force, shape (n,) [N].
 
     Raises:
-        ValueError: If the lengths differ, a segment of the arm is missing, or a force on it is negative or not finite.
+        ValueError: If the lengths differ, a segment of the arm is missing, or a force on the arm is negative or not
+            finite.
     """
     if not len(segments) == len(sums) == len(largest):
         raise ValueError(
@@ -55,17 +56,17 @@ def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Seque
 class ArmForce:
     """Forces on the arm over the last tenth of a second, as shares of their limits.
 
-    There are three: a single contact may reach the transient limit of its body region, the mean over a segment the
-    quasi-static one, and the mean over the whole arm a limit chosen for comfort.
+    Three kinds of forces are limited: a single contact by the transient limit of its body region, the mean force on a
+    segment by the quasi-static limit of its region, and the mean force on the whole arm by a limit chosen for comfort.
 
     Args:
         limit_n: Largest sum over the arm [N].
 
     Attributes:
-        arm_n: Sum over the arm, as mean over 0.1 s [N].
-        peak_n: Largest of these so far [N].
-        share: Largest share of a limit that is used; above 1 it is exceeded.
-        peak_share: Largest of these so far.
+        arm_n: Sum of the forces on the arm, as mean over 0.1 s [N].
+        peak_n: Largest `arm_n` so far [N].
+        share: Largest ratio of a force to its limit; above 1 a limit is exceeded.
+        peak_share: Largest `share` so far.
     """
 
     def __init__(self, limit_n: float) -> None:
@@ -96,7 +97,7 @@ class Outcome(NamedTuple):
         past_elbow_m: Distance of the middle of the cuff past the elbow, along the upper arm [m].
         is_around: Whether the arm is inside the cuff, and inside the ring of the sleeve that is nearest to the elbow.
         peak_force_n: Largest force on the arm [N]: the sum of all magnitudes, as mean over 0.1 s.
-        peak_share: Largest share of a force limit that was reached: of a contact, of a segment or of the arm.
+        peak_share: Largest ratio of a force to its limit: of a contact, of a segment or of the arm.
     """
 
     past_elbow_m: float
@@ -106,7 +107,7 @@ class Outcome(NamedTuple):
 
     @property
     def is_dressed(self) -> bool:
-        """Whether the sleeve is past the elbow."""
+        """Whether the sleeve is around the arm and at least `ENOUGH_M` past the elbow."""
         return self.is_around and self.past_elbow_m >= ENOUGH_M
 
     @property
@@ -119,8 +120,8 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
     """Returns the result of dressing.
 
     Args:
-        rings: Rings of the sleeve (11 x 14 x 3) [m].
-        arm: Where the person's arm is.
+        rings: Corners of the sleeve's rings, shape (11, 14, 3) [m].
+        arm: Joint positions of the person's arm.
         force: Forces on the arm so far.
     """
     upper_arm = arm.shoulder - arm.elbow
@@ -133,10 +134,10 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 
 
 def rings_of(corners: ArrayLike) -> Array:
-    """Returns the rings of the sleeve but the last (11 x 14 x 3) [m], from the corners of its triangles.
+    """Returns all rings of the sleeve except the last, shape (11, 14, 3) [m], from the corners of its triangles.
 
     Raises:
-        ValueError: If the number of triangles differs, or a corner is not finite.
+        ValueError: If the number of triangles is not that of the sleeve, or a corner is not finite.
     """
     triangles, expected = np.asarray(corners, dtype=float), 2 * AROUND * (RINGS - 1)
     if triangles.size != 9 * expected:
@@ -147,7 +148,7 @@ def rings_of(corners: ArrayLike) -> Array:
 
 
 def _encloses(ring: Array, point: Array, axis: Array) -> bool:
-    """Returns whether a ring goes once around a line through a point."""
+    """Returns whether a ring goes once around the line that passes through a point along an axis."""
     across = np.cross(axis, (0.0, 0.0, 1.0))
     across /= np.linalg.norm(across)
     beside = ring - point

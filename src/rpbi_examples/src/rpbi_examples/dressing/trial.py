@@ -25,7 +25,7 @@ from .outcome import ARM_SEGMENTS, ArmForce, Outcome, outcome, rings_of
 WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
 AVATAR_HEIGHT_M = 1.75
 HEIGHTS_M = (1.60, 1.90)
-"""Heights of the people."""
+"""Range of the people's heights [m]."""
 FORCE_LIMIT_N, SPEED = 15.0, 0.1
 MAX_DURATION_S = 30.0
 
@@ -34,8 +34,8 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
     """Runs the example as fast as possible and returns its result.
 
     Args:
-        seed: Seed of the person's height and the pose of the arm.
-        force_limit_n: Force on the arm above which the cuff goes back [N].
+        seed: Seed for the person's height and for the pose of the arm.
+        force_limit_n: Sum of forces on the arm above which the cuff moves back [N].
         speed: Speed of the cuff [m/s].
     """
     world = World.from_file(WORLD)
@@ -60,7 +60,7 @@ class Trial:
 
     Attributes:
         force: Forces on the arm.
-        cuff: Where the middle of the cuff is (3) [m].
+        cuff: Middle of the cuff, shape (3,) [m].
     """
 
     def __init__(self, world: World, person: ArmHeldOut, dressing: Dressing, force_limit_n: float) -> None:
@@ -90,11 +90,11 @@ class Trial:
 
     @property
     def is_over(self) -> bool:
-        """Whether the motion of the cuff has ended, or timed out."""
+        """Whether the motion of the cuff has ended, or the trial has timed out."""
         return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:
-        """Advances by the period of one target."""
+        """Advances the world by the period between two targets."""
         dt = 1.0 / TARGET_HZ
         pose = self._engagement.step(self._retargeting.pose(self._person.frame(self.time_s)), dt)
         self._world.put("human/pose", Pose(tuple(pose.position.tolist()), tuple(pose.quat_xyzw.tolist())))
@@ -128,12 +128,12 @@ class Trial:
 
 
 def _joint_positions(robot: Any) -> dict[str, float]:
-    """Returns the positions of movable joints by name [rad or m]."""
+    """Returns the positions of the movable joints, indexed by joint name [rad or m]."""
     return dict(zip((joint.name for joint in robot.model.moving), robot.joint_positions().values()))
 
 
 def main() -> int:
-    """Runs the command; returns 1 if a person is not dressed."""
+    """Runs trials for the given seeds, and returns 1 if a person is not dressed."""
     parser = argparse.ArgumentParser(description="Dresses random people, as fast as possible and without ROS.")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
     parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")

@@ -1,4 +1,4 @@
-"""The cross-entropy method, and policies that it can find: linear ones, for environments in a vector."""
+"""The cross-entropy method, and linear policies for vectorised environments, whose weights it finds."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Array = npt.NDArray[np.float64]
 
 
 class CrossEntropy:
-    """Draws parameters from a normal distribution, and moves it to the best of them.
+    """Draws parameters from a normal distribution, and moves the distribution towards the best of them.
 
     Args:
         size: Number of parameters.
-        deviation: Standard deviation of each at the start.
-        elite: Share of those drawn that count as the best.
+        deviation: Initial standard deviation of each parameter.
+        elite: Share of the drawn parameter vectors that count as the best.
         floor: Smallest standard deviation.
-        random: Source of the parameters.
-        rate: Step of mean and deviation towards those of the best, as a share of the difference.
+        random: Generator that the parameters are drawn from.
+        rate: Step towards the mean and deviation of the best vectors, as a share of the difference.
     """
 
     def __init__(
@@ -36,11 +36,13 @@ class CrossEntropy:
         self._elite, self._floor, self._random, self._rate = elite, floor, random, rate
 
     def draw(self, count: int) -> Array:
-        """Returns parameters, shape (count, size)."""
+        """Draws parameter vectors, shape (count, size)."""
         return self.mean + self.deviation * self._random.normal(size=(count, len(self.mean)))
 
     def update(self, parameters: Array, scores: Array) -> None:
-        """Moves the distribution to the parameters with the highest scores, shape (count,)."""
+        """Moves the distribution towards the parameters, shape (count, size), with the highest scores, shape
+        (count,).
+        """
         best = parameters[np.argsort(scores)[-max(2, round(self._elite * len(scores))) :]]
         self.mean += self._rate * (best.mean(axis=0) - self.mean)
         deviation = self.deviation + self._rate * (best.std(axis=0) - self.deviation)
@@ -51,7 +53,7 @@ class LinearPolicies:
     """A linear policy for each of n environments: action = tanh(W features), without an offset.
 
     Args:
-        parameters: The weights W of each, shape (n, features x actions).
+        parameters: The weights W of each policy, action by action, shape (n, actions * features).
         features: Number of features.
     """
 
@@ -68,8 +70,8 @@ class Episodes(NamedTuple):
 
     Attributes:
         returns: Sums of rewards, shape (n,).
-        successes: Whether each succeeded, shape (n,).
-        actions: Number of actions of all.
+        successes: Whether each episode succeeded, shape (n,).
+        actions: Number of actions in all episodes.
     """
 
     returns: Array
@@ -82,9 +84,9 @@ def run_episodes(envs: Any, policies: Any, features: Any, seeds: Sequence[int]) 
 
     Args:
         envs: A vector of n environments.
-        policies: Returns actions of all for features of all.
-        features: Returns features, shape (n, features), of observations of all.
-        seeds: A seed for each.
+        policies: Maps the features, shape (n, features), to actions, shape (n, actions).
+        features: Maps the observations of all environments to features, shape (n, features).
+        seeds: A seed for each environment.
     """
     observations, infos = envs.reset(seed=list(seeds))
     returns, successes = np.zeros(envs.num_envs), np.zeros(envs.num_envs, bool)

@@ -1,4 +1,4 @@
-"""Learns to reach random goals by seven joints, from nothing, and draws the learning curve.
+"""Learns from scratch to reach random goals with seven joints, and draws the learning curve.
 
     .venv/bin/python -m rpbi_examples.gym.train_reach
 
@@ -24,18 +24,18 @@ from .cross_entropy import Array, CrossEntropy, LinearPolicies, run_episodes
 ENVIRONMENT = next(name for name in rpbi_examples.gym.ENVIRONMENTS if "Reach" in name)
 FEATURES, ACTIONS = 3, 7
 UNIT_M = 0.1
-"""Distance that is a feature of 1."""
+"""Distance that corresponds to a feature of 1 [m]."""
 TESTS = 32
 """Number of test episodes, a multiple of the number of environments."""
 FIRST_TEST_SEED = 1_000_000
-"""Seeds of test episodes, which are not used to learn."""
+"""First seed of the test episodes; these seeds are not used to learn."""
 
 
 class Progress(NamedTuple):
     """Result of a generation.
 
     Attributes:
-        actions: Actions so far.
+        actions: Number of training actions so far.
         score: Mean return of the mean policy in test episodes.
         success: Share of test episodes in which the mean policy succeeded.
         seconds: Time so far [s].
@@ -57,9 +57,9 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
 
     Args:
         envs: Environments, one for each policy of a generation.
-        generations: Their number.
-        tries: Episodes of each policy in a generation.
-        seed: Seed of everything.
+        generations: Number of generations.
+        tries: Number of episodes of each policy in a generation.
+        seed: Seed of the drawn parameters; the seeds of the training episodes count from it.
     """
     count, begin_s, actions = envs.num_envs, time.monotonic(), 0
     method = CrossEntropy(FEATURES * ACTIONS, 1.0, 0.25, 0.05, np.random.default_rng(seed))
@@ -79,7 +79,7 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
 
 
 def _test(envs: Any, parameters: Array) -> tuple[float, float]:
-    """Returns mean return and success of a policy in test episodes."""
+    """Returns a policy's mean return and share of successes in test episodes."""
     policies = LinearPolicies(np.tile(parameters, (envs.num_envs, 1)), FEATURES)
     seeds = np.arange(FIRST_TEST_SEED, FIRST_TEST_SEED + TESTS).reshape(-1, envs.num_envs).tolist()
     found = [run_episodes(envs, policies, features, each) for each in seeds]
@@ -92,7 +92,7 @@ def _line(progress: Progress) -> str:
 
 
 def draw(progress: list[Progress], file: Path) -> None:
-    """Draws returns and successes over the number of actions."""
+    """Draws returns and successes over the number of actions, and writes the picture."""
     matplotlib.use("Agg")
     from matplotlib import pyplot
 

@@ -17,22 +17,23 @@ from .program import ProgramConfig
 
 
 class PushingConfig(ConfigModel):
-    """A slider, a pusher and a path.
+    """Options of pushing a slider along a path.
 
     Attributes:
-        slider: The slider.
+        slider: Size, friction and support of the slider.
         radius: Radius of the pusher [m].
-        path: The path.
+        path: Shape, start and speed of the path.
         program: Horizon, cost and solver.
         estimator: Filter of measurements.
-        approach: Motion to the slider.
+        approach: Motion of the pusher to the slider.
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
-        max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
-        max_off: Distance of the slider from the path at which the task fails [m].
-        tolerance: Largest errors of a push that counts as finished.
+        max_lag: Distance along the path by which the reference may be ahead of the slider [m]; beyond it, the reference
+            waits.
+        max_off: Distance of the slider from the path beyond which the task fails [m].
+        tolerance: Largest errors with which a push counts as finished.
         settle_s: Time after the end of the path for which the last pose is the target [s].
-        cycle_s: Time of a cycle, for which a command acts [s].
-        lag_s: Delay from a command to the motion of the pusher, besides the delay of the loop [s].
+        cycle_s: Duration of a cycle, for which one command acts [s].
+        lag_s: Delay from a command to the motion of the pusher, in addition to the delay of the loop [s].
         plan_cycles: Number of commands of a plan, one for each cycle.
         max_command: Largest speed of the pusher [m/s].
     """

@@ -1,5 +1,5 @@
-"""The controller of pushing: estimates the state, moves the pusher to the slider, and follows a planner along the
-path.
+"""The controller of pushing: estimates the state, moves the pusher to the slider, and executes the commands of a
+planner along the path.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ KEPT_REFERENCES = 100
 
 
 class PushingController(MpcController):
-    """Pushes a slider along a path by a round pusher, whose velocity is commanded.
+    """Pushes a slider along a path with a round pusher whose velocity is commanded.
 
-    Path time stops while the pusher is not at the slider, and while the slider is too far behind the reference. The
-    measured slider decides whether the task is done, not the estimated one, which follows the model.
+    Path time stops while the pusher is not at the slider, and while the slider is too far behind the reference. Whether
+    the task is done depends on the measured pose of the slider, not on its estimated pose, which follows the model.
 
     Args:
         config: Slider, pusher, path and cost.
@@ -47,7 +47,7 @@ class PushingController(MpcController):
 
     def reset(self) -> None:
         self.path_time_s = 0.0
-        """Time along the path for the newest plan [s]."""
+        """Time along the path at which the newest plan starts [s]."""
         self._estimator.reset()
         self._planner.reset()
         self._settled_s = 0.0
@@ -85,9 +85,9 @@ class PushingController(MpcController):
         self._estimator.executed(time_s + self.config.lag_s, command)
 
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns commands, planned from the predicted scene at the time of the first one.
+        """Returns commands that are planned from the scene predicted for the time at which the first command acts.
 
-        A plan of the approach has commands but no solution; its cost is NaN.
+        Commands of the approach do not come from a solver; the cost of such a plan is NaN.
         """
         acts_s = sensed.time_s + delay_s + self.config.lag_s
         self._references.append((acts_s, self.path_time_s))
@@ -108,7 +108,9 @@ class PushingController(MpcController):
         return dataclasses.replace(plan, extras=extras | plan.extras)
 
     def _note(self, sensed: Sensed) -> float:
-        """Records a measurement, and returns its distance from the reference of the same time [m]."""
+        """Records a measurement, and returns the slider's distance from the reference at the time of
+        measurement [m].
+        """
         assert sensed.values is not None
         measured = PlanarScene.of(sensed.values)
         times_s, path_times_s = zip(*self._references)
@@ -122,7 +124,7 @@ class PushingController(MpcController):
         return float(np.hypot(*deviation[:2]))
 
     def _go_on(self, lag: float) -> None:
-        """Advances the reference by a cycle, unless the slider is too far behind it."""
+        """Advances the reference by a cycle, unless the slider is too far behind; at the end, counts settling time."""
         if self.path_time_s >= self.path.duration_s:
             self._settled_s += self.config.cycle_s
         elif lag <= self.config.max_lag:

@@ -1,4 +1,4 @@
-"""A hand that moves in a plane: positions of an arm's joints for places of a point on the hand."""
+"""A hand that moves in a plane: joint positions of an arm for given positions of a point on the hand."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from robot_model.linear_algebra import solve
 from robot_model.model import RobotModel
 
 TOLERANCE_M, TOLERANCE_RAD = 1e-4, 1e-3
-"""Distance and angle within which a place is reached [m, rad]."""
+"""Largest errors of position and orientation with which a place counts as reached [m, rad]."""
 MAX_ITERATIONS = 100
 """Newton steps after which a place counts as out of reach."""
 MAX_STEP_RAD = 0.1
-"""Largest change of a joint in a Newton step [rad]; larger ones jump to other postures."""
+"""Largest change of a joint in a Newton step [rad]; larger changes can jump to a different posture."""
 DAMPING = 1e-3
-"""Damping of the least squares [m^2/rad^2]; larger values converge slowly, smaller ones oscillate near singular
-postures.
+"""Damping of the least squares [m^2/rad^2]; with larger values the solver converges slowly, with smaller values it
+oscillates near singular postures.
 """
 
 
@@ -34,11 +34,11 @@ class PlanarHandConfig(ConfigModel):
     Attributes:
         urdf: The robot.
         link: Link whose origin is the point; its axis z points down.
-        joints: The joints that move it.
+        joints: The joints that move the point.
         base: Position of the robot's root link in the world [m].
         height: Height of the point in the world [m].
         yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
-        posture: Initial positions of the joints for the first place [rad].
+        posture: Joint positions from which the first solution starts [rad]; 0 if empty.
     """
 
     urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
@@ -53,9 +53,9 @@ class PlanarHandConfig(ConfigModel):
 
 
 class PlanarHand:
-    """Inverse kinematics of a hand over a table, by damped least squares (C. Wampler, IEEE SMC 16, 1986).
+    """Inverse kinematics of a hand over a table, with damped least squares (C. Wampler, IEEE SMC 16, 1986).
 
-    The same sequence of places leads to the same positions, on any computer.
+    The same sequence of places leads to the same joint positions on any computer.
 
     Args:
         config: Robot, joints and height.
@@ -76,16 +76,16 @@ class PlanarHand:
         self.posture = np.array(posture, dtype=float)
 
     def position(self, joints: np.ndarray) -> np.ndarray:
-        """Returns the position of the point in the world, 3 [m]."""
+        """Returns the position of the point in the world [m], shape (3,)."""
         position: np.ndarray = self._pose(joints)[:3, 3] + self._config.base
         return position
 
     def solve(self, start: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Returns positions of the joints that bring the point to a place.
+        """Returns joint positions that bring the point to a place [rad].
 
         Args:
-            start: Positions to start from [rad].
-            place: x, y in the world [m], at the height of the configuration.
+            start: Joint positions from which the iteration starts [rad].
+            place: x, y in the world [m]; the height is that in the configuration.
 
         Raises:
             InterfaceError: If the place is out of reach.
@@ -101,8 +101,8 @@ class PlanarHand:
         raise InterfaceError(f"hand.{self._config.link}: expected a place within reach, got ({place_text}) m")
 
     def _error(self, q: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Returns the vector to a place [m], and the rotation to the desired orientation [rad], in the axes of the
-        root.
+        """Returns the vector from the point to a goal [m], and the rotation vector to the desired orientation [rad], in
+        the axes of the root, shape (6,).
         """
         pose, cos, sin = self._pose(q), np.cos(self._config.yaw), np.sin(self._config.yaw)
         wanted = np.array([[cos, sin, 0.0], [sin, -cos, 0.0], [0.0, 0.0, -1.0]])
@@ -110,7 +110,7 @@ class PlanarHand:
         return np.array([*(goal - self._config.base - pose[:3, 3]), *turn])
 
     def _improved(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
-        """Returns improved positions after one step of damped least squares."""
+        """Returns joint positions after one step of damped least squares, within the joint limits."""
         jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
         damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
         step = jacobian.T @ solve(damped, error)

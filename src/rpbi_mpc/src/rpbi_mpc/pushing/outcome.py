@@ -1,4 +1,4 @@
-"""Result of a push from measurements: errors at the goal and along the path, and the error of the model."""
+"""Measured result of a push: errors at the goal and along the path, and the error of the model."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from rpbi_mpc.pushing.planar.model import SliderConfig
 
 
 class ToleranceConfig(ConfigModel):
-    """Largest errors of a push that counts as finished.
+    """Largest errors with which a push counts as finished.
 
     Attributes:
-        goal: Distance of the measured slider from the end of the path, mean of the second half of the settling [m].
-        goal_rad: The same for yaw [rad].
+        goal: Distance of the measured slider from the end of the path [m], from the mean position in the second half of
+            the settling time.
+        goal_rad: Difference in yaw from the end of the path [rad], from the mean over the same time.
         tracking: Mean distance of the measured slider from the reference [m].
     """
 
@@ -31,12 +32,13 @@ class PushOutcome(NamedTuple):
     """Errors of a push, and the misfit of its model.
 
     Attributes:
-        goal_m: Distance from the end of the path at the end [m]; NaN before it.
-        goal_rad: Angle from the direction of the path there [rad]; NaN before it.
+        goal_m: Final distance from the end of the path [m]; NaN before the reference has reached the end.
+        goal_rad: Final angle from the direction of the path at its end [rad]; NaN before the reference has reached the
+            end.
         tracking_m: Mean distance from the reference [m].
-        misfit: Mean difference of the slider's velocity from the model while it is pushed, as a share of the speed
-            along the path; rotation is weighted by the characteristic length.
-        face_m: Distance of the pushed face from the middle, minus that in the model [m].
+        misfit: Mean difference between the velocities of the slider and of the model during pushing, as a share of the
+            speed along the path; rotation is weighted with the characteristic length.
+        face_m: Measured minus modelled distance of the pushed face from the middle of the slider [m].
     """
 
     goal_m: float
@@ -46,7 +48,7 @@ class PushOutcome(NamedTuple):
     face_m: float
 
     def fault(self, tolerance: ToleranceConfig) -> str:
-        """Returns the errors that are too large, with the misfit; empty if there is none."""
+        """Returns a text with the errors that are too large and the misfit; empty if no error is too large."""
         faults = []
         if self.goal_m > tolerance.goal:
             faults.append(
@@ -62,7 +64,7 @@ class PushOutcome(NamedTuple):
 
     @property
     def of_model(self) -> str:
-        """The misfit of the model in words."""
+        """A clause that states how the box differs from the model: `misfit` and `face_m`."""
         side = "farther from" if self.face_m > 0.0 else "nearer to"
         return (
             f"unlike the model, the box moves by {100 * self.misfit:.0f} % of its speed, and its pushed face is "
@@ -77,12 +79,12 @@ class PushOutcome(NamedTuple):
 
 
 class PushRecord:
-    """Collects the measurements of each cycle.
+    """Collects the errors of each cycle.
 
     Args:
         slider: The slider of the model.
         speed: Speed along the path [m/s].
-        final_cycles: Number of cycles at the end whose mean is the error at the goal.
+        final_cycles: Number of last cycles over which the error at the goal is averaged.
     """
 
     def __init__(self, slider: SliderConfig, speed: float, final_cycles: int) -> None:
@@ -92,18 +94,23 @@ class PushRecord:
         self._pushed: list[tuple[float, float]] = []
 
     def track(self, deviation: np.ndarray, at_end: bool) -> None:
-        """Records the deviation of the measured slider from the reference [m, m, rad]."""
+        """Records the deviation of the measured slider from the reference [m, m, rad].
+
+        Args:
+            deviation: Differences in x, y and yaw.
+            at_end: Whether the reference is at the end of the path.
+        """
         self._errors.append(float(np.hypot(*deviation[:2])))
         if at_end:
             self._ends.append(deviation)
 
     def push(self, drift: np.ndarray, gap: float) -> None:
-        """Records the difference of the slider's twist from the model [m/s, m/s, rad/s], and the measured gap [m]."""
+        """Records the difference between the twists of slider and model [m/s, m/s, rad/s], and the measured gap [m]."""
         self._pushed.append((float(np.linalg.norm(self._scale * drift)) / self._speed, gap))
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors and misfit so far; NaN without records."""
+        """Errors and misfit so far; each is NaN if nothing is recorded for it."""
         x, y, yaw = np.mean(self._ends, axis=0) if self._ends else np.full(3, math.nan)
         misfit, gap = np.mean(self._pushed, axis=0) if self._pushed else np.full(2, math.nan)
         tracking_m = float(np.mean(self._errors)) if self._errors else math.nan

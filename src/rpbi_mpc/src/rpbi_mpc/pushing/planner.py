@@ -1,4 +1,4 @@
-"""Planners of pushing: their interface, and the one that solves a nonlinear program."""
+"""Planners of pushing: their interface, and a planner that solves a nonlinear program."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class PushSituation(NamedTuple):
 
     Attributes:
         scene: The predicted scene at the time of the first command.
-        gap: Distance between pusher and face in it [m], negative inside.
-        contact: Place of the pusher along the face [m].
+        gap: Distance between pusher and face in this scene [m], negative inside the slider.
+        contact: Position of the pusher along the face in this scene [m].
         delay_s: Time until the first command acts [s].
         path: The path.
-        path_time_s: Time along the path when it acts [s].
+        path_time_s: Time along the path when the first command acts [s].
     """
 
     scene: PlanarScene
@@ -37,9 +37,9 @@ class PushSituation(NamedTuple):
     path_time_s: float
 
     def reference(self, times_s: np.ndarray) -> np.ndarray:
-        """Returns reference poses of the slider at times after the first command [s], N x 3 [m, m, rad].
+        """Returns the slider's reference poses at given times after the first command [s], shape (N, 3) [m, m, rad].
 
-        Yaw differs by less than half a turn from that of the slider.
+        The first reference yaw differs by at most half a turn from the slider's yaw.
         """
         poses = self.path.poses(self.path_time_s + times_s)
         poses[:, 2] += 2 * math.pi * round((self.scene.slider[2] - poses[0, 2]) / (2 * math.pi))
@@ -56,18 +56,18 @@ class PushPlanner(ABC):
 
     @abstractmethod
     def plan(self, situation: PushSituation) -> ControlPlan:
-        """Returns velocities of the pusher in the axes of the table, and states (x, y, yaw, contact)."""
+        """Returns a plan of pusher velocities in the table's axes [m/s], with predicted states (x, y, yaw, contact)."""
 
     @abstractmethod
     def reset(self) -> None:
-        """Forgets the last plan."""
+        """Discards the last plan."""
 
 
 class ProgramPlanner(PushPlanner):
-    """Solves `PushingProgram` at each cycle, with a warm start from the last solution.
+    """Solves `PushingProgram` in each cycle, with a warm start from the last solution.
 
-    The extras of a plan are its first force, `normal` and `tangential` in units of the speed that it causes, and the
-    speed of `sliding` to the left along the face [m/s].
+    The extras of a plan are its first force, `normal` and `tangential` in units of the speed that the force causes
+    [m/s], and `sliding`, the speed of the pusher to the left along the face [m/s].
 
     Args:
         config: Slider, pusher, path and cost.
@@ -115,7 +115,7 @@ class ProgramPlanner(PushPlanner):
         return self._program.solve(state, reference, situation.speed, self._force, guess)
 
     def _commands(self, solved: Solved, gap: float) -> np.ndarray:
-        """Returns velocities of the pusher in the axes of the table, one for each cycle."""
+        """Returns pusher velocities in the table's axes [m/s], one for each cycle."""
         config = self._config
         rows = []
         for cycle in range(config.plan_cycles):
@@ -128,6 +128,6 @@ class ProgramPlanner(PushPlanner):
 
 
 def _limited(velocity: np.ndarray, most: float) -> np.ndarray:
-    """Returns a velocity, scaled down to the limit."""
+    """Returns a velocity, scaled down to the speed `most` if it is faster."""
     speed = float(np.hypot(*velocity))
     return velocity if speed <= most else velocity * (most / speed)

@@ -28,13 +28,14 @@ class WeightsConfig(ConfigModel):
 
     Attributes:
         position: Distance from the path [1/m^2].
-        yaw: Difference from its direction [1/rad^2].
+        yaw: Difference between yaw and the direction of the path [1/rad^2].
         contact: Distance of the pusher from the middle of the face [1/m^2].
-        force: Difference of the normal force from that of motion along the path, and tangential force [s^2/m^2].
+        force: Tangential force, and difference between the normal force and the force of motion along the path
+            [s^2/m^2].
         sliding: Speed of sliding along the face [s^2/m^2].
-        change: Change from the previous force to that of the first step [s^2/m^2].
-        final: Factor of the weights of the last state.
-        complementarity: Penalty of inputs that neither stick nor slide [s^2/m^2].
+        change: Change from the previous force to the force of the first step [s^2/m^2].
+        final: Factor by which the weights of the last state are multiplied.
+        complementarity: Penalty of inputs with which the contact neither sticks nor slides [s^2/m^2].
     """
 
     position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
@@ -54,12 +55,12 @@ class ProgramConfig(ConfigModel):
         steps: Number of steps of the horizon.
         step_s: Duration of a step [s].
         max_speed: Largest normal speed of the pusher, and of sliding along the face [m/s].
-        weights: The cost.
+        weights: Weights of the cost.
         solvers: Solvers in the order in which they are tried until one converges: `fatrop` (L. Vanroye et al., IROS
-            2023), an interior-point method for optimal control that is several times faster, and `ipopt` (A. Waechter
-            and L. Biegler, Mathematical Programming 106, 2006), which converges more often.
+            2023), an interior-point method for optimal control, and `ipopt` (A. Waechter and L. Biegler, Mathematical
+            Programming 106, 2006), which is several times slower but converges more often.
         max_iterations: Number of iterations after which a solver gives up.
-        tolerance: Optimality at which it stops.
+        tolerance: Optimality error at which a solver stops.
     """
 
     steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
@@ -77,14 +78,14 @@ class Solved(NamedTuple):
     """Result of the program.
 
     Attributes:
-        states: (steps + 1) x 4.
-        inputs: steps x 4.
+        states: States of the solution, shape (steps + 1, 4).
+        inputs: Inputs of the solution, shape (steps, 4).
         cost: Value of the cost.
-        converged: Whether it is a solution.
-        status: Text of the solver.
-        iterations: Their number.
-        wall_s: Time by the clock [s].
-        processor_s: Time of the processor [s].
+        converged: Whether the solver converged to finite numbers.
+        status: Name of the solver, and the status that it reports.
+        iterations: Number of iterations of all solvers that were tried.
+        wall_s: Wall time [s].
+        processor_s: Processor time [s].
     """
 
     states: np.ndarray
@@ -98,7 +99,7 @@ class Solved(NamedTuple):
 
 
 class PushingProgram:
-    """Optimal inputs to push a slider along a path, over a horizon; compiled once, solved at each cycle.
+    """Program for the optimal inputs of a push over a horizon; compiled once, solved in each cycle.
 
     Args:
         slider: The slider.
@@ -113,14 +114,14 @@ class PushingProgram:
     def solve(
         self, state: np.ndarray, reference: np.ndarray, speed: float, force: np.ndarray, guess: np.ndarray
     ) -> Solved:
-        """Solves the problem from a state.
+        """Solves the problem from a given state with each solver in turn, until one converges.
 
         Args:
             state: The first state.
-            reference: Reference poses, (steps + 1) x 3 [m, m, rad].
-            speed: Normal force along the path [m/s].
+            reference: Reference poses, shape (steps + 1, 3) [m, m, rad].
+            speed: Speed along the path, to which the normal force is compared [m/s].
             force: Normal and tangential force before the first step [m/s].
-            guess: States and inputs to start from, see `guess_of`.
+            guess: States and inputs from which the solvers start, as a vector from `guess_of`.
         """
         parameters = np.concatenate([state, reference.ravel(), [speed], force])
         wall, processor, iterations = time.perf_counter(), time.thread_time(), 0
@@ -144,7 +145,7 @@ class PushingProgram:
         return Solved(states, inputs, float(answer["f"]), converged, status, int(stats["iter_count"]), 0.0, 0.0)
 
     def guess_of(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Returns states, (steps + 1) x 4, and inputs, steps x 4, as a vector of the program."""
+        """Returns states (steps + 1, 4) and inputs (steps, 4) as a vector of the program's variables."""
         return np.concatenate([np.hstack([states[:-1], inputs]).ravel(), states[-1]])
 
     def _split(self, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +153,10 @@ class PushingProgram:
         return np.vstack([table[:, :NX], vector[-NX:]]), table[:, NX:]
 
     def _compiled(self) -> list[Any]:
-        """Returns the program for each solver: variables x0, u0, x1, ..., and rows of dynamics and limits by step."""
+        """Returns the program compiled for each solver.
+
+        The variables are x0, u0, x1, ...; the constraints are, step by step, rows of the dynamics and of the limits.
+        """
         states = [casadi.SX.sym(f"x{k}", NX) for k in range(self._steps + 1)]
         inputs = [casadi.SX.sym(f"u{k}", NU) for k in range(self._steps)]
         start = casadi.SX.sym("start", NX)
@@ -195,8 +199,8 @@ class PushingProgram:
         )
 
     def _limited(self, state: Any, control: Any) -> Any:
-        """Returns the inequality constraints of a step, as non-negative rows: the friction cone, and the speed of the
-        pusher.
+        """Returns expressions that must not be negative in a step: the distances from the edges of the friction cone,
+        and from the largest speed of the pusher.
         """
         normal, tangential = control[0], control[1]
         edge = self._slider.friction * normal
@@ -212,7 +216,7 @@ class PushingProgram:
         least, most = np.array([0.0, -fast, 0.0, 0.0]), np.array([fast, fast, fast, fast])
         self._lower = self.guess_of(np.tile(lower, (self._steps + 1, 1)), np.tile(least, (self._steps, 1)))
         self._upper = self.guess_of(np.tile(upper, (self._steps + 1, 1)), np.tile(most, (self._steps, 1)))
-        free = slice(0, NX)  # the first state is given, also outside the limits
+        free = slice(0, NX)  # the first state is given, and may be outside the limits
         self._lower[free], self._upper[free] = -np.inf, np.inf
         self._lower_g = np.zeros(len(self._equal))
         self._upper_g = np.where(self._equal, 0.0, np.inf)

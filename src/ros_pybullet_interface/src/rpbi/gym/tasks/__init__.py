@@ -20,4 +20,4 @@ TASKS: PluginTable[WorldTask] = PluginTable(
         "peg": "rpbi.gym.tasks.peg:PegTask",
     },
 )
-"""All tasks; each is imported when it is looked up, since they need Gymnasium."""
+"""All tasks; each is imported when it is looked up, since tasks need Gymnasium."""

@@ -25,14 +25,14 @@ class HandConfig(WorldTaskConfig):
 
 
 class HandTask(WorldTask):
-    """A task in which the hand of a robot moves in the axes of the world, and keeps its orientation."""
+    """A task in which a robot's hand moves along axes of the world and keeps its orientation."""
 
     def __init__(self, world: World, config: HandConfig) -> None:
         super().__init__(world, config)
         self._link = link_index(robot_of(world, config.robot), config.link)
 
     def hand_action(self, axes: str = "xyz") -> HandAction:
-        """Returns translations of the hand along some axes."""
+        """Returns an action part that translates the hand along given axes."""
         config = self.config
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 
@@ -46,11 +46,11 @@ class HandTask(WorldTask):
         return self.world.bodies[self.config.robot].link_pose(self._link).position
 
     def position_of(self, name: str) -> Vector:
-        """Returns the position of a body's base [m]."""
+        """Returns the position of a body's base in the world [m]."""
         return self.world.bodies[name].base_pose().position
 
     def touches(self, name: str) -> Sequence[tuple[str, float]]:
-        """Returns the other body and the normal force [N] of each contact of a body in the last tick."""
+        """Returns, for each contact of a body in the last tick, the name of the other body and the normal force [N]."""
         body = self.world.bodies[name]
         points = self.world.contacts.sample(body, self.world.clock.tick).points
         return [(point.other_body, point.normal_force) for point in points]

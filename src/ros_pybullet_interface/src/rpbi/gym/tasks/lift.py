@@ -46,7 +46,7 @@ class LiftTask(HandTask):
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Notes the height of the body."""
+        """Records the start height of the body."""
         self._start_height = self.position_of(self.config.object)[2]
         super().reset(random)
 
@@ -55,7 +55,7 @@ class LiftTask(HandTask):
         return self.position_of(self.config.object)[2] - self._start_height
 
     def reward(self) -> float:
-        """Returns the height of the body above its start, less the distance of the hand from it [m]."""
+        """Returns the height of the body above its start, minus the distance between hand and body [m]."""
         return self.lifted() - math.dist(self.hand(), self.position_of(self.config.object))
 
     def has_succeeded(self) -> bool:

@@ -29,7 +29,7 @@ class PegConfig(HandConfig):
 
 
 class PegTask(HandTask):
-    """Inserts a peg, the tip of which is the hand, into a hole."""
+    """Inserts a peg into a hole; the hand is the tip of the peg."""
 
     Config = PegConfig
 
@@ -38,7 +38,7 @@ class PegTask(HandTask):
         for name in config.walls:
             world.dynamics(name)  # checks that it exists
         self.hole: Vector = config.hole
-        """Middle of the hole's opening [m]."""
+        """Middle of the hole's opening, in the world [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
         """Returns translations of the hand."""
@@ -50,7 +50,7 @@ class PegTask(HandTask):
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 
     def reset(self, random: np.random.Generator) -> None:
-        """Moves the hole."""
+        """Moves the hole by a random offset."""
         x, y = random.uniform(-self.config.hole_offset, self.config.hole_offset, 2).tolist()
         self.hole = plus(self.config.hole, (x, y, 0.0))
         for name in self.config.walls:
@@ -59,7 +59,7 @@ class PegTask(HandTask):
         super().reset(random)
 
     def reward(self) -> float:
-        """Returns minus the distance of the tip from its place in the hole [m]."""
+        """Returns the negative distance between the tip and the target depth in the hole [m]."""
         return -math.dist(minus(self.hole, (0.0, 0.0, self.config.depth)), self.hand())
 
     def has_succeeded(self) -> bool:

@@ -34,10 +34,10 @@ class PushTask(HandTask):
         super().__init__(world, config)
         world.dynamics(config.object)  # checks that it exists
         self.goal: tuple[float, float] = (0.0, 0.0)
-        """The goal of the body in the plane [m]."""
+        """Goal of the body, x and y in the world [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns translations of the hand in the plane; its height stays as it is."""
+        """Returns horizontal translations of the hand."""
         return [self.hand_action("xy")]
 
     def parts(self) -> Iterator[ObservationPart]:
@@ -53,11 +53,13 @@ class PushTask(HandTask):
         super().reset(random)
 
     def distance(self) -> float:
-        """Returns the distance of the body from the goal in the plane [m]."""
+        """Returns the horizontal distance between body and goal [m]."""
         return math.dist(self.goal, self.position_of(self.config.object)[:2])
 
     def reward(self) -> float:
-        """Returns minus the distance of the body from the goal, and a tenth of that of the hand from the body [m]."""
+        """Returns the negative sum of the distance from body to goal and 0.1 times the distance from hand to
+        body [m].
+        """
         return -self.distance() - 0.1 * math.dist(self.hand(), self.position_of(self.config.object))
 
     def has_succeeded(self) -> bool:
@@ -65,6 +67,6 @@ class PushTask(HandTask):
         return bool(self.distance() <= self.config.tolerance)
 
     def has_ended(self) -> bool:
-        """Returns whether the body is at the goal, or out of the hand's box."""
+        """Returns whether the body is at the goal, or horizontally outside the hand's box."""
         position, low, high = self.position_of(self.config.object), self.config.low, self.config.high
         return self.has_succeeded() or not all(low[i] <= position[i] <= high[i] for i in (0, 1))

@@ -57,12 +57,12 @@ class ReachTask(WorldTask):
         super().reset(random)
 
     def position(self) -> Vector:
-        """Returns the position of the link [m]."""
+        """Returns the position of the link in the world [m]."""
         position: Vector = self.world.bodies[self.config.robot].link_pose(self._link).position
         return position
 
     def reward(self) -> float:
-        """Returns minus the distance to the goal [m]."""
+        """Returns the negative distance between link and goal [m]."""
         return -math.dist(self.goal, self.position())
 
     def has_succeeded(self) -> bool:

@@ -16,7 +16,7 @@ from rpbi.world import World
 from .hand import HandConfig, HandTask
 
 TICKS = 40
-"""Ticks between two looks at the contacts; the hand moves by at most half a cell meanwhile."""
+"""Ticks between two checks of the contacts; the hand moves at most half a cell in that time."""
 
 
 class WipeConfig(HandConfig):
@@ -31,7 +31,7 @@ class WipeConfig(HandConfig):
 
 
 class WipeTask(HandTask):
-    """Wipes a rectangle of a surface: presses on it, and passes over all of its cells."""
+    """Wipes a rectangle on a surface: the hand presses on the surface, and passes over all cells of the rectangle."""
 
     Config = WipeConfig
 
@@ -42,7 +42,7 @@ class WipeTask(HandTask):
         steps = (np.arange(config.cells) + 0.5) / config.cells
         x, y = np.meshgrid(*(low + np.outer(steps, high - low)).T)
         self.cells = np.stack([x.ravel(), y.ravel()], axis=1)
-        """Middles of the cells in the plane [m], shape (n, 2)."""
+        """Middles of the cells, x and y in the world [m], shape (n, 2)."""
         self.is_wiped = np.zeros(len(self.cells), bool)
         """Whether each cell was wiped in this episode."""
         self._rewarded = 0.0
@@ -69,12 +69,12 @@ class WipeTask(HandTask):
         return sum(force for other, force in self.touches(self.config.surface) if other == self.config.robot)
 
     def after_tick(self) -> None:
-        """Wipes the cells around the hand, if it presses."""
+        """Marks the cells around the hand as wiped if the hand presses hard enough; checked every `TICKS` ticks."""
         if self.world.clock.tick % TICKS == 0 and self.force() >= self.config.force:
             self.is_wiped |= np.linalg.norm(self.cells - self.hand()[:2], axis=1) <= self.config.radius
 
     def reward(self) -> float:
-        """Returns the share of all cells that were wiped in the last action."""
+        """Returns the share of all cells that were newly wiped in the last action."""
         before, self._rewarded = self._rewarded, float(self.is_wiped.mean())
         return self._rewarded - before
 

@@ -1,4 +1,4 @@
-"""Commands that entered a world after its start, by tick: their log, and how they are applied again."""
+"""The log of the commands that entered a world after its start, and how recorded commands are applied again."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from custom_ros_tools.errors import InterfaceError
 from .values import from_text, to_text, trusting
 
 MAX_KEPT = 5_000
-"""Number of commands that are kept as they are, some megabytes at most; older ones are packed."""
+"""Number of commands that are kept as they are, in a few megabytes at most; older commands are compressed as text."""
 MAX_PACKED_BYTES = 1 << 28
-"""Largest size of the packed commands [bytes]; these are some millions."""
+"""Largest size of the compressed commands [bytes], enough for millions of commands."""
 KEYFRAME = "keyframe"
-"""Kind of the command whose value is the text of a keyframe."""
+"""Kind of the command that made a keyframe; its value is the text of the keyframe."""
 
 
 class WorldCommand(NamedTuple):
     """A change that entered a world from outside.
 
     Attributes:
-        tick: The world's tick: it entered after that tick's physics, before the next.
-        name: The body or camera that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's
-            name for those, empty for the whole world.
-        what: Its kind: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`, `attach`,
-            `detach`, `halt`, `pause`, `keyframe`, or a key of ACTIONS.
-        value: Its value.
+        tick: Tick of the world at which the command entered: after the physics of this tick, before the next step.
+        name: Name of the body or camera that the command concerns; `NAME/LINK` for `dynamics` of a link, `NAME/INPUT`
+            for `input`, the attachment's name for `attach` and `detach`; empty for the whole world.
+        what: Kind of the command: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`,
+            `attach`, `detach`, `halt`, `pause`, `keyframe`, or a key of ACTIONS.
+        value: Value of the command, whose type depends on the kind.
     """
 
     tick: int
@@ -40,7 +40,7 @@ class WorldCommand(NamedTuple):
 
 
 class RecordedCommand(NamedTuple):
-    """A command as it is recorded: a WorldCommand with its value as text."""
+    """A command as it is recorded: the fields of a `WorldCommand`, but with its value as text (`data`)."""
 
     tick: int
     name: str
@@ -52,40 +52,46 @@ class RecordedCommand(NamedTuple):
         """Returns the record of a command.
 
         Raises:
-            TypeError: If its value cannot be recorded.
+            TypeError: If the value of the command cannot be written as text.
         """
         return cls(command.tick, command.name, command.what, to_text(command.value))
 
 
 class CommandLog:
-    """The commands since a world was built or reset, and their number.
+    """The commands since a world was built or reset.
 
     Attributes:
-        count: Number of commands so far.
-        first: Index of the first one that `records` returns, 0 unless earlier ones were forgotten.
+        count: Number of commands since then, including forgotten commands.
+        first: Index of the first command that `records` yields; 0 unless `forget` dropped earlier commands.
     """
 
     def __init__(self) -> None:
         self.clear()
 
     def note(self, command: WorldCommand) -> None:
-        """Appends a command; if there are many, the oldest is packed."""
+        """Appends a command; if `MAX_KEPT` commands are kept already, the oldest of them is compressed."""
         if len(self._kept) == MAX_KEPT:
             self._pack(self._kept.popleft())
         self._kept.append(command)
         self.count += 1
 
     def since(self, index: int, most: int = MAX_KEPT) -> tuple[int, tuple[WorldCommand, ...]]:
-        """Returns the commands from an index on, as far as they are not packed, and the index of the first."""
+        """Returns the commands from an index on that are not compressed yet, at most `most`, after the index of the
+        first.
+        """
         first = max(index, self.count - len(self._kept))
         end = min(first + most, self.count)
         return first, tuple(self._kept[each - self.count] for each in range(first, end))
 
     def records(self, first: int = 0) -> Iterator[RecordedCommand]:
-        """Yields the records of all commands from an index on, without those that `forget` dropped.
+        """Yields the records of all commands from an index on, except commands that `forget` dropped.
+
+        Args:
+            first: Index of the first command, counted since the world was built or reset.
 
         Raises:
-            InterfaceError: If one cannot be recorded, or the oldest had to be forgotten.
+            InterfaceError: If a command cannot be recorded, or if there were so many commands that the oldest were
+                lost.
         """
         if self._fault:
             raise InterfaceError(self._fault)
@@ -106,7 +112,9 @@ class CommandLog:
         self.forget()
 
     def forget(self) -> None:
-        """Drops the records of all commands so far, which a keyframe replaces; `since` still returns the newest."""
+        """Drops the records of all commands so far, since a new keyframe replaces them; `since` still returns the
+        newest.
+        """
         self._packing, self._packed = zlib.compressobj(), bytearray()
         self._fault = ""
         self.first, self._packed_from = self.count, self.count - len(self._kept)
@@ -139,20 +147,20 @@ _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {
     "pause": lambda world, _, reason: world.pause(reason),
     KEYFRAME: lambda world, _, recorded: world.keyframe(recorded),
 }
-"""Commands to a world other than actions on its bodies."""
+"""Functions that apply the commands other than actions on bodies, indexed by kind; arguments: world, name, value."""
 
 
 def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] | None = ()) -> None:
     """Applies a recorded command to a `World`.
 
     Args:
-        world: The world.
-        command: The command.
-        trust: Packages that it may import, see `trusting`.
+        world: World to which the command is applied.
+        command: The recorded command.
+        trust: Packages that the command's value may import, see `trusting`.
 
     Raises:
-        InterfaceError: If the world refuses.
-        ValueError: If the command cannot be read, or is unknown.
+        InterfaceError: If the world refuses the command.
+        ValueError: If the command cannot be read, is unknown, or does not fit the world.
     """
     name, what = command.name, command.what
     with trusting(trust):
@@ -166,7 +174,7 @@ def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] |
 
 
 def apply(world: Any, name: str, what: str, value: Any) -> None:
-    """Applies a command, with the fields of a WorldCommand, to a `World`."""
+    """Applies a command, given as the fields of a `WorldCommand`, to a `World`."""
     if what in _CHANGES:
         _CHANGES[what](world, name, value)
     else:

@@ -29,15 +29,15 @@ from rpbi_data.episodes.sample_messages import SampleMessages
 class EpisodeBag:
     """The bag of an episode, with the topics that the recorder records by default.
 
-    As a context it is closed at the end. Rates in wall time are rates in the world's time here.
+    It is a context manager that closes the bag. Rates that are configured in wall time apply to simulated time here.
 
     Args:
-        path: The bag.
-        world: The world, at tick 0.
-        images: Whether the colour images of its cameras are written, too, as JPEG.
+        path: Path of the new bag file.
+        world: The world at tick 0.
+        images: Whether the colour images of the world's cameras are written, too, as JPEG.
 
     Raises:
-        OSError: If it cannot be written, as from all methods.
+        OSError: If the bag cannot be written; all methods raise this error, too.
     """
 
     def __init__(self, path: Path, world: World, images: bool = False) -> None:
@@ -60,11 +60,11 @@ class EpisodeBag:
         try:
             self._bag.close()
         except Exception:
-            if error is None:  # else this one follows from that
+            if error is None:  # otherwise, this exception is a consequence of `error`
                 raise
 
     def start(self) -> None:
-        """Writes the world before its first tick: description, static frames, state and samples."""
+        """Writes the world before its first tick: description, static frames, commands, state, samples and images."""
         self._write(DESCRIPTION.name, String(self._world.describe()))
         if self._world.config.poses:
             self._write(TF_STATIC.name, static_frames_message(self._world.config.poses))
@@ -75,10 +75,10 @@ class EpisodeBag:
         self._write_images()
 
     def before_step(self) -> None:
-        """Writes the new commands, and targets on the topics on which a node would have received them.
+        """Writes the new commands, and writes targets also on the topics on which the node would receive them.
 
         Raises:
-            InterfaceError: If one cannot be recorded.
+            InterfaceError: If a command cannot be recorded.
         """
         world = self._world
         while self._commands < world.commands.count:
@@ -94,7 +94,7 @@ class EpisodeBag:
                         self._write(topic, target)
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes a tick: its time and samples, and its state if that is due."""
+        """Writes the samples of a tick, and those of its clock, images and state that are due."""
         tick = self._world.clock.tick
         if self._clock.is_due(tick):
             self._write_clock()
@@ -105,7 +105,7 @@ class EpisodeBag:
             self._write_state(with_hash)
 
     def end(self) -> None:
-        """Writes the remaining messages of the last tick, with the hash of its state.
+        """Writes the remaining messages of the last tick, including the hash of the world's state.
 
         Raises:
             InterfaceError: If a camera has no image, since its pose was never set.
@@ -137,7 +137,7 @@ class EpisodeBag:
 
 
 class _Images:
-    """Draws the colour images of a world's cameras at their rates."""
+    """Draws the colour images of a world's cameras at the configured rates."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -146,7 +146,7 @@ class _Images:
         self._drawn = CameraImages(world)
 
     def due(self) -> Iterator[tuple[str, Any]]:
-        """Yields topics and messages of the cameras that are due at the present tick, and have a pose."""
+        """Yields topics and messages of the cameras that have a pose and are due at the present tick."""
         tick, stamp = self._world.clock.tick, to_ros_time(self._world.clock.stamp_ns)
         for name, schedule in self._schedules.items():
             camera = self._world.cameras[name]
@@ -161,7 +161,7 @@ class _Images:
             yield f"rpbi/{camera.topic_name}/colour/image/compressed", jpeg
 
     def require_all(self) -> None:
-        """Raises an InterfaceError if a camera has drawn no image."""
+        """Raises an `InterfaceError` if a camera has not drawn an image."""
         for name in sorted(self._missing):
             where = f"expected its frame in `poses`, or its pose from the policy: world.put('{name}/pose', pose)"
             raise InterfaceError(f"camera '{name}' has no image: {where}")

@@ -1,6 +1,6 @@
 """Entry point of the process between a farm and a Ray cluster: `python -m rpbi_data.farm.ros.cluster FD ADDRESS`.
 
-It is a separate process because Ray ends its client process when the head of the cluster ends.
+This process is separate from the farm because Ray ends the client process when the head node of the cluster ends.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from rpbi_data.farm.job import EpisodeOutcome, FarmJob
 from .maker import make_remotely, store
 
 POLL_S = 0.2
-"""Longest time between two looks at new requests [s]."""
+"""Maximum time between two checks for new requests [s]."""
 HEAD_TIMEOUT_S = 5.0
-"""Time without an answer after which the head of the cluster counts as gone [s]."""
+"""Time without an answer after which the head node counts as unreachable [s]."""
 
 
 class Cluster:
     """Makes episodes on the nodes of a Ray cluster.
 
     Args:
-        address: Address of its head, `HOST:PORT`, as `ray start` prints it; or `auto`.
-        job: The job.
-        folder: Folder of the episodes, on this machine.
+        address: Address of the head node as `HOST:PORT`, as `ray start` prints it, or `auto`.
+        job: Job that determines the episodes.
+        folder: Folder of the episodes on this machine.
 
     Raises:
-        ClusterError: If there is no cluster.
+        ClusterError: If the cluster cannot be used.
     """
 
     def __init__(self, address: str, job: FarmJob, folder: EpisodeFolder) -> None:
@@ -55,14 +55,14 @@ class Cluster:
         self._numbers: dict[Any, int] = {}
 
     def start(self, number: int) -> None:
-        """Asks for an episode."""
+        """Requests an episode from the cluster."""
         self._numbers[self._task.remote(self._job, number)] = number
 
     def outcomes(self) -> Iterator[EpisodeOutcome]:
-        """Yields the outcomes of episodes that are ready, or become ready within POLL_S.
+        """Yields the outcome of an episode that is complete or becomes complete within `POLL_S`, if there is one.
 
         Raises:
-            ClusterError: If the head does not answer.
+            ClusterError: If the head node does not answer.
         """
         self._require_head()
         if not self._numbers:
@@ -96,7 +96,7 @@ class Cluster:
 
 
 class ClusterError(InterfaceError):
-    """A Ray cluster cannot be used."""
+    """Raised if a Ray cluster cannot be used."""
 
     def __init__(self, address: str, message: str) -> None:
         super().__init__(address, message)
@@ -107,7 +107,7 @@ class ClusterError(InterfaceError):
 
 
 def main() -> None:
-    """Forwards requests to the cluster, and outcomes back, until the other end is closed."""
+    """Forwards requests to the cluster and outcomes to the farm, until the farm closes the connection."""
     connection = Connection(int(sys.argv[1]))
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it
@@ -123,7 +123,7 @@ def main() -> None:
         return
     except ClusterError as error:
         connection.send(EpisodeOutcome(-1, fault=str(error), stops=True))
-        os._exit(1)  # Ray would wait for its head
+        os._exit(1)  # a normal exit would wait for the head node
 
 
 if __name__ == "__main__":

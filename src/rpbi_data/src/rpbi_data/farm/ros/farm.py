@@ -1,4 +1,4 @@
-"""A farm: the episodes of a job in a folder, made by processes here or by a cluster."""
+"""A farm: makes the episodes of a job in a folder, with processes on this machine or on a cluster."""
 
 from __future__ import annotations
 
@@ -24,24 +24,23 @@ from rpbi_data.farm.pool import Child, Pool
 from .maker import new_world
 
 WORKER, CLUSTER = "rpbi_data.farm.ros.maker", "rpbi_data.farm.ros.cluster"
-"""Programs that make episodes."""
+"""Modules of the processes that make episodes, here and on a Ray cluster."""
 
 
 class Farm:
-    """The episodes of a world and a policy.
-
-    The policy may be in the current folder, too.
+    """Makes episodes of a world and a policy.
 
     Args:
-        world: The main YAML file.
-        policy: `module:Class` of the policy.
+        world: Main YAML file of the world.
+        policy: `module:Class` of the policy; the current folder is searched, too.
         seed: Seed of the farm.
-        seconds: Length of an episode that its policy does not end, in the world's time [s].
-        ticks: The same in ticks; 0 if `seconds` counts.
+        seconds: Simulated time after which an episode ends if its policy has not ended it [s].
+        ticks: Number of ticks that replaces `seconds`; 0 to use `seconds`.
         images: Whether the colour images of cameras are recorded.
 
     Raises:
-        ConfigError: If the world is wrong or has no camera for images, or there is no such policy.
+        ConfigError: If the configuration of the world is wrong, `images` is set but the world has no camera, or there
+            is no such policy.
         PhysicsError: If PyBullet cannot load the world.
     """
 
@@ -65,7 +64,9 @@ class Farm:
         self.job = FarmJob(path, policy, seed, length, world_sha256, policy_sha256, images, (here,))
 
     def missing(self, folder: EpisodeFolder, count: int) -> list[int]:
-        """Returns the numbers below a count of episodes missing in a folder; discarded ones count as present."""
+        """Returns the numbers below `count` of the episodes that a folder lacks; it does not lack discarded
+        episodes.
+        """
         return sorted(set(range(count)) - folder.taken())
 
     @contextmanager
@@ -73,7 +74,8 @@ class Farm:
         """Locks a folder for this farm until the end of the context.
 
         Raises:
-            EpisodeError: If it has episodes of another farm, another process is about it, or it cannot be written.
+            EpisodeError: If the folder has files other than those of this job, another farm has locked the folder, or
+                the folder cannot be written.
         """
         try:
             self.job.claim(folder.path)
@@ -94,18 +96,18 @@ class Farm:
         address: str | None = None,
         disk_reserve_mb: float = 200.0,
     ) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields their outcomes, in any order.
+        """Makes episodes, and yields their outcomes in the order of completion.
 
         Args:
-            folder: The folder, which is claimed.
+            folder: Folder of the episodes, which `claimed` has locked.
             numbers: Numbers of the episodes.
-            jobs: Number of processes.
-            address: Address of a Ray cluster that makes them instead.
-            disk_reserve_mb: Free space of the disk that is never used [MB].
+            jobs: Maximum number of processes on this machine.
+            address: Address of a Ray cluster that makes the episodes instead of processes on this machine.
+            disk_reserve_mb: Free disk space below which no further episode is made [MB].
 
         Raises:
-            EpisodeError: If no further episode can be made; those that are complete stay.
-            MissingDependency: If Ray is not installed, and needed.
+            EpisodeError: If no further episode can be made; complete episodes are kept.
+            MissingDependency: If `address` is given and Ray is not installed.
         """
         if address is not None and importlib.util.find_spec("ray") is None:
             raise MissingDependency("ray", "./rpbi setup farm")
@@ -120,7 +122,7 @@ class Farm:
             _require_space(folder, disk_reserve_mb)
 
     def _facts(self, folder: EpisodeFolder) -> dict[str, object]:
-        """Returns the facts that all episodes share, and stores the files of the world."""
+        """Stores the files of the world, and returns the attributes that all episodes share."""
         try:
             files, faults = store_files(self._description, folder.files)
         except OSError as error:

@@ -1,6 +1,7 @@
-"""Makes episodes of a job: in this process, on a node of a Ray cluster, or as the program of a process.
+"""Makes episodes of a job, in this process, on a node of a Ray cluster, or in a child process.
 
-`python -m rpbi_data.farm.ros.maker FD` makes the episodes that the other end of a connection requests.
+`python -m rpbi_data.farm.ros.maker FD` is the child process: it makes the episodes requested over the connection with
+file handle FD.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _log = logging.getLogger(__name__)
 
 
 def new_world(loaded: LoadedWorld) -> World:
-    """Returns a world in simulated time, without a window, with frame names as in messages."""
+    """Builds a world in simulated time without a window, and makes its TF prefix and frames apply to messages."""
     world = World(loaded, connection_mode=pybullet.DIRECT)
     use_prefix(loaded.config.tf_prefix)
     use_own_frames(world.frames())
@@ -46,10 +47,11 @@ class EpisodeMaker:
     """Makes episodes of a job, each in a new world.
 
     Args:
-        job: The job.
+        job: Job that determines the episodes.
 
     Raises:
-        InterfaceError: If the world or the policy is not here, or not the same as where the farm was started.
+        InterfaceError: If the world or the policy cannot be loaded on this machine, or the file of the policy differs
+            from the file where the farm was started.
     """
 
     def __init__(self, job: FarmJob) -> None:
@@ -61,7 +63,7 @@ class EpisodeMaker:
             raise _AnotherError(f"the file of the policy {job.policy}")
 
     def make(self, folder: EpisodeFolder, number: int) -> EpisodeOutcome:
-        """Makes an episode in a folder; a failed one leaves nothing behind."""
+        """Makes an episode in a folder, and returns its outcome; a failed episode leaves no files."""
         try:
             return EpisodeOutcome(number, self._make(folder, number))
         except OSError as error:
@@ -89,20 +91,20 @@ class EpisodeMaker:
             episode.state, episode.topics = "complete", measure_topics(part / BAG)
             folder.complete(part, episode)
         finally:
-            shutil.rmtree(part, ignore_errors=True)  # still there only after a fault
+            shutil.rmtree(part, ignore_errors=True)  # it exists only after a fault
             if world is not None:
                 world.close()
         return episode.label
 
     def _check(self, world: World) -> None:
-        """Checks, for the first world, that it is the one of the job."""
+        """Checks that a world has the description on which the job depends; only the first world is checked."""
         if not self._is_checked and digest(world.describe()) != self._job.world_sha256:
             raise _AnotherError(f"the world of {self._job.world}")
         self._is_checked = True
 
 
 class _AnotherError(InterfaceError):
-    """World or policy differs from that of the job; the argument names it."""
+    """Raised if the world or the policy differs from the job's; its argument names the differing item."""
 
     def __str__(self) -> str:
         where = "another one here than where the farm was started"
@@ -110,13 +112,13 @@ class _AnotherError(InterfaceError):
 
 
 Files = dict[str, bytes]
-"""Contents of the files of an episode by name."""
+"""Contents of the files of an episode, indexed by file name."""
 
 
 def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
-    """Makes an episode in a temporary folder of this node, and returns its files; none if it has failed.
+    """Makes an episode in a temporary folder of this node, and returns its outcome and its files.
 
-    A fault that stops the farm names the node.
+    A failed episode has no files. A fault that prevents all further episodes names the node.
     """
     node = socket.gethostname()
     try:
@@ -132,10 +134,10 @@ def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
 
 
 def store(folder: EpisodeFolder, number: int, files: Files) -> None:
-    """Puts an episode of another node into a folder, under its final name when it is complete.
+    """Writes an episode made on another node into a folder; the episode gets its final name when it is complete.
 
     Raises:
-        OSError: If it cannot be written.
+        OSError: If the episode cannot be written.
     """
     part = folder.part_of(number)
     shutil.rmtree(part, ignore_errors=True)
@@ -147,12 +149,14 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
 
 @lru_cache(maxsize=1)
 def _maker(job: FarmJob) -> EpisodeMaker:
-    """Returns the maker of a job, cached, since the process of a node mostly continues with the same job."""
+    """Returns the maker of a job; the last maker is cached, since a process on a node mostly gets the same job
+    again.
+    """
     return EpisodeMaker(job)
 
 
 def main() -> None:
-    """Makes the requested episodes until the other end is closed."""
+    """Makes the requested episodes until the farm closes the connection."""
     connection = Connection(int(sys.argv[1]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it
     job, path = connection.recv()

@@ -15,23 +15,23 @@ from .model import SliderConfig
 from .motion import PlanarScene, moved, rotation
 
 KEPT_S = 2.0
-"""Time for which commands are kept [s]; an older measurement is treated as new."""
+"""Time for which commands are kept [s]; predictions from older measurements lack the commands before this time."""
 
 DRIFT_S = 1.0
-"""Time constant of the filter of the difference from the model [s]."""
+"""Time constant of the filter of `SceneEstimator.drift` [s]."""
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class EstimatorConfig(ConfigModel):
-    """Gains of the estimator: shares of the difference between measurement and prediction that are corrected in a
+    """Gains of the estimator, which corrects a share of the difference between measurement and prediction in each
     cycle.
 
     Attributes:
-        position: Of the position.
-        yaw: Of the yaw.
+        position: Corrected share of the difference in position.
+        yaw: Corrected share of the difference in yaw.
         jump: Distance between measurement and prediction beyond which the measurement replaces the estimate [m].
-        jump_rad: The same for yaw [rad].
+        jump_rad: Difference in yaw beyond which the measurement replaces the estimate [rad].
     """
 
     position: Share = Field(0.4, description="Share of a difference in position that is corrected in a cycle.")
@@ -43,7 +43,7 @@ class EstimatorConfig(ConfigModel):
 
 
 class SceneEstimator:
-    """Corrects the predictions of the model by measurements (an observer of fixed gain, D. Luenberger, 1964).
+    """Corrects the predictions of the model with measurements (an observer with fixed gains, D. Luenberger, 1964).
 
     Args:
         config: Gains.
@@ -51,7 +51,7 @@ class SceneEstimator:
         radius: Radius of the pusher [m].
 
     Attributes:
-        drift: Filtered difference of the slider's twist from the model, in its axes [m/s, m/s, rad/s].
+        drift: Filtered difference between the twists of slider and model, in the slider's axes [m/s, m/s, rad/s].
     """
 
     def __init__(self, config: EstimatorConfig, slider: SliderConfig, radius: float) -> None:
@@ -66,17 +66,17 @@ class SceneEstimator:
         self._commands: list[tuple[float, np.ndarray]] = []
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
-        """Records the velocity of the pusher from a time on; None is rest."""
+        """Records the velocity of the pusher [m/s] from `time_s` [s] on; None means rest."""
         self._commands.append((time_s, np.zeros(2) if command is None else np.asarray(command)))
         while len(self._commands) > 2 and self._commands[1][0] < time_s - KEPT_S:
             del self._commands[0]
 
     def update(self, sensed: Sensed, ahead_s: float) -> PlanarScene:
-        """Returns the predicted scene at a time, corrected by a measurement (x, y, yaw, pusher_x, pusher_y).
+        """Corrects the estimate with a measurement, and returns the scene predicted for a time.
 
         Args:
-            sensed: A complete measurement.
-            ahead_s: The time of the scene [s].
+            sensed: A complete measurement (x, y, yaw, pusher_x, pusher_y).
+            ahead_s: Time for which the scene is predicted [s].
         """
         measured_s = sensed.time_s - sensed.age_s
         assert sensed.values is not None
@@ -101,7 +101,7 @@ class SceneEstimator:
         return PlanarScene(expected.slider + gains * difference, measured.pusher)
 
     def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:
-        """Returns the scene after the commands between two times."""
+        """Returns the scene at `end_s`, predicted from a scene at `begin_s` with the recorded commands."""
         edges = [*(time_s for time_s, _ in self._commands), math.inf]
         for (start_s, velocity), stop_s in zip(self._commands, edges[1:]):
             duration_s = min(stop_s, end_s) - max(start_s, begin_s)

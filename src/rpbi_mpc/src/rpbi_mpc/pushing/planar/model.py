@@ -1,17 +1,19 @@
 """A slider, and its quasi-static motion under the push of one contact, with an ellipsoidal limit surface.
 
-Friction with the table and the force of the pusher are in balance. The limit surface, the set of all loads of a sliding
-body, is approximated by the ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1 with f the largest force and c the
-characteristic length; the twist is normal to it (K. Lynch, H. Maekawa and K. Tanie, IROS 1992). With forces in units of
-the speed that they cause, the twist of the slider in its own frame under the load (fx, fy, m) is (fx, fy, m / c^2).
+Friction with the table and the force of the pusher are in balance. The limit surface, the set of all loads under which
+a body slides, is approximated with the ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1, where f is the largest force
+and c the characteristic length; the twist is normal to the ellipsoid (K. Lynch, H. Maekawa and K. Tanie, IROS 1992).
+With forces in units of the speed that they cause, the twist of the slider in its own frame under the load (fx, fy, m)
+is (fx, fy, m / c^2).
 
 The contact sticks, or slides to one side of the face at the edge of the friction cone (F. Hogan and A. Rodriguez,
 "Feedback control of the pusher-slider system", WAFR 2016, and "Reactive planar non-prehensile manipulation with hybrid
 model predictive control", IJRR 39, 2020).
 
 All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact): pose of the slider in
-the plane [m, m, rad], and the place of the pusher along the face at -x, from its middle to the left [m]. The input is
-(normal, tangential, left, right): the force [m/s], and the speeds at which the pusher slides along the face [m/s].
+the plane [m, m, rad], and position of the pusher along the face at -x, from the middle of the face to the left [m]. The
+input is (normal, tangential, left, right): the components of the force [m/s], and the speeds at which the pusher slides
+along the face to the left and to the right [m/s].
 """
 
 from __future__ import annotations
@@ -33,16 +35,16 @@ Vector = Any
 
 
 class SliderConfig(ConfigModel):
-    """A box on a table, pushed at its face at -x.
+    """A box on a table that is pushed at the face on its -x side.
 
-    The origin of its frame is in its middle; x is forwards, y to the left.
+    The origin of the box's frame is the middle of the box; x points forwards, y to the left.
 
     Attributes:
         length: Size along x [m].
         width: Size along y [m].
         friction: Coefficient of friction between pusher and slider.
-        support: Where the weight rests: `uniform` over the area, or on the `corners`, as in a simulator whose contacts
-            of two boxes are four points.
+        support: Distribution of the supporting pressure: `uniform` over the area, or at the four `corners`, as in a
+            simulator that represents the contact between two boxes with four points.
         margin: Least distance of the pusher from the ends of the face [m].
     """
 
@@ -66,12 +68,12 @@ class SliderConfig(ConfigModel):
 
     @property
     def characteristic_length(self) -> float:
-        """Ratio of the largest moment of friction about the middle to the largest force [m].
+        """Ratio of the largest friction moment about the middle to the largest friction force [m].
 
-        It is the mean distance of the supporting points from the middle, weighted by their pressure, and the ratio of
-        the half axes of the ellipsoidal limit surface (S. Goyal, A. Ruina and J. Papadopoulos, "Planar sliding with
-        dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie, "Manipulation and active sensing by pushing
-        using tactile feedback", IROS 1992).
+        This length is the mean distance of the supporting points from the middle, weighted with their pressure, and the
+        ratio of the half axes of the ellipsoidal limit surface (S. Goyal, A. Ruina and J. Papadopoulos, "Planar sliding
+        with dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie, "Manipulation and active sensing by
+        pushing using tactile feedback", IROS 1992).
         """
         if self.support == "corners":
             return math.hypot(self.length, self.width) / 2
@@ -80,22 +82,22 @@ class SliderConfig(ConfigModel):
 
 
 def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns force x, y [m/s] and moment [m^2/s] about the middle of the slider, in its frame."""
+    """Returns the load of a contact in the slider's frame: force x, y [m/s] and moment about the middle [m^2/s]."""
     return normal, tangential, -slider.face * tangential - contact * normal
 
 
 def twist_of(load: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the twist of the slider in its frame [m/s, m/s, rad/s]: the normal of the limit surface at a load."""
+    """Returns the twist in the slider's frame [m/s, m/s, rad/s]: the normal of the limit surface at a load."""
     return load[0], load[1], load[2] / slider.characteristic_length**2
 
 
 def load_for(twist: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a twist; the inverse of `twist_of`."""
+    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a given twist; the inverse of `twist_of`."""
     return twist[0], twist[1], twist[2] * slider.characteristic_length**2
 
 
 def rates(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any, Any, Any]:
-    """Returns the derivative of the state by time."""
+    """Returns the time derivative of the state."""
     yaw, contact = state[2], state[3]
     along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
     cos, sin = _cos_sin(yaw)
@@ -103,23 +105,23 @@ def rates(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, An
 
 
 def advanced(state: Vector, control: Vector, duration_s: Any, slider: SliderConfig) -> list[Any]:
-    """Returns the state after a time with one input, by the midpoint rule."""
+    """Returns the state after an input has acted for `duration_s` [s], computed with the midpoint rule."""
     middle = [value + duration_s / 2 * rate for value, rate in zip(_items(state), rates(state, control, slider))]
     return [value + duration_s * rate for value, rate in zip(_items(state), rates(middle, control, slider))]
 
 
 def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any]:
-    """Returns the velocity of the pusher in the frame of the slider's axes [m/s]: that of the contact, and sliding."""
+    """Returns the pusher's velocity in the slider's axes [m/s]: velocity of the contact point plus sliding."""
     contact = state[3]
     along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
     return along - turning * contact, across - turning * slider.face + control[2] - control[3]
 
 
 def complementarity(control: Vector, slider: SliderConfig) -> Any:
-    """Returns the violation of the contact modes by an input [m^2/s^2]; 0 if it sticks or slides.
+    """Returns the amount by which an input violates the contact modes [m^2/s^2]; 0 if the contact sticks or slides.
 
-    The contact slides to the left only at the left edge of the friction cone, and to the right only at the right one.
-    Inside the cone the sum is not negative. It is penalised instead of constrained to 0, similar to the
+    The contact slides to the left only at the left edge of the friction cone, and to the right only at the right edge.
+    Inside the cone the violation is not negative. It is penalised instead of constrained to 0, similar to the
     relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar manipulation via
     trajectory optimization with complementarity constraints", ICRA 2022.
     """
@@ -130,9 +132,9 @@ def complementarity(control: Vector, slider: SliderConfig) -> Any:
 def response(
     state: Vector, velocity: Vector, slider: SliderConfig
 ) -> tuple[tuple[float, float, float], tuple[float, float], float]:
-    """Returns the motion caused by a velocity of the pusher at the contact.
+    """Returns the motion that a given velocity of the pusher causes at the contact.
 
-    The contact sticks if the required force is in the friction cone, which is the case within the motion cone (M.
+    The contact sticks if the required force is in the friction cone, that is, if the velocity is in the motion cone (M.
     Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986); otherwise it slides at the edge of
     the cone. A pusher that moves away does not move the slider.
 
@@ -146,7 +148,7 @@ def response(
         which the pusher slides to the left along the face [m/s].
     """
     contact, square = float(state[3]), slider.characteristic_length**2
-    mobility = np.array(  # velocity of the contact by the force at it
+    mobility = np.array(  # maps the force at the contact to the contact's velocity
         [
             [1.0 + contact**2 / square, contact * slider.face / square],
             [contact * slider.face / square, 1.0 + slider.face**2 / square],
@@ -163,10 +165,10 @@ def response(
 
 
 def _cos_sin(angle: Any) -> tuple[Any, Any]:
-    """Returns cosine and sine; symbols have them as methods, and warn of NumPy's functions."""
+    """Returns cosine and sine; CasADi symbols have them as methods, and cause warnings with NumPy's functions."""
     return (angle.cos(), angle.sin()) if hasattr(angle, "cos") else (np.cos(angle), np.sin(angle))
 
 
 def _items(vector: Vector) -> list[Any]:
-    """Returns the four entries; vectors of CasADi cannot be iterated over."""
+    """Returns the four entries of a vector as a list; CasADi vectors cannot be iterated over."""
     return [vector[index] for index in range(4)]

@@ -15,7 +15,7 @@ from custom_ros_tools.schema import ConfigModel, Positive, PositiveMetres, Unit
 from .model import SliderConfig, response
 
 CONTACT_GAP = 1e-6
-"""Distance below which pusher and slider touch [m]."""
+"""Depth of penetration above which the pusher moves the slider [m]."""
 
 
 class PlanarScene(NamedTuple):
@@ -41,7 +41,7 @@ class PlanarScene(NamedTuple):
 
 
 def rotation(yaw: float) -> np.ndarray:
-    """Returns the 2 x 2 matrix from the axes of the slider to those of the table."""
+    """Returns the matrix that rotates vectors from the slider's axes to the table's axes, shape (2, 2)."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return np.array([[cos, -sin], [sin, cos]])
 
@@ -53,7 +53,7 @@ def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
 
 
 def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
-    """Returns the distance between pusher and face, and the place of the pusher along the face [m, m].
+    """Returns the distance between pusher and face, and the position of the pusher along the face [m, m].
 
     The face counts as infinitely long; the distance is negative if the pusher penetrates the slider.
     """
@@ -64,15 +64,15 @@ def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> 
 def moved(
     scene: PlanarScene, velocity: np.ndarray, duration_s: float, slider: SliderConfig, radius: float, steps: int = 4
 ) -> PlanarScene:
-    """Returns the scene after the pusher has moved at a velocity for a time, by the quasi-static model.
+    """Returns the scene after the pusher has moved at a given velocity for `duration_s`, from the quasi-static model.
 
     Args:
-        scene: Scene before.
+        scene: Scene before the motion.
         velocity: Velocity of the pusher in the axes of the table [m/s].
-        duration_s: The time [s].
+        duration_s: Duration of the motion [s].
         slider: The slider.
         radius: Radius of the pusher [m].
-        steps: Number of steps of integration.
+        steps: Number of integration steps.
     """
     pose, pusher = scene.slider.copy(), scene.pusher.copy()
     step_s = duration_s / steps
@@ -92,10 +92,11 @@ class ApproachConfig(ConfigModel):
     """Motion of a pusher without contact.
 
     Attributes:
-        speed: Its speed [m/s].
+        speed: Largest speed of the pusher [m/s].
         clearance: Distance from the face at which the pusher passes along it [m].
-        gap: Distance from the face below which the pusher counts as touching [m]; while pushing, three times as much.
-        rate: Rate at which it approaches points: its speed is at most this rate times the distance [1/s].
+        gap: Distance from the face up to which the pusher counts as touching [m]; three times this distance during a
+            push.
+        rate: Ratio of the pusher's speed to its distance from the point that it approaches [1/s].
     """
 
     speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Speed of the pusher.")
@@ -105,14 +106,14 @@ class ApproachConfig(ConfigModel):
 
 
 def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:
-    """Returns whether the pusher is at a place from which it can push.
+    """Returns whether the pusher is at a position from which it can push.
 
     Args:
-        gap: Distance from the face [m], negative inside.
-        contact: Place along the face [m].
+        gap: Distance from the face [m], negative inside the slider.
+        contact: Position along the face [m].
         slider: The slider.
-        config: Distances.
-        pushes: Whether it pushed before; then a larger distance is accepted.
+        config: Limits of the gap.
+        pushes: Whether the pusher was pushing before; if so, a larger distance is accepted.
     """
     slack = 3.0 if pushes else 1.0
     beside = slider.width / 2 if pushes else slider.reach
@@ -120,9 +121,10 @@ def is_pushable(gap: float, contact: float, slider: SliderConfig, config: Approa
 
 
 def approach_velocity(scene: PlanarScene, slider: SliderConfig, radius: float, config: ApproachConfig) -> np.ndarray:
-    """Returns the velocity of a pusher that approaches the face, in the axes of the table [m/s].
+    """Returns the velocity of a pusher that approaches the face, in the table's axes [m/s].
 
-    A pusher at the side of the slider moves back first, then along the face at some distance, and then to the face.
+    A pusher at the side of the slider first moves back, then along the face at the distance `clearance`, and then to
+    the face.
     """
     gap, contact = gap_and_contact(scene, slider, radius)
     beyond = contact - np.clip(contact, -slider.reach / 2, slider.reach / 2)

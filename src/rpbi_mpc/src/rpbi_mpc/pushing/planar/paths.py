@@ -1,4 +1,4 @@
-"""Paths on a table: poses as functions of the distance along the path."""
+"""Paths on a table: poses of the slider as functions of time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel, ListOf, Positive, PositiveMetres, Unit
 
 SPACING = 0.0005
-"""Distance between stored points of a path [m]."""
+"""Largest distance between successive stored points of a path [m]."""
 
 Point = tuple[float, float]
 
@@ -25,8 +25,8 @@ class PathConfig(ConfigModel):
             or `points`.
         size: Length of the line, radius of the arcs, half the length of the eight [m].
         angle: Angle of each arc [rad].
-        points: Corners of the path `points` [m], in the frame of its start; they are passed on straight lines.
-        start: Pose of the start [m, m, rad].
+        points: Corners of the path `points` in the frame of its start [m]; straight lines join the corners.
+        start: x, y and yaw of the start [m, m, rad].
         speed: Speed along the path [m/s].
     """
 
@@ -43,13 +43,13 @@ class PathConfig(ConfigModel):
 
 
 class PushPath:
-    """A path that is followed at a constant speed, with yaw along it.
+    """A path that is followed at a constant speed, with yaw in the direction of the path.
 
     Args:
         config: Shape, start and speed.
 
     Raises:
-        ValueError: If the path `points` has fewer than two different ones.
+        ValueError: If all points of the path `points` are equal.
     """
 
     def __init__(self, config: PathConfig) -> None:
@@ -71,16 +71,19 @@ class PushPath:
 
     @property
     def duration_s(self) -> float:
-        """Time to its end [s]."""
+        """Time from the start to the end of the path [s]."""
         return self.length / self.speed
 
     @property
     def points(self) -> np.ndarray:
-        """Points half a millimetre apart, N x 2 [m]."""
+        """Equidistant points at most half a millimetre apart [m], shape (N, 2)."""
         return self._points
 
     def poses(self, times_s: Any) -> np.ndarray:
-        """Returns reference poses of the slider, N x 3 [m, m, rad]; clipped to the start and the end of the path."""
+        """Returns the slider's reference poses at given times [s], shape (N, 3) [m, m, rad].
+
+        Times before the start or after the end of the path give the first or the last pose.
+        """
         along = np.clip(np.atleast_1d(np.asarray(times_s, dtype=float)) * self.speed, 0.0, self.length)
         columns = (self._points[:, 0], self._points[:, 1], self._yaws)
         return np.stack([np.interp(along, self._distances, column) for column in columns], axis=1)
@@ -109,13 +112,13 @@ def _arc(config: PathConfig) -> np.ndarray:
 
 
 def _s(config: PathConfig) -> np.ndarray:
-    """Returns an arc, and the same arc turned by half a circle about its end."""
+    """Returns an arc, followed by the same arc turned by half a circle about its end."""
     first = _arc(config)
     return np.concatenate([first, (2 * first[-1] - first)[-2::-1]])
 
 
 def _eight(config: PathConfig) -> np.ndarray:
-    """Returns the lemniscate of Bernoulli, from its middle, with the start along x; radii are a third of its size."""
+    """Returns a lemniscate of Bernoulli that starts at its middle along x; its least radius is a third of `size`."""
     turned = np.linspace(-math.pi / 2, 3 * math.pi / 2, 4000)
     x, y = np.cos(turned), np.sin(turned) * np.cos(turned)
     return config.size * np.stack([x - y, x + y], axis=1) / (math.sqrt(2) * (1 + np.sin(turned) ** 2))[:, None]
@@ -132,4 +135,4 @@ SHAPES: dict[str, Callable[[PathConfig], np.ndarray]] = {
     "eight": _eight,
     "points": _points,
 }
-"""Points of each shape, N x 2 [m], from the origin; close enough to each other to be joined by lines."""
+"""Functions that return points of each shape, from the origin [m], shape (N, 2); straight lines join the points."""
