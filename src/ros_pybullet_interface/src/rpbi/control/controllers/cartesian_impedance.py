@@ -1,4 +1,4 @@
-"""A spring and a damper between a link and a target in space."""
+"""Controller with a spring and a damper between a link and a target pose."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .controller import Array, ControlledRobot, Controller, ControllerConfig, Ro
 from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, turn_between
 
 LEAST_MOBILITY = 0.01
-"""Smallest mobility that damping is computed with [1/kg, 1/(kg m^2)], for directions in which the arm hardly moves."""
+"""Lower bound of the mobility when damping is computed [1/kg, 1/(kg m^2)]: keeps damping finite at singularities."""
 
 
 class PoseTarget(NamedTuple):
     """Target pose of a point of a link.
 
     Attributes:
-        pose: Pose in the world.
-        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
+        pose: Pose of the point in the world; the orientation is the link's.
+        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
     """
 
     pose: Pose
@@ -36,7 +36,7 @@ class PoseTarget(NamedTuple):
 
 
 class CartesianImpedanceConfig(ControllerConfig):
-    """Keys of `cartesian_impedance`."""
+    """Configuration of a `cartesian_impedance` controller."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["cartesian_impedance"]})] = Field(
         description="`cartesian_impedance`, or a class with its keys."
@@ -57,10 +57,10 @@ class CartesianImpedanceConfig(ControllerConfig):
 
 
 class CartesianImpedanceController(Controller):
-    """Holds a point of a link at a target pose as a spring and a damper do.
+    """Pulls a point of a link to a target pose by a spring and a damper, and compensates gravity and Coriolis forces.
 
-    Gravity and Coriolis forces are compensated. `target` is a pose in the world. A redundant arm keeps to the posture
-    that it had at the start.
+    Its input `target` is a pose in the world. A redundant arm is pulled to the posture measured at the start, as far as
+    the target pose permits.
     """
 
     Config = CartesianImpedanceConfig
@@ -75,17 +75,17 @@ class CartesianImpedanceController(Controller):
         self._critical = 2.0 * config.damping_ratio * np.sqrt(self._stiffness)
         self._push = np.zeros(6)
         self._axes: Array | None = None
-        """Axes of the springs, as columns, shape (6, 6); None for those of the world."""
+        """Axes of the springs as columns, shape (6, 6); None for the world's axes."""
         self._posture_stiffness = np.full(len(arm.chosen), config.posture_stiffness)
 
     def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> PoseTarget:
-        """Accepts finite poses."""
+        """Checks that a pose is finite, and returns the pose as a `PoseTarget`."""
         if not isinstance(value, PoseTarget):
             return PoseTarget(check_pose(value))
         return value._replace(pose=check_pose(value.pose))
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Holds the pose and the posture that are measured."""
+        """Sets the target pose and the posture to the measured ones, until the first target comes."""
         self._goal = self._pose()
         self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
@@ -93,7 +93,7 @@ class CartesianImpedanceController(Controller):
         self._taken: Any = None
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of the spring and the damper, with compensation of gravity and Coriolis forces."""
+        """Returns the efforts of the spring and the damper plus the compensation of gravity and Coriolis forces."""
         self._update_target(targets.get("target"), tick)
         arm, config = self.arm, self.config
         q, velocity = arm.of_chosen(np.array((state.position, state.velocity)))
@@ -128,7 +128,7 @@ class CartesianImpedanceController(Controller):
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
-        """Returns the errors to the target, and the force and moment towards it, in the world's axes."""
+        """Returns the pose error [m, rad] and the controller's wrench [N, N m], both in the world's axes."""
         wrench = self._wrench if self._axes is None else self._axes @ self._wrench
         numbers = (*self._error.tolist(), *wrench.tolist())
         names = (f"{what}/{axis}" for what in ("error", "turn", "force", "moment") for axis in "xyz")
@@ -140,8 +140,10 @@ class CartesianImpedanceController(Controller):
         return damping
 
     def _way(self, tick: int) -> Sequence[float]:
-        """Returns the translation [m] and rotation [rad] from the present pose of the point to its target after a
-        tick."""
+        """Returns the pose error: 3 translations [m] and the rotation vector [rad] from the point to its set point.
+
+        The set point is the pose at the end of the tick; the call advances the target stream by one tick.
+        """
         x, y, z, *quat = self._stream.advance(tick + 1.0).values()
         pose = self._pose()
         return *minus((x, y, z), pose.position), *turn_between(pose.quat_xyzw, quat)
@@ -155,7 +157,7 @@ class CartesianImpedanceController(Controller):
             return
         self._taken = target
         position, quat = target.pose
-        if sum(a * b for a, b in zip(quat, self._goal.quat_xyzw)) < 0.0:  # the same orientation, and near in numbers
+        if sum(a * b for a, b in zip(quat, self._goal.quat_xyzw)) < 0.0:  # -quat is the same orientation, but nearer
             quat = (-quat[0], -quat[1], -quat[2], -quat[3])
         self._goal = Pose(position, quat)
         self._stream.push(tick, _components(self._goal), {}, target.stamp_ns)

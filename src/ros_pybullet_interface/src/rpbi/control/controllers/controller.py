@@ -1,4 +1,4 @@
-"""Base class of controllers, which turn the state of a robot into efforts or set points, tick by tick."""
+"""Base class of controllers. A controller computes efforts or set points from a robot's state at each tick."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 
 class ControllerConfig(ConfigModel):
-    """An entry of a robot's `controllers`; a controller with more keys has a subclass of this as its `Config`."""
+    """Keys that every entry of a robot's `controllers` has; a controller adds its own keys in a subclass."""
 
     type: Text = Field(description="Its type: a key of CONTROLLERS, or `module:Class`.")
     active: Switch = Field(True, description="Whether it drives its joints from the start on.")
@@ -32,8 +32,8 @@ class RobotState(NamedTuple):
     Attributes:
         base: Pose of the root link in the world.
         position: Positions of all n driven joints [rad or m], in the order of `RobotDynamics.joints`.
-        velocity: Their velocities [rad/s or m/s].
-        base_twist: Twist of the root link in the world; 0 where the base is fixed.
+        velocity: Velocities of the same joints, in the same order [rad/s or m/s].
+        base_twist: Twist of the root link in the world; zero for a fixed base.
     """
 
     base: Pose
@@ -43,24 +43,24 @@ class RobotState(NamedTuple):
 
 
 class SetPoints(NamedTuple):
-    """Positions of a controller's joints after the tick, to which PyBullet's motors move them.
+    """Output of a controller that commands positions; PyBullet's motors move the joints there within the tick.
 
     Attributes:
-        position: One for each of its joints [rad or m].
+        position: Position of each of the controller's m joints at the end of the tick [rad or m], shape (m,).
     """
 
     position: Array
 
 
 class ControlledRobot(NamedTuple):
-    """The robot of a controller, and its part of it.
+    """A robot as a controller sees it, with the joints that the controller drives.
 
     Attributes:
-        name: The robot.
-        link_pose: Returns the measured pose in the world of the URDF frame of a link, by PyBullet's index.
-        model: Its dynamics and kinematics.
-        links: PyBullet's indices of its links by name.
-        chosen: The places of the controller's joints among the driven ones, shape (m,).
+        name: Name of the robot.
+        link_pose: Function from PyBullet's link index to the measured pose of the link's URDF frame in the world.
+        model: Dynamics and kinematics of the robot.
+        links: PyBullet's link indices, keyed by link name.
+        chosen: Indices of the controller's m joints in `model.joints`, shape (m,).
         dt_s: Length of a tick [s].
     """
 
@@ -72,33 +72,42 @@ class ControlledRobot(NamedTuple):
     dt_s: float
 
     def of_chosen(self, rows: Array) -> Array:
-        """Returns the entries of the controller's joints, along the last axis of an array for all driven joints."""
+        """Selects the controller's joints along the last axis of an array.
+
+        Args:
+            rows: Array with one entry per driven joint of the robot on its last axis.
+        """
         return rows if len(self.chosen) == len(self.model.joints) else rows[..., self.chosen]
 
 
 class Controller(ABC):
-    """Drives some joints of one robot, on the simulation thread, before the physics of each tick.
+    """Base class: computes the commands of some joints of one robot before the physics of each tick.
 
-    A new one is a subclass with a `Config` and `compute`; see docs/controllers.md.
+    A subclass defines `Config` and `compute`; see docs/controllers.md. The simulation thread makes all calls except
+    those of `check`.
 
     Args:
-        arm: The robot.
-        config: Its keys in YAML.
+        arm: The robot and the joints to drive.
+        config: The controller's configuration, an instance of `Config`.
 
     Raises:
-        ValueError: If they do not fit each other.
+        ValueError: If the configuration does not fit the robot.
     """
 
     Config: ClassVar[type[ControllerConfig]] = ControllerConfig
     inputs: ClassVar[Mapping[str, str]] = {}
-    """Place of the Topic of each input, as `module:NAME`, by the input's name in `targets`."""
+    """Import path `module:NAME` of each input's Topic, keyed by the input's name in `targets`."""
 
     def __init__(self, arm: ControlledRobot, config: Any) -> None:
         self.arm = arm
         self.config = config
 
     def check(self, key: str, value: Any) -> Any:
-        """Returns the entry of `targets` for a value received by topic; any thread calls it.
+        """Checks a value received on a topic, and returns the value to store in `targets`. Any thread may call it.
+
+        Args:
+            key: Name of the input.
+            value: The received value.
 
         Raises:
             ValueError: If the value is refused.
@@ -106,18 +115,18 @@ class Controller(ABC):
         return value
 
     def start(self, state: RobotState, tick: int) -> None:  # noqa: B027 (many need nothing)
-        """Begins, before the first `compute`, from the measured state."""
+        """Initializes the controller from the measured state, before the first `compute` after each activation."""
 
     @abstractmethod
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array | SetPoints:
-        """Returns the efforts [N m or N] of its m joints, shape (m,), or set points, for one tick.
+        """Computes the commands of one tick: the efforts [N m or N] of the m joints, shape (m,), or set points.
 
         Args:
-            state: The robot before the tick.
-            targets: The newest value of each input that came since the start, by name.
-            tick: The world's tick.
+            state: State of the robot before the tick.
+            targets: Newest value of each input received since the start, keyed by the input's name.
+            tick: Number of the simulation tick.
         """
 
     def report(self) -> Mapping[str, float]:
-        """Returns numbers for its state topic, by name."""
+        """Returns the numbers that the controller's state topic publishes, keyed by name."""
         return {}

@@ -1,4 +1,4 @@
-"""A force along one axis, and motion across it."""
+"""Controller that pushes along one axis and holds a pose in the other directions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .controller import Array, ControlledRobot
 
 
 class ForceControllerConfig(CartesianImpedanceConfig):
-    """Keys of `force`, beside those of `cartesian_impedance`."""
+    """Configuration of a `force` controller."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(description="`force`, or a class with its keys.")
 
@@ -31,10 +31,10 @@ class ForceControllerConfig(CartesianImpedanceConfig):
 
 
 class ForceController(CartesianImpedanceController):
-    """Pushes along an axis with a given force, and holds a point at a target pose across it.
+    """Pushes along an axis with a given force, and pulls a point to a target pose in all other directions.
 
-    A damper along the axis limits the speed without contact; in contact, the point rests and the force is the
-    configured one. The target's position along the axis is ignored.
+    A damper along the axis limits the speed without contact. Once the point rests in contact, the configured force
+    acts. The target's position along the axis is ignored.
     """
 
     Config = ForceControllerConfig

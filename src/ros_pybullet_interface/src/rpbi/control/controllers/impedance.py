@@ -1,8 +1,8 @@
-"""Springs and dampers that stay stable at a tick's length, however stiff.
+"""Springs and dampers that stay stable for any stiffness at the simulation's time step.
 
-An explicit spring of stiffness k on a mass m oscillates, and then diverges, once k dt^2 / m is large. Here the spring
-is evaluated where the joint will be after the tick, predicted from the mass matrix (Tan, Liu and Turk, "Stable
-Proportional-Derivative Controllers", 2011) and an estimate of all other efforts on the joint.
+A spring of stiffness k on a mass m that is integrated explicitly diverges if k dt^2 / m is large. Here the spring force
+is computed for the joint position at the end of the tick. That position is predicted from the mass matrix (Tan, Liu and
+Turk, "Stable Proportional-Derivative Controllers", 2011) and from an estimate of the external efforts.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ Array = npt.NDArray[np.float64]
 
 DampingRatio = Annotated[float, Field(ge=0.0, le=2.0)]
 SMOOTHED_S = 0.01
-"""Time constant of the estimate of external efforts [s]."""
+"""Time constant of the low-pass filter on the estimated disturbance [s]."""
 _EYE = np.eye(6)
 ROUNDING = 1e-6 * np.eye(6)
-"""Keeps the mobility of a singular arm invertible."""
+"""Added to the mobility matrix so that the matrix is invertible at singular arm configurations."""
 
 
 class JointSprings(ConfigModel):
-    """Springs and dampers at joints."""
+    """Stiffness and damping ratio of springs and dampers at joints."""
 
     stiffness: Annotated[Positive, Unit("N m/rad or N/m")] | dict[str, Positive] = Field(
         500.0, description="For all joints, or by joint."
@@ -42,10 +42,14 @@ class JointSprings(ConfigModel):
     )
 
     def by_joint(self, key: str, joints: Iterable[Joint]) -> Array:
-        """Returns the values of a key for joints, its default where the joint is not named.
+        """Returns one value per joint of a key; joints that the configuration does not name get the key's default.
+
+        Args:
+            key: `stiffness` or `damping_ratio`.
+            joints: The n joints, in the order of the result.
 
         Raises:
-            ValueError: If a name is none of them.
+            ValueError: If the configuration names a joint that is not in `joints`.
         """
         given = getattr(self, key)
         names = [joint.name for joint in joints]
@@ -59,40 +63,49 @@ class JointSprings(ConfigModel):
 
 
 class Disturbance:
-    """Estimates the acceleration of n joints by unmodelled effects, from the error of predicted positions.
+    """Estimates how unmodelled effects accelerate n joints, from the errors of predicted velocities.
 
     Args:
-        count: Number of joints.
+        count: Number n of joints.
         dt_s: Length of a tick [s].
     """
 
     def __init__(self, count: int, dt_s: float) -> None:
         self.estimate = np.zeros(count)
-        """n accelerations [rad/s^2 or m/s^2], smoothed by a first-order filter of 10 ms."""
+        """Estimated accelerations of the n joints [rad/s^2 or m/s^2], smoothed by a first-order filter."""
         self._dt_s = dt_s
         self._share = (1.0 - math.exp(-dt_s / SMOOTHED_S)) / dt_s
         self._predicted: Array | None = None
 
     def update(self, velocity: Array) -> None:
-        """Updates the estimate by the velocities [rad/s or m/s] after the tick of the last `predict`."""
+        """Corrects the estimate by the error of the last prediction.
+
+        Args:
+            velocity: n velocities [rad/s or m/s] measured after the tick that `predict` predicted.
+        """
         if self._predicted is not None:
             self.estimate += self._share * (velocity - self._predicted)
 
     def predict(self, velocity: Array, acceleration: Array) -> None:
-        """Notes velocities before a tick, and the accelerations that are expected of it, with the estimate."""
+        """Predicts the velocities at the end of a tick, for the next `update`.
+
+        Args:
+            velocity: n velocities before the tick [rad/s or m/s].
+            acceleration: n expected accelerations during the tick, the estimate included [rad/s^2 or m/s^2].
+        """
         self._predicted = velocity + self._dt_s * acceleration
 
 
 class JointImpedance:
-    """Springs and dampers at n joints from tick to tick.
+    """Computes the efforts of springs and dampers at n joints at each tick.
 
     Args:
-        springs: Their stiffness and damping.
+        springs: Stiffness and damping ratio of the springs and dampers.
         joints: The n joints.
         dt_s: Length of a tick [s].
 
     Raises:
-        ValueError: If the springs name a joint that is none of these.
+        ValueError: If `springs` names a joint that is not in `joints`.
     """
 
     def __init__(self, springs: JointSprings, joints: Sequence[Joint], dt_s: float) -> None:
@@ -108,14 +121,14 @@ class JointImpedance:
     def efforts(
         self, mass: Array, error: Array, velocity: Array, wanted_velocity: Array, push: Array | float = 0.0
     ) -> Array:
-        """Returns n efforts [N m or N] for a tick, beyond those that balance gravity and motion.
+        """Computes n efforts [N m or N] for a tick, without the compensation of gravity and Coriolis forces.
 
         Args:
             mass: Mass matrix, shape (n, n).
-            error: n position errors, desired less measured [rad or m].
+            error: n position errors, desired minus measured [rad or m].
             velocity: n measured velocities [rad/s or m/s].
             wanted_velocity: n desired velocities [rad/s or m/s].
-            push: n efforts [N m or N] to add.
+            push: n efforts [N m or N] to add, or one for all joints.
         """
         self._disturbance.update(velocity)
         external = mass @ self._disturbance.estimate
@@ -128,13 +141,13 @@ class JointImpedance:
 
 
 def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, velocity: Array, dt_s: float) -> Array:
-    """Returns how n joints accelerate [rad/s^2 or m/s^2] by springs and dampers, evaluated at the end of a tick.
+    """Returns the accelerations [rad/s^2 or m/s^2] of n joints with springs and dampers, by an implicit Euler step.
 
     Args:
         mass: Mass matrix, shape (n, n).
         stiffness: n stiffnesses [N m/rad or N/m].
         damping: n dampings [N m s/rad or N s/m].
-        forces: n efforts [N m or N] that act if the joints do not move, those of the springs among them.
+        forces: n efforts [N m or N] at zero velocity, including the efforts of the springs.
         velocity: n velocities before the tick [rad/s or m/s].
         dt_s: Length of the tick [s].
     """
@@ -147,15 +160,15 @@ def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, veloc
 def implicit_wrench(
     mobility: Array, stiffness: Array, damping: Array, wrench: Array, acceleration: Array, dt_s: float
 ) -> Array:
-    """Returns force and moment of springs and dampers at a point of an arm, evaluated at the end of a tick.
+    """Returns the wrench of springs and dampers at a point of an arm, by an implicit Euler step, shape (6,).
 
     Args:
-        mobility: Acceleration of the point by force, J M^-1 J^T, shape (6, 6).
-        stiffness: 6 stiffnesses [N/m, N m/rad] along and about the axes of the springs.
-        damping: 6 dampings [N s/m, N m s/rad].
-        wrench: Force [N] and moment [N m] if the point did not move, shape (6,).
-        acceleration: Acceleration of the point that results in its velocity within a tick, plus that by everything else
-            that acts on the arm [m/s^2, rad/s^2], shape (6,).
+        mobility: Mobility matrix of the point, J M^-1 J^T, shape (6, 6). It maps wrenches to accelerations.
+        stiffness: 6 stiffnesses [N/m, N m/rad], along and about the axes of the springs.
+        damping: 6 dampings [N s/m, N m s/rad], along and about the same axes.
+        wrench: Force [N] and moment [N m] of the springs, and pushes, at zero velocity, shape (6,).
+        acceleration: Velocity of the point divided by the length of a tick, plus the acceleration of the point by
+            unmodelled effects [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of the tick [s].
     """
     by_acceleration = (damping + stiffness * dt_s) * dt_s
@@ -166,16 +179,20 @@ def implicit_wrench(
 
 
 def force_for(mobility: Array, acceleration: Array) -> Array:
-    """Returns force and moment that result in an acceleration of a point [m/s^2, rad/s^2], shapes (6,).
+    """Returns the wrench [N, N m], shape (6,), that accelerates a point of an arm as given.
 
     Args:
-        mobility: Acceleration by force, shape (6, 6); of a singular arm it is not invertible but for a small part.
+        mobility: Mobility matrix of the point, shape (6, 6), possibly singular: `ROUNDING` is added before inversion.
+        acceleration: Acceleration of the point [m/s^2, rad/s^2], shape (6,).
     """
     return solve(mobility + ROUNDING, acceleration)
 
 
 def turn_between(start: Sequence[float], end: Sequence[float]) -> Vector:
-    """Returns the rotation vector [rad] from one quaternion (x, y, z, w) to another, in the axes that both are in."""
+    """Returns the rotation vector [rad] from one orientation to another; both are quaternions (x, y, z, w).
+
+    The vector is expressed in the frame in which both orientations are given.
+    """
     x, y, z, w = start
     a, b, c, d = end
     turn = a * w - d * x - b * z + c * y, b * w - d * y - c * x + a * z, c * w - d * z - a * y + b * x

@@ -1,4 +1,4 @@
-"""Springs and dampers at the joints."""
+"""Controller with springs and dampers at the joints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .impedance import JointImpedance, JointSprings
 
 
 class JointImpedanceConfig(JointSprings, ControllerConfig):
-    """Keys of `joint_impedance`."""
+    """Configuration of a `joint_impedance` controller."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["joint_impedance"]})] = Field(
         description="`joint_impedance`, or a class with its keys."
@@ -26,9 +26,9 @@ class JointImpedanceConfig(JointSprings, ControllerConfig):
 
 
 class JointImpedanceController(Controller):
-    """Holds joints at targets as springs and dampers do; gravity and Coriolis forces are compensated.
+    """Pulls joints to target positions by springs and dampers, and compensates gravity and Coriolis forces.
 
-    `target` has positions [rad or m], and efforts [N m or N] to add if it has any.
+    Its input `target` holds positions [rad or m], and optionally efforts [N m or N] to add.
     """
 
     Config = JointImpedanceConfig
@@ -41,7 +41,15 @@ class JointImpedanceController(Controller):
         self._springs = JointImpedance(config, self._joints, arm.dt_s)
 
     def check(self, key: str, value: JointCommand | Mapping[str, float]) -> JointCommand:
-        """Accepts targets for some or all of its joints, or a mapping of them to positions [rad or m]."""
+        """Checks a target for some or all of the controller's joints, and returns the target as a `JointCommand`.
+
+        Args:
+            key: Name of the input.
+            value: A command with positions, or a mapping from joint names to positions [rad or m].
+
+        Raises:
+            ValueError: If a joint is unknown, or a value is missing, not finite or outside the joint's limits.
+        """
         value = JointCommand.of(value, "position")
         positions = value.values_of("position", "its targets are positions")
         for name, position in zip(value.names, positions, strict=True):
@@ -57,7 +65,7 @@ class JointImpedanceController(Controller):
         return value
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Holds the measured positions."""
+        """Sets the target to the measured positions, until the first target comes."""
         held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
         self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), held, smooth=True)
         self._push = np.zeros(len(held))
@@ -66,7 +74,7 @@ class JointImpedanceController(Controller):
         self._goal = dict(held)
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of springs and dampers, with compensation of gravity and Coriolis forces."""
+        """Returns the efforts of the springs and dampers plus the compensation of gravity and Coriolis forces."""
         self._update_target(targets.get("target"), tick)
         before = np.array(list(self._stream.set_points.values()))
         after = np.array(list(self._stream.advance(tick + 1.0).values()))
@@ -79,7 +87,7 @@ class JointImpedanceController(Controller):
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
-        """Returns the position error of each joint [rad or m]."""
+        """Returns the position error of each joint [rad or m], desired minus measured."""
         return {f"error/{joint.name}": float(error) for joint, error in zip(self._joints, self._error)}
 
     def _update_target(self, target: JointCommand | None, tick: int) -> None:

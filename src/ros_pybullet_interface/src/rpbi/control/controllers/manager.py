@@ -1,4 +1,4 @@
-"""Manager of the controllers of one robot: switches them, runs them, and stops those that fail."""
+"""Starts, runs and stops the controllers of one robot, and stops controllers that fail."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from .controller import ControlledRobot, Controller, ControllerConfig, RobotStat
 log = logging.getLogger(__name__)
 
 SLOW_TICKS = 50
-"""Number of ticks in a row that may each need more than a tick's time; then the controller is stopped."""
+"""Number of consecutive ticks with a computation longer than the tick, after which a controller is stopped."""
 
 
 class ControllerStateSample(NamedTuple):
-    """State of a controller.
+    """State of a controller, for its state topic.
 
     Attributes:
         name: `ROBOT/CONTROLLER`.
-        type: Its type, as in YAML.
-        active: Whether it drives its joints.
-        message: Reason why it does not; empty if it was stopped by request.
-        values: Its own numbers, by name.
+        type: Type of the controller, as in YAML.
+        active: Whether the controller drives its joints.
+        message: Error that stopped the controller; empty without an error.
+        values: Numbers that `Controller.report` returned, keyed by name.
     """
 
     name: str
@@ -42,11 +42,11 @@ class ControllerStateSample(NamedTuple):
 
 
 class ControllerSwitch(NamedTuple):
-    """Controllers to start and to stop.
+    """Request to start and stop controllers; stops come first.
 
     Attributes:
-        start: Names of those to start.
-        stop: Names of those to stop, first.
+        start: Names of the controllers to start.
+        stop: Names of the controllers to stop.
     """
 
     start: Sequence[str] = ()
@@ -54,11 +54,11 @@ class ControllerSwitch(NamedTuple):
 
 
 class ControllerUpdate(NamedTuple):
-    """Another configuration of a controller.
+    """Request to replace a controller's configuration.
 
     Attributes:
-        name: The controller.
-        config: All of its keys.
+        name: Name of the controller.
+        config: The complete new configuration.
     """
 
     name: str
@@ -66,7 +66,7 @@ class ControllerUpdate(NamedTuple):
 
 
 class _Managed:
-    """A controller and its state."""
+    """A controller with its activation state, targets and timing."""
 
     not_in_keyframes = ("slow",)
 
@@ -80,16 +80,17 @@ class _Managed:
         self.configure(config)
 
     def configure(self, config: ControllerConfig) -> None:
-        """Replaces the controller; an active one starts again from the robot's present state."""
+        """Creates the controller anew from a configuration. An active controller starts again at the next tick."""
         self.controller = CONTROLLERS.find(config.type)(self.robot, config)
         self.config = config
         self.has_begun = False
 
     def compute(self, state: RobotState, tick: int) -> np.ndarray | SetPoints:
-        """Returns its checked output: efforts or set points, finite.
+        """Runs the controller for one tick, and returns its efforts or set points after checking shape and finiteness.
 
         Raises:
-            Exception: Any that it raises.
+            ValueError: If the output has a wrong shape or is not finite.
+            Exception: Whatever the controller raises.
         """
         if not self.has_begun:
             self.controller.start(state, tick)
@@ -106,11 +107,11 @@ class _Managed:
 
 
 class ControllerManager:
-    """Runs the controllers of one robot that are active; one joint is driven by one of them at most.
+    """Runs the active controllers of one robot. At most one controller drives a joint.
 
     Args:
-        robot: The robot; which joints each controller drives is chosen here.
-        configs: Their configurations by name.
+        robot: The robot; `chosen` is replaced for each controller by the joints in its configuration.
+        configs: Configurations, keyed by the controller's name.
         motors: The robot's motors.
 
     Raises:
@@ -122,7 +123,7 @@ class ControllerManager:
         self._robot = robot
         self._managed = {name: _Managed(name, self._with_joints_of(config), config) for name, config in configs.items()}
         self.driven: frozenset[int] = frozenset()
-        """Joints that a controller drives, by PyBullet's index."""
+        """PyBullet's indices of the joints that an active controller drives."""
         self.switch(ControllerSwitch([name for name, config in configs.items() if config.active], []))
 
     @property
@@ -131,10 +132,10 @@ class ControllerManager:
         return list(self._managed)
 
     def of(self, name: str) -> Controller:
-        """Returns a controller.
+        """Returns the controller with a name.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If the name is unknown.
         """
         return self._named(name).controller
 
@@ -142,16 +143,16 @@ class ControllerManager:
         """Returns whether a controller drives its joints.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If the name is unknown.
         """
         return self._named(name).active
 
     def check_switch(self, switch: ControllerSwitch) -> None:
-        """Checks that controllers can be started and stopped.
+        """Checks that controllers can be started and stopped as requested.
 
         Raises:
-            UnknownNameError: If there is none of a name.
-            ValueError: If two would drive one joint.
+            UnknownNameError: If a name is unknown.
+            ValueError: If two controllers would drive the same joint.
         """
         for name in (*switch.start, *switch.stop):
             self._named(name)
@@ -164,14 +165,14 @@ class ControllerManager:
                 drivers[index] = name
 
     def switch(self, switch: ControllerSwitch) -> frozenset[int]:
-        """Stops and starts controllers; joints that none drives any more hold where they are.
+        """Stops and starts controllers. Joints that lose their controller hold their measured positions.
 
         Returns:
-            The joints that a controller drives which none drove before.
+            PyBullet's indices of the joints that are driven by a controller now and were not before.
 
         Raises:
-            UnknownNameError: If there is none of a name.
-            ValueError: If two would drive one joint; then nothing has changed.
+            UnknownNameError: If a name is unknown.
+            ValueError: If two controllers would drive the same joint. Nothing has changed then.
         """
         self.check_switch(switch)
         active = self._after(switch)
@@ -184,34 +185,45 @@ class ControllerManager:
         return self.driven - before
 
     def configure(self, update: ControllerUpdate) -> None:
-        """Changes the keys of a controller, such as its gains.
+        """Replaces the configuration of a controller, for example to change its gains.
 
         Raises:
-            UnknownNameError: If there is none of that name.
-            ValueError: If they do not fit.
+            UnknownNameError: If the controller's name is unknown.
+            ValueError: If the configuration does not fit the robot.
         """
         self._named(update.name).configure(update.config)
 
     def config(self, name: str) -> ControllerConfig:
-        """Returns the keys of a controller.
+        """Returns the configuration of a controller.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If the name is unknown.
         """
         return self._named(name).config
 
     def set_target(self, name: str, key: str, value: Any) -> None:
-        """Sets the newest value of an input of a controller."""
+        """Sets the value of an input of a controller.
+
+        Args:
+            name: Name of the controller.
+            key: Name of the input.
+            value: Value that `Controller.check` returned.
+        """
         self._managed[name].targets[key] = value
 
     def advance(self, state: RobotState, tick: int) -> None:
-        """Runs the active controllers for one tick; one that fails is stopped, and the error logged."""
+        """Runs the active controllers for one tick. A controller that fails is stopped, and its error is logged."""
         for managed in self._managed.values():
             if managed.active:
                 self._advance(managed, state, tick)
 
     def sample(self, robot: str, name: str) -> ControllerStateSample:
-        """Returns the state of a controller; if its `report` fails, it is stopped."""
+        """Returns the state of a controller. If its `report` fails, the controller is stopped first.
+
+        Args:
+            robot: Name of the robot.
+            name: Name of the controller.
+        """
         managed = self._managed[name]
         values: Mapping[str, float] = {}
         if managed.active and managed.has_begun:
@@ -232,7 +244,7 @@ class ControllerManager:
             self._fail(managed, _cause(managed.controller, "compute", error))
             return
         took_s = (time.perf_counter_ns() - begin_ns) * 1e-9
-        if managed.slow and took_s > managed.robot.dt_s:  # by processor time, which is slower to read
+        if managed.slow and took_s > managed.robot.dt_s:  # then measure processor time, which is slower to read
             took_s = (time.thread_time_ns() - used_ns) * 1e-9
         managed.slow = managed.slow + 1 if took_s > managed.robot.dt_s else 0
         if managed.slow >= SLOW_TICKS:
@@ -251,7 +263,7 @@ class ControllerManager:
         self._drive_others(before)
 
     def _drive_others(self, before: frozenset[int]) -> None:
-        """Updates `driven`: joints that are no longer driven hold, and motors of new ones are disabled."""
+        """Updates `driven`. Joints no longer driven hold; PyBullet's motors of newly driven joints are disabled."""
         self.driven = frozenset(
             index for managed in self._managed.values() if managed.active for index in managed.indices
         )
@@ -259,7 +271,7 @@ class ControllerManager:
         self._motors.disable(self.driven - before)
 
     def _after(self, switch: ControllerSwitch) -> list[str]:
-        """Returns the names of those that are active after a switch."""
+        """Returns the names of the controllers that are active after a switch."""
         stays = {name for name, managed in self._managed.items() if managed.active} - set(switch.stop)
         return [name for name in self._managed if name in stays or name in switch.start]
 
@@ -273,10 +285,13 @@ class ControllerManager:
 
 
 def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.ndarray:
-    """Returns the indices among the driven joints of the named ones; of all if none are named.
+    """Returns the indices of the named joints in `robot.model.joints`, shape (m,).
+
+    Args:
+        names: m joint names; None for all driven joints.
 
     Raises:
-        UnknownNameError: If the robot has no such joint, or no motor can move it.
+        UnknownNameError: If a name is not that of a driven joint.
     """
     known = [joint.name for joint in robot.model.joints]
     if names is None:
@@ -288,7 +303,7 @@ def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.nda
 
 
 def _cause(controller: Controller, doing: str, error: Exception) -> str:
-    """Returns the message of a controller's error; it names the class if that is of another package."""
+    """Returns the message of a controller's error. For a class from another package, the message names the class."""
     try:
         raise_plugin_error(controller, doing, error)
     except InterfaceError as named:
