@@ -1,4 +1,4 @@
-"""rospy in one object."""
+"""Offers `RosNode` under the import path of the authors' release."""
 
 from rpbi.ros.ros_node import RosNode
 

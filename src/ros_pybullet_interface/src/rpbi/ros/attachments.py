@@ -1,4 +1,4 @@
-"""Attachments in ROS: their topic, and the services that attach, detach and push."""
+"""Topic of the attachments between bodies, and services that attach, detach and apply wrenches."""
 
 import math
 from typing import Any
@@ -18,7 +18,7 @@ from .headers import to_ros_time
 
 ATTACHMENTS = Topic("rpbi/attachments", Attachments, meaning="Attachments, whenever one is added or removed; latched.")
 AXES = {"": False, "world": False, "link": True}
-"""Whether a wrench is in the axes of its link, by the `frame` of a request."""
+"""For each `frame` of a request, whether the wrench is given in the axes of the link."""
 
 
 class AttachmentPublisher:
@@ -30,7 +30,7 @@ class AttachmentPublisher:
         self._publisher = rospy.Publisher(ATTACHMENTS.name, Attachments, queue_size=10, latch=True)
 
     def poll(self) -> None:
-        """Publishes changes, if any."""
+        """Publishes all attachments, if any was added or removed since the last call."""
         attachments = self._world.attachments
         if self._published == attachments.changes:
             return
@@ -46,7 +46,7 @@ def attach(node: Any, request: AttachRequest) -> Answer:
     """Attaches a link of an object to one of another, as a magnet or a tool changer does.
 
     Raises:
-        ConfigError: If a number is not finite or makes no sense; it has all problems.
+        ConfigError: If a number in the request is invalid; the error lists all problems.
     """
     asked = request.attachment
     config = AttachmentConfig.parse(_keys(asked), "attachment")
@@ -64,7 +64,7 @@ def apply_wrench(node: Any, request: ApplyWrenchRequest) -> Answer:
     """Has a force and a torque act on an object or a link, for a time or until replaced.
 
     Raises:
-        ValueError: If the frame is unknown, or a number is not finite.
+        ValueError: If the frame is unknown, or a number in the request is invalid.
     """
     if request.frame not in AXES:
         raise ValueError(f"frame: expected world or link, got '{request.frame}'")
@@ -95,14 +95,14 @@ def _pose_message(pose: AttachmentPose | None) -> Pose:
 
 
 def _keys(asked: Attachment) -> dict[str, Any]:
-    """Returns a message as keys of YAML, without those at zero."""
+    """Converts a message to the YAML keys of an attachment; optional keys whose value is zero or empty are left out."""
     keys = {key: getattr(asked, key) for key in ("name", "parent", "child")}
     keys |= {key: value for key in ("kind", "max_force") if (value := getattr(asked, key))}
     return keys | {key: pose for key in ("parent_pose", "child_pose") if (pose := _pose_keys(getattr(asked, key)))}
 
 
 def _pose_keys(pose: Pose) -> dict[str, list[float]]:
-    """Returns a pose with the keys of YAML, nothing if it is all zeros."""
+    """Converts a pose to YAML keys; returns an empty mapping if all numbers are zero."""
     position = [pose.position.x, pose.position.y, pose.position.z]
     orientation = [pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w]
     return {"position": position, "orientation": orientation} if any(position + orientation) else {}

@@ -1,4 +1,4 @@
-"""Rows of the tables of topics and services, used by the node and by the reference pages."""
+"""Descriptions of topics and services as data, from which the node opens them and the reference pages list them."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -14,18 +14,23 @@ from rpbi.bodies import Body
 from rpbi.samples import LinkPoseSample
 
 Owners = Callable[[Body], Sequence[str]]
-"""Returns the values of `{name}` for the endpoints that a body has by a row; none if it has none."""
+"""Function that returns the owners of a topic or service within a body: the texts that replace `{name}` in its name.
+
+An empty sequence means that the body does not have the topic or service."""
 
 
 class Answer(NamedTuple):
-    """Answer of most services, whose types have the two fields in different orders."""
+    """Success and message, the answer of most services.
+
+    The service types have the two fields in different orders; `serve` matches them by name.
+    """
 
     success: bool
     message: str
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns the owners function of an endpoint that every body of a type has once."""
+    """Returns an `Owners` function for a topic or service that every body of the given type has once."""
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -33,14 +38,17 @@ class Topic(NamedTuple):
     """A topic.
 
     Attributes:
-        name: Its name, with `{name}` for the body, sensor or camera.
-        message_type: Its ROS type.
-        handler: For samples: returns the message of a sample and its stamp [ns]. For an input: returns its value from a
-            message. For a body: acts on the body's context and a message. None if something else publishes.
-        meaning: Its content, or the effect of a message, in a sentence; with the key that sets its rate.
-        key: Key of the main file that opens it or sets its rate, where 0 is off; empty if it is there in any case.
-        owners: Bodies that subscribe to it.
-        on_tf: For samples: returns poses for TF and their stamp [ns]. None if there are none.
+        name: Name of the topic, with `{name}` in place of the body, sensor or camera.
+        message_type: ROS type of the messages.
+        handler: Function for the messages, of three kinds. For a sensor's topic, it converts a sample and its stamp
+            [ns] to a message. For an input, it converts a message to the input's value. In `BODY_TOPICS`, it takes the
+            body's context and a message, and acts on the body. None if other code publishes the topic.
+        meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
+        key: Key of the main YAML file that opens the topic or sets its rate, where 0 is off. Empty if the topic is
+            always open.
+        owners: Returns the owners within a body that subscribe to the topic, see `Owners`.
+        on_tf: For a sensor's topic whose samples also go to TF: converts a sample and its stamp [ns] to poses and
+            their stamp [ns]. None for other topics.
     """
 
     name: str
@@ -56,12 +64,12 @@ class Service(NamedTuple):
     """A service of the node or of bodies.
 
     Attributes:
-        name: Its name, with `{name}` for the body or sensor.
-        service_type: Its ROS type.
-        handler: Returns the answer to a context and a request: an Answer, or the response or its fields. An
-            InterfaceError or ValueError refuses the request: `success=False` and its message, or an error of the call
-            where the response has no `success`. None where something else serves it.
-        owners: Bodies that have it.
+        name: Name of the service, with `{name}` in place of the body or sensor.
+        service_type: ROS type of the service.
+        handler: Takes a context and a request, and returns an Answer, the response, or the response's fields. To refuse
+            the request, it raises an InterfaceError or ValueError. The client then gets `success=False` and the error's
+            message; if the response has no field `success`, the call fails. None if other code serves it.
+        owners: Returns the owners within a body that have the service, see `Owners`.
     """
 
     name: str
@@ -71,17 +79,24 @@ class Service(NamedTuple):
 
     @property
     def meaning(self) -> str:
-        """Its purpose: the first paragraph of its handler's docstring."""
+        """Purpose of the service: the first paragraph of the handler's docstring."""
         return " ".join((inspect.getdoc(self.handler) or "").split("\n\n")[0].split()) if self.handler else ""
 
 
 MAX_BYTES = 2_000_000
-"""Largest size of YAML in a request, or in a file that it names [bytes]; larger ones would delay the simulation."""
+"""Largest size of YAML text in a request, or of a file that a request names [bytes]; more would delay the
+simulation."""
 _warn = ThrottledWarning()
 
 
 def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
-    """Subscribes to a topic whose handler acts on a context; refused messages are logged at a limited rate."""
+    """Subscribes to a topic and calls its handler for each message; refused messages are logged at a limited rate.
+
+    Args:
+        topic: The topic.
+        context: First argument of the handler.
+        owner: Text that replaces `{name}` in the topic's name.
+    """
     name, handler = rospy.resolve_name(topic.name.format(name=owner)), topic.handler
     assert handler is not None  # rows of topics to subscribe to have one
 
@@ -97,7 +112,13 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
 
 
 def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
-    """Opens a service."""
+    """Opens a service.
+
+    Args:
+        service: The service.
+        context: First argument of the handler.
+        owner: Text that replaces `{name}` in the service's name.
+    """
     response_type, handler = service.service_type._response_class, service.handler
     assert handler is not None  # rows of services to open have one
 
@@ -115,14 +136,14 @@ def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
 
 
 def find_topic(name: str, owner: Any) -> Topic:
-    """Returns a topic of another package.
+    """Imports and returns a `Topic`, possibly one that another package defines.
 
     Args:
-        name: Where it is, as `module:NAME`.
-        owner: The sensor or body that names it as its `ros_topic`.
+        name: Module and variable of the Topic, as `module:NAME`.
+        owner: The sensor or input function whose `ros_topic` is `name`, for the error message.
 
     Raises:
-        ConfigError: If it does not exist; the error names the class of the owner.
+        ConfigError: If the module has no such Topic; the error names the owner.
     """
     try:
         found = find(name)

@@ -1,4 +1,4 @@
-"""Headers of messages: names of TF frames, and stamps of the world's clock."""
+"""Headers of messages: full names of TF frames, and ROS stamps from the world's clock."""
 
 from collections.abc import Container
 
@@ -17,49 +17,55 @@ FRAMES = {
     "rpbi/NAME/LINK": "URDF frames of links: all of a robot with `broadcast_link_states`, its root link with "
     "`broadcast_root_tf_hz`, all of a URDF object with `broadcast_hz`.",
 }
-"""Frames that the node puts on TF, and the bodies that have them; `NAME` is a body and `LINK` one of its links."""
+"""Meaning of each TF frame that the node publishes; `NAME` stands for a body and `LINK` for one of its links."""
 
 
 def use_prefix(prefix: str | None) -> None:
-    """Puts a prefix before all frames of this node's world, so that two worlds can share one TF tree."""
+    """Sets a prefix for all frames of this node's world, so that two worlds can share one TF tree; None for none."""
     global _prefix
     _prefix = f"{prefix}/" if prefix else ""
 
 
 def use_own_frames(frames: Container[str]) -> None:
-    """Resolves these frames, without prefix, to those of this node's world wherever YAML names them."""
+    """Sets the frames of this node's world, by their names without prefix; `named_frame` adds the prefix to them."""
     global _own_frames
     _own_frames = frames
 
 
 def named_frame(frame: str) -> str:
-    """Returns the full name of a frame that YAML names: with the prefix if it is one of this node's world."""
+    """Returns the full name of a frame from a YAML file; only frames of this node's world get the prefix."""
     return prefixed(frame) if frame in _own_frames else frame
 
 
 def prefixed(frame: str) -> str:
-    """Returns the full name of a frame of this node's world, such as `rpbi/kuka_lwr`."""
+    """Returns the name of a frame of this node's world, such as `rpbi/kuka_lwr`, with the prefix in front."""
     return _prefix + frame
 
 
 def world_frame() -> str:
-    """Returns the frame that all poses are in: `rpbi/world`, with the prefix if there is one."""
+    """Returns the full name of the world frame: `rpbi/world`, with the prefix in front if one is set."""
     return prefixed(WORLD_FRAME)
 
 
 def to_ros_time(stamp_ns: int) -> genpy.Time:
-    """Returns a stamp [ns] as a ROS time, without going through a float."""
+    """Converts a stamp [ns] to a ROS time without rounding, since it computes with integers only."""
     stamp: genpy.Time = _new(genpy.Time)
     stamp.secs, stamp.nsecs = divmod(stamp_ns, NS_PER_S)
     return stamp
 
 
 def stamped_header(stamp_ns: int, frame: str) -> Header:
-    """Returns the header of a message with a stamp [ns], in a frame given by its full name."""
+    """Returns a message header.
+
+    Args:
+        stamp_ns: Stamp [ns].
+        frame: Full name of the TF frame.
+    """
     header: Header = _new(Header)
     header.seq, header.stamp, header.frame_id = 0, to_ros_time(stamp_ns), frame
     return header
 
 
 _new = object.__new__
-"""Makes times and headers without their constructors, which check types and loop over fields: six times as fast."""
+"""Creates times and headers without calling their constructors, which is six times as fast: the constructors check
+types and loop over fields."""

@@ -1,4 +1,4 @@
-"""Robots that start where another robot, for instance the real one, is at that time."""
+"""Sets the initial joint positions of robots from joint states of, for instance, the real robot."""
 
 import math
 from dataclasses import replace
@@ -14,10 +14,10 @@ from rpbi.world.loading import LoadedWorld
 
 
 def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
-    """Returns a world whose robots start at the joint states that their configurations name.
+    """Waits for the `initial_joint_state_topic` of each robot that names one, and returns a world with these positions.
 
     Raises:
-        ConfigError: If such joint states do not come or do not fit; it names all topics.
+        ConfigError: If a joint state does not arrive in time or does not fit its robot; the error lists all problems.
     """
     problems: list[Problem] = []
     objects = []
@@ -32,12 +32,17 @@ def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
 
 
 def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
-    """Returns the configuration of a body, for a robot with the joint positions of its topic of joint states.
+    """Waits for a robot's `initial_joint_state_topic`, and returns its configuration with the received positions.
 
-    Joints that the topic does not name start as configured; joints that the robot lacks are left out.
+    Joints that the message does not name start as configured. Joints that the robot lacks are ignored. For other
+    bodies, and for robots without that key, the configuration is returned unchanged.
+
+    Args:
+        config: Configuration of a body.
+        file: Name of its YAML file, for error messages.
 
     Raises:
-        ConfigError: If no joint states come in time, or they have nothing for the robot.
+        ConfigError: If a message does not arrive in time, names no joint of the robot, or has invalid positions.
     """
     if not isinstance(config, RobotConfig) or config.initial_joint_state_topic is None:
         return config

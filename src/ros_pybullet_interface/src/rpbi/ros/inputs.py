@@ -1,4 +1,4 @@
-"""Inputs of the world from ROS: subscriptions and TF, by way of the mailbox."""
+"""Receives the inputs of the world from topics and TF, and passes them to the world's mailbox."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -27,7 +27,7 @@ from .tf_follower import TfFollower, refusal
 
 
 def _joint_target(message: JointState) -> JointCommand:
-    """Returns all quantities of a message; the robot's control mode decides which are used."""
+    """Converts a message with all its quantities; the robot's control mode decides which quantities are used."""
     return JointCommand(
         message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec()
     )
@@ -39,7 +39,11 @@ def _twist(message: geometry_msgs.msg.Twist) -> Twist:
 
 
 def _external_wrench(message: WrenchStamped) -> ExternalWrench:
-    """Returns a wrench at the origin of the link that the frame names, in its axes; in the world's at the root link."""
+    """Converts a message to a wrench.
+
+    If `frame_id` names a link, the wrench acts at the origin of the link, in the link's axes. If `frame_id` is empty or
+    `world`, the wrench acts on the root link, in the world's axes.
+    """
     frame = message.header.frame_id.removeprefix(prefixed("rpbi/"))
     in_link_axes = frame not in ("", "world")
     force, torque = message.wrench.force, message.wrench.torque
@@ -86,7 +90,7 @@ TOPIC_INPUTS: dict[str, Topic] = {
         "Force [N] and torque [N m] on the link of the frame, in its axes, for 0.5 s; without a frame in the world's.",
     ),
 }
-"""The topic of each kind of input that comes by topic."""
+"""Topics of the inputs of bodies, indexed by the name of the input."""
 POSE_TARGET = Topic(
     "rpbi/{name}/target", PoseStamped, _pose_target, "Target of the point that the controller holds, in the world."
 )
@@ -101,8 +105,12 @@ JOINT_TARGET = Topic(
 def topic_input(key: str, taken: Input) -> Topic:
     """Returns the topic of an input.
 
+    Args:
+        key: Name of the input.
+        taken: The input.
+
     Raises:
-        ConfigError: If it comes from another package and has no topic that can be found.
+        ConfigError: If another package defines the input and its `ros_topic` is missing or cannot be found.
     """
     if taken.ros_topic:
         return find_topic(taken.ros_topic, taken.apply)
@@ -113,12 +121,12 @@ def topic_input(key: str, taken: Input) -> Topic:
 
 
 def input_messages(world: World, slot: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yields topics and messages by which a value of an input would have come; none for inputs of other kinds.
+    """Yields the topics and messages that would have caused an input, for joint targets and base velocities only.
 
     Args:
-        world: The world; its present stamp is that of the messages.
-        slot: `NAME/INPUT`.
-        value: The value, as it was applied.
+        world: The world; the messages get its present stamp.
+        slot: Body and name of the input, as `NAME/INPUT`.
+        value: Value of the input, as it was applied to the world.
     """
     name, _, key = slot.rpartition("/")
     if key == "target" and isinstance(value, tuple):
@@ -141,7 +149,7 @@ class Inputs:
     """Subscribes to the inputs of the world; refused messages are logged at a limited rate.
 
     Args:
-        world: The world; only its `put` and the time of its clock are used.
+        world: The world; only its method `put` and the time of its clock are used.
     """
 
     def __init__(self, world: World) -> None:
@@ -152,7 +160,7 @@ class Inputs:
         self._tf = TfFollower(world.put, lambda: world.clock.time_s)
 
     def open(self, name: str, inputs: Mapping[str, Input]) -> None:
-        """Connects the inputs of a body or sensor."""
+        """Subscribes to the topics, and follows the TF frames, of the inputs of a body or sensor."""
         subscribers = self._subscribers.setdefault(name, [])
         for key, taken in inputs.items():
             if isinstance(taken, PoseInput):
@@ -161,13 +169,13 @@ class Inputs:
                 subscribers.append(self._subscribe(name, key, taken))
 
     def close(self, name: str) -> None:
-        """Disconnects the inputs of a body or sensor."""
+        """Unsubscribes from the topics, and stops following the TF frames, of a body or sensor."""
         for subscriber in self._subscribers.pop(name, []):
             subscriber.unregister()
         self._tf.leave(name)
 
     def repeat_poses(self) -> None:
-        """Sends the last poses of TF frames to the world again, after a reset; any thread may call it."""
+        """Sends the last poses of all followed TF frames to the world again, for instance after a reset."""
         self._tf.repeat()
 
     def _subscribe(self, name: str, key: str, taken: Input) -> rospy.Subscriber:

@@ -1,4 +1,4 @@
-"""The page of all topics, services, frames and parameters of the simulator."""
+"""Writes the reference page of all topics, services, frames and parameters of the simulator."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -53,11 +53,15 @@ The nodes of custom_ros_tools, which remap joint states and publish transforms a
 [real_robots.md](real_robots.md#the-stand-in)."""
 HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
 PACKAGES = ("ros_pybullet_interface", "compatibility/cob_srvs", "compatibility/custom_srvs")
-"""Folders with the messages and services that the node has."""
+"""Folders of the packages that define the node's own message and service types."""
 
 
 def interface_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the page of a workspace, by its path."""
+    """Returns the text of the reference page, indexed by the path of its file.
+
+    Args:
+        root: Folder of the workspace.
+    """
     world = reference_world()
     try:
         return {root / "docs/topics_and_services.md": interface_page(world, _definitions(root))}
@@ -66,11 +70,12 @@ def interface_files(root: Path) -> dict[Path, str]:
 
 
 def interface_page(world: World, definitions: Mapping[str, str]) -> str:
-    """Returns the page.
+    """Returns the text of the reference page, in Markdown.
 
     Args:
-        world: A world of one body of each type, named after it, and a camera.
-        definitions: Text of each message and service of ours, such as `ros_pybullet_interface/Contacts`.
+        world: A world that has a body of each type, with the type as its name, and a camera.
+        definitions: Definitions of this workspace's message and service types, indexed by names such as
+            `ros_pybullet_interface/Contacts`.
     """
     of_bodies = {name: list(of_body(world, name, body)) for name, body in world.bodies.items()}
     of_cameras = [each for name in world.cameras for each in of_camera(world, name)]
@@ -91,7 +96,11 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
 
 
 def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[str]]:
-    """Returns the types of bodies that have each endpoint; placeholders stand for names of the reference world."""
+    """Returns the types of bodies that have each topic or service, with placeholders in place of example names.
+
+    Args:
+        of_bodies: Topics and services of the bodies of the reference world, indexed by the type of body.
+    """
     owners: dict[Endpoint, list[str]] = {}
     placeholders = {f"/{JOINT}/": "/JOINT/", **{f"/{name}/": "/CONTROLLER/" for name in CONTROLLERS}}
     for body, rows in of_bodies.items():
@@ -106,7 +115,12 @@ def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[
 
 
 def _tables(owners: Mapping[Endpoint, list[str]], definitions: Mapping[str, str]) -> Iterator[str]:
-    """Yields a table of each kind of endpoint that there is, with its heading."""
+    """Yields a heading and a table for each kind of endpoint; kinds without endpoints are left out.
+
+    Args:
+        owners: Types of bodies that have each endpoint; `[""]` for endpoints that belong to no body.
+        definitions: Definitions of this workspace's message and service types, indexed by name.
+    """
     for kind, heading in HEADINGS.items():
         rows = {row: kinds for row, kinds in owners.items() if row.kind == kind}
         if not rows:

@@ -1,4 +1,4 @@
-"""All topics, services and parameters of a world, listed without starting anything."""
+"""Lists all topics, services and parameters of a world, without opening them."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
@@ -31,16 +31,16 @@ SUBSCRIBES = "subscribes"
 SERVES = "serves"
 FOLLOWS = "listens to TF"
 OF_WINDOW = "PyBullet's window"
-"""Note of what belongs to it."""
+"""Note of the topics and services of PyBullet's window."""
 
 
 class NodeParameter(NamedTuple):
     """A parameter of the node.
 
     Attributes:
-        name: Its name, with `NAME` for a robot.
-        is_set: Whether the node sets it, else it reads it.
-        meaning: Its purpose, in a sentence.
+        name: Name of the parameter, with `NAME` in place of a robot's name.
+        is_set: Whether the node sets the parameter; otherwise the node reads it.
+        meaning: Purpose of the parameter, in a sentence.
     """
 
     name: str
@@ -78,14 +78,14 @@ PARAMETERS = (
 
 
 class Endpoint(NamedTuple):
-    """A topic or service.
+    """A topic, a service or a followed TF frame.
 
     Attributes:
-        kind: `publishes`, `subscribes`, `serves` or `listens to TF`.
-        name: Its relative name, or the TF frame.
-        type: Its ROS type.
-        note: Its rate in this world, or its owner.
-        meaning: Its purpose, in a sentence.
+        kind: What the node does with it: `publishes`, `subscribes`, `serves` or `listens to TF`.
+        name: Relative ROS name, or name of the TF frame.
+        type: ROS type; empty for a TF frame.
+        note: Rate in this world, name of the owner, or both.
+        meaning: Purpose, in a sentence.
     """
 
     kind: str
@@ -96,10 +96,11 @@ class Endpoint(NamedTuple):
 
 
 def endpoints(world: World) -> list[Endpoint]:
-    """Lists what the node opens for a world.
+    """Lists all topics, services and followed TF frames that the node opens for a world.
 
     Raises:
-        ConfigError: If a class of another package has no topic that can be found, or two things would have one name.
+        ConfigError: If the `ros_topic` of a class from another package cannot be found, or two topics or two services
+            would have the same name.
     """
     listed = [*_node_topics(world), *_window(world)]
     if world.config.poses:
@@ -114,7 +115,12 @@ def endpoints(world: World) -> list[Endpoint]:
 
 
 def _refuse_clashes(file: str, listed: Iterable[Endpoint]) -> None:
-    """Raises a ConfigError if two topics or services of different meaning have one name; TF is of all bodies."""
+    """Raises a ConfigError if two topics or two services have the same name; all bodies may share `/tf`.
+
+    Args:
+        file: Name of the main YAML file, for the error message.
+        listed: All topics and services.
+    """
     by_name: dict[tuple[str, str], Endpoint] = {}
     problems = []
     for each in listed:
@@ -128,7 +134,7 @@ def _refuse_clashes(file: str, listed: Iterable[Endpoint]) -> None:
 
 
 def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:
-    """Yields what belongs to a body."""
+    """Yields the topics, services and followed TF frames of a body."""
     for sensor in world.sensors_of(name):
         published = sample_topic(sensor)
         rate = f"{sensor.hz:g} Hz"
@@ -146,7 +152,7 @@ def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:
 
 
 def of_camera(world: World, name: str) -> Iterator[Endpoint]:
-    """Yields what belongs to a camera."""
+    """Yields the topics and followed TF frame of a camera."""
     camera = world.cameras[name]
     for _, topic in camera_topics(camera.topic_name, camera.config.pointcloud).values():
         yield _topic(PUBLISHES, topic, f"{camera.hz:g} Hz", camera.topic_name)

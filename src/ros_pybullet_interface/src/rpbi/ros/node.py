@@ -1,4 +1,4 @@
-"""The simulator node: a world with ROS around it."""
+"""The simulator node: builds a world and opens its ROS interfaces."""
 
 import gc
 import logging
@@ -42,13 +42,15 @@ from .window_topics import WindowTopics
 
 
 def configured_world(robot_description: str | None) -> LoadedWorld:
-    """Reads the world of `~config_file` with the overrides of `~config`, or that of `~config` alone.
+    """Loads the world from the file that `~config_file` names, or from the mapping `~config` if no file is named.
+
+    With `~config_file`, the keys of `~config` override those of the file.
 
     Args:
-        robot_description: File that the word `robot_description` stands for.
+        robot_description: URDF file that a `fileName` of `robot_description` stands for; None if there is none.
 
     Raises:
-        ConfigError: If there is none, or with all of its problems.
+        ConfigError: If both parameters are missing, or the configuration is wrong; the error lists all problems.
     """
     file, config = (rospy.get_param(name, None) for name in ("~config_file", "~config"))
     if file is None and config is None:
@@ -84,7 +86,7 @@ def _wants_real_time_priority() -> bool:
 
 
 def parameter_above(name: str) -> Any:
-    """Returns a parameter of this namespace or, failing that, of the nearest one around it; None if there is none."""
+    """Returns a ROS parameter from this namespace or the nearest one above that has it; None if none has it."""
     found = rospy.search_param(name)
     if found is None:
         return None
@@ -95,13 +97,13 @@ def parameter_above(name: str) -> Any:
 log = logging.getLogger(__name__)
 
 LONGEST_END_S = 10.0
-"""Longest wait for the loop and the renderer at shutdown [s]; beyond it, ROS ends without them."""
+"""Longest wait for the simulation loop and the renderer at shutdown [s]; beyond it, ROS shuts down without them."""
 
 SWITCH_S = 0.0005
-"""Longest wait of a thread for Python's lock [s]; Python's default, 5 ms, is five ticks at 1 kHz."""
+"""Longest wait of a thread for Python's global lock [s]; Python's default, 5 ms, is five ticks at 1 kHz."""
 
 MAX_WARNINGS = 20
-"""Warnings of a world that are logged at its start; of more, the rest is counted."""
+"""Largest number of warnings of a world that are logged one by one at its start; further ones are only counted."""
 
 
 def _log_warnings(warnings: Sequence[Problem]) -> None:
@@ -115,8 +117,8 @@ class SimulatorNode:
     """Builds the configured world and connects it to ROS.
 
     Raises:
-        ConfigError: If the configuration is wrong; it has all problems.
-        PhysicsError: If PyBullet cannot do what is asked.
+        ConfigError: If the configuration is wrong; the error lists all problems.
+        PhysicsError: If PyBullet cannot build the world.
     """
 
     def __init__(self) -> None:
@@ -163,7 +165,9 @@ class SimulatorNode:
             self._simulation.start()
 
     def run(self) -> None:
-        """Simulates until ROS shuts down, which waits until everything here has ended.
+        """Runs the simulation until ROS shuts down or PyBullet ends, then closes the world.
+
+        The shutdown of ROS waits until the world is closed, for at most LONGEST_END_S.
 
         Raises:
             PhysicsError: If PyBullet has ended, for instance because its window was closed.
@@ -181,11 +185,11 @@ class SimulatorNode:
             if self._priority is not None:
                 self._priority.end()  # while ROS shuts down, a thread of rospy spins
             has_gone = not self._world.is_connected
-            send_at_once()  # such as the results of goals that end with it
+            send_at_once()  # buffered messages, such as the results of action goals that the shutdown has ended
             self._cameras.close()
             self._world.close()  # from here on, no object is added or removed
-            # rospy would lock up on topics that are being opened or closed. Threads that wait for these end with the
-            # process.
+            # rospy's shutdown would lock up on topics that are being opened or closed, so this waits for them. Threads
+            # of later additions and removals wait until the process ends.
             self._objects.end(LONGEST_END_S)
             ended.set()
         if has_gone:
@@ -193,7 +197,7 @@ class SimulatorNode:
 
 
 def main() -> None:
-    """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
+    """Runs the node; the exit code is 1 if the node cannot start, and 0 if it is interrupted."""
     sys.setswitchinterval(SWITCH_S)
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False, loggers=["robot_model"])

@@ -1,4 +1,4 @@
-"""Requests to the simulation thread, and the body that a service or topic acts on."""
+"""Requests from other threads to the simulation thread, and the context of a service or topic of a body."""
 
 import time
 from collections.abc import Callable
@@ -16,21 +16,23 @@ from .simulation import Simulation
 T = TypeVar("T")
 
 GIVE_UP_AFTER_S = 30.0
-"""Longest wait of a request for a pass of the loop [s] of wall time; beyond it, the request fails."""
+"""Longest wait for the next pass of the simulation loop [s] of wall time; beyond it, a waiting request fails."""
 
 
 class Requests:
-    """Makes the simulation thread call functions, and waits for their results."""
+    """Makes the simulation thread call a function, and waits for the result."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
 
     def __call__(self, call: Callable[[], T], even_if_busy: bool = False) -> T:
-        """Returns what the call returns, or raises what it raises; on the simulation thread it is made at once.
+        """Makes the simulation thread call a function; returns the function's result or raises its exception.
+
+        If the caller is in the simulation thread, the function is called directly.
 
         Args:
-            call: The call.
-            even_if_busy: Whether it is made even while the world is restored.
+            call: The function.
+            even_if_busy: Whether to call the function even while the world is being restored.
 
         Raises:
             InterfaceError: If the world is being restored, the simulation has ended, the node shuts down or the loop
@@ -41,7 +43,7 @@ class Requests:
         return self.wait_for(self._simulation.world.mailbox.request(call, even_if_busy))
 
     def wait_for(self, future: Future[T]) -> T:
-        """Waits for a future of the simulation thread; returns its result or raises its error.
+        """Waits for a future that the simulation thread completes; returns its result or raises its exception.
 
         Raises:
             InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
@@ -61,13 +63,14 @@ class Requests:
 
 
 class BodyContext(NamedTuple):
-    """A body, and access to it from other threads.
+    """The body that a service or topic acts on, for handlers that run in other threads than the simulation.
 
     Attributes:
         name: Name of the body.
-        owner: Value of `{name}` in the name of the service or topic: the body, or a sensor as `BODY/JOINT`.
+        owner: Text that replaces `{name}` in the name of the service or topic: the body's name, or `BODY/JOINT` for a
+            sensor, or `BODY/CONTROLLER` for a controller.
         simulation: The loop that runs the world.
-        ask: Calls a function in the simulation thread.
+        ask: Makes the simulation thread call a function.
     """
 
     name: str
@@ -77,17 +80,18 @@ class BodyContext(NamedTuple):
 
     @property
     def world(self) -> World:
-        """The world it is in."""
+        """The world that contains the body."""
         return self.simulation.world
 
     @property
     def body(self) -> Any:
-        """The present body, which may be another object after each reset; a robot if only robots are served.
+        """The body of this name; a reset may replace it by a new object.
 
-        Its PyBullet state is for the simulation thread alone.
+        Only the simulation thread may read its PyBullet state. The type is `Any`, since a service for robots only gets
+        a robot here.
 
         Raises:
-            UnknownNameError: If it was removed.
+            UnknownNameError: If the body was removed.
             InterfaceError: If the simulation has ended.
         """
         body = self.world.bodies.get(self.name)
@@ -98,15 +102,16 @@ class BodyContext(NamedTuple):
         return body
 
     def ask_body(self, call: Callable[[], T], body: Any = None) -> T:
-        """Calls a function that uses the body in the simulation thread; returns its result or raises its exception.
+        """Makes the simulation thread call a function that uses the body; returns its result or raises its exception.
 
         Args:
-            call: The call.
-            body: The body that it uses, if it was looked up before.
+            call: The function, without arguments.
+            body: The body that the function uses; None for the present one.
 
         Raises:
-            UnknownNameError: If the body was removed meanwhile.
-            InterfaceError: If the world was reset meanwhile, the simulation has ended or makes no progress.
+            UnknownNameError: If the body was removed before the call.
+            InterfaceError: If a reset has replaced the body before the call, or the simulation has ended or makes no
+                progress.
         """
         asked = self.body if body is None else body
 
@@ -118,5 +123,5 @@ class BodyContext(NamedTuple):
         return self.ask(checked)
 
     def act(self, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
-        """Applies a replayable action to the body in the simulation thread; see `World.act`."""
+        """Makes the simulation thread apply an action to the body, which is recorded for replays; see `World.act`."""
         return self.ask_body(lambda: self.world.act(self.name, what, value, do))

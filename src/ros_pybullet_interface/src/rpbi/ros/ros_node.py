@@ -1,4 +1,4 @@
-"""rospy in one object, for scripts in the style of the authors' release."""
+"""A class that offers all of rospy and a TF listener in one object, as scripts of the authors' release expect."""
 
 from typing import Any
 
@@ -9,17 +9,17 @@ from custom_ros_tools.tf import TfInterface
 
 
 class RosNode:
-    """A node, its TF, and all that rospy has, under the same names: `Publisher`, `Rate`, `loginfo` and so on.
+    """Initialises a ROS node and offers all attributes of rospy, such as `Publisher`, `Rate` and `loginfo`.
 
-    The simulator does not use it: it waits for ROS time, which the simulator must not.
+    The simulator does not use this class: the class waits for ROS time, which the simulator itself publishes.
 
     Args:
-        name: The node's name unless remapped.
-        options: Those of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals` the script
+        name: The node's name, unless it is remapped.
+        options: Options of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals`, the script
             handles Ctrl-C itself.
 
     Attributes:
-        tf: TF.
+        tf: Listens to TF and broadcasts transforms.
     """
 
     def __init__(self, name: str, **options: Any) -> None:

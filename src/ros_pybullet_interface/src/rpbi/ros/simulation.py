@@ -1,4 +1,4 @@
-"""The simulation loop: requests, ticks, samples out, in step with the wall clock."""
+"""The simulation loop: serves requests, runs ticks and publishes samples, in step with the wall clock."""
 
 import logging
 import math
@@ -21,13 +21,13 @@ from rpbi.world.saved.state import WorldState
 log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
-"""Shortest time between two checks for requests while stopped [s]."""
+"""Shortest period of the loop while the world is stopped [s]."""
 BURST_S = 0.005
-"""Longest run of due ticks before the loop sends messages and looks at requests [s]."""
+"""Longest time that the loop runs due ticks before it sends messages and serves requests [s]."""
 
 
 class StepRequest:
-    """A request for ticks, and the number left; the caller waits for `done`."""
+    """A request to run a number of ticks, and the number of ticks left; the caller waits for `done`."""
 
     def __init__(self, steps: int) -> None:
         self.done: Future[tuple[int, int]] = Future()
@@ -35,12 +35,12 @@ class StepRequest:
         self._steps = self.left = steps
 
     def finish(self, tick: int, stamp_ns: int) -> None:
-        """Ends the wait with success."""
+        """Sets the result of `done`: the number and stamp [ns] of the last tick."""
         if self.done.set_running_or_notify_cancel():
             self.done.set_result((tick, stamp_ns))
 
     def fail(self, error: Exception) -> None:
-        """Ends the wait with an error."""
+        """Sets the exception of `done`."""
         if self.done.set_running_or_notify_cancel():
             self.done.set_exception(error)
 
@@ -52,8 +52,8 @@ class RestoreRequest:
     """A request to restore a state, and its progress; the caller waits for `done`.
 
     Args:
-        ticks: Runs the ticks up to the state and yields each, see `World.restoring`.
-        end: The last of them.
+        ticks: Runs the ticks up to the saved state and yields the number of each, see `World.restoring`.
+        end: Number of the last tick.
     """
 
     def __init__(self, ticks: Generator[int, None, None], end: int) -> None:
@@ -61,7 +61,7 @@ class RestoreRequest:
         self._ticks, self._end, self._tick = ticks, end, 0
 
     def advance(self, end_s: float) -> bool:
-        """Continues until a time of the monotonic clock [s]; returns whether it is done."""
+        """Continues the restoration until a time of the monotonic clock [s]; returns whether it is complete."""
         for tick in self._ticks:
             self._tick = tick
             if time.monotonic() > end_s:
@@ -69,7 +69,10 @@ class RestoreRequest:
         return True
 
     def end(self, error: Exception | None = None) -> None:
-        """Ends the restoration and the wait for it; if it is not complete, the world is reset."""
+        """Ends the restoration, and sets the result or exception of `done`.
+
+        If the restoration is not complete, the world is reset.
+        """
         self._ticks.close()
         if self.done.set_running_or_notify_cancel():
             self.done.set_result(None) if error is None else self.done.set_exception(error)
@@ -79,10 +82,13 @@ class RestoreRequest:
 
 
 class Simulation:
-    """Runs, stops and steps a world on the one thread that owns PyBullet.
+    """Runs, stops and steps a world in the simulation thread, the only thread that calls PyBullet.
 
-    All methods are for that thread; others reach it through the world's mailbox. Helpers are called at every pass and
-    must return at once.
+    Only the simulation thread may call the methods; other threads send requests through the world's mailbox.
+
+    Args:
+        helpers: Functions that each pass of the loop calls; they must return at once.
+        priority: Real-time priority of the node's threads; None if it is never changed.
     """
 
     def __init__(
@@ -114,17 +120,17 @@ class Simulation:
 
     @property
     def is_own_thread(self) -> bool:
-        """Whether the caller is on the thread that runs the loop."""
+        """Whether the caller is in the simulation thread."""
         return self._thread == threading.get_ident()
 
     def start(self) -> bool:
         """Starts the world.
 
         Returns:
-            False if it runs already.
+            False if the world runs already.
 
         Raises:
-            InterfaceError: If it is running the ticks of a request.
+            InterfaceError: If the ticks of a request are running.
         """
         if self.running:
             return False
@@ -135,10 +141,12 @@ class Simulation:
         return True
 
     def stop(self) -> bool:
-        """Stops the world, with its last tick published completely.
+        """Stops the world, or aborts a request for ticks or a restoration.
+
+        All samples of the last tick are published. An aborted restoration resets the world.
 
         Returns:
-            False if it is stopped already.
+            False if the world is stopped already.
         """
         if self._request is not None:
             self._abort_request(InterfaceError(f"stopped {self._request}"))
@@ -155,14 +163,14 @@ class Simulation:
         return True
 
     def step(self) -> tuple[int, int]:
-        """Advances by a tick; when it returns, everything of that tick has been passed to every subscriber.
+        """Advances a stopped world by a tick, and sends all samples of the tick to the subscribers before it returns.
 
         Returns:
-            The new tick and its stamp [ns].
+            Number and stamp [ns] of the new tick.
 
         Raises:
-            InterfaceError: If the world runs, or the ticks of another request.
-            PhysicsError: If something in the world is not finite any more.
+            InterfaceError: If the world runs, or the ticks of a request are running.
+            PhysicsError: If a number in the world is no longer finite.
         """
         self._refuse_while_moving()
         self._failure = None
@@ -172,13 +180,19 @@ class Simulation:
         return self.world.clock.tick, self.world.clock.stamp_ns
 
     def step_n(self, steps: int) -> Future[tuple[int, int]]:
-        """Advances by ticks as fast as possible; other requests are served meanwhile, a stop ends it.
+        """Makes the loop run ticks as fast as possible, and returns at once.
+
+        Between ticks, the loop serves other requests; `stop` aborts the ticks.
+
+        Args:
+            steps: Number of ticks.
 
         Returns:
-            The last tick and its stamp [ns], once everything of it has been passed to every subscriber.
+            A future with the number and stamp [ns] of the last tick. It is done when all samples of the last tick have
+            been sent to the subscribers.
 
         Raises:
-            InterfaceError: If the world runs, or the ticks of another request.
+            InterfaceError: If the world runs, or the ticks of another request are running.
         """
         self._refuse_while_moving()
         request = StepRequest(steps)
@@ -191,13 +205,13 @@ class Simulation:
         return request.done
 
     def reset(self, refill: Callable[[], None] = lambda: None) -> None:
-        """Resets the world to its state when built; it stays running or stopped, and its time continues.
+        """Resets the world to its initial state; it stays running or stopped, and stamps continue.
 
         Args:
-            refill: Puts the inputs of the new start.
+            refill: Sends inputs to the world after the reset; by default none are sent.
 
         Raises:
-            InterfaceError: If something cannot be loaded any more; then it is stopped.
+            InterfaceError: If an object can no longer be loaded. The world is stopped then.
         """
         self._interrupt_request()
         try:
@@ -209,14 +223,15 @@ class Simulation:
         self._start_again()
 
     def restore(self, to: WorldState) -> Future[None]:
-        """Restores a saved state of this world, a few milliseconds in each pass of the loop.
+        """Starts to restore a saved state of this world, and returns at once.
 
-        Meanwhile nothing is published of the world, inputs are dropped, and requests that would change or save it are
-        refused. A stop ends it and resets the world.
+        Each pass of the loop spends a few milliseconds on it. Until the state is reached, samples are not published,
+        inputs are dropped, and requests that would change or save the world are refused. `stop` aborts the restoration
+        and resets the world.
 
         Returns:
-            A future that is done when the world continues, running or stopped, from that state. It fails with an
-            InterfaceError if the state is not reached; then the world was reset and is stopped.
+            A future that is done when the state is reached; the world then runs if it ran before. The future fails with
+            an InterfaceError if the state is not reached; the world is then reset and stopped.
         """
         self._interrupt_request()
         restore = self._restore = RestoreRequest(self.world.restoring(to), to.tick)
@@ -245,7 +260,7 @@ class Simulation:
             restore.end(error)
 
     def _start_again(self) -> None:
-        """Publishes the restarted world, and sends it its inputs."""
+        """Applies waiting inputs to the world, and publishes its state after a reset or restoration."""
         self._failure = None
         self.world.apply_inputs()
         self._pacer.restart()
@@ -254,14 +269,14 @@ class Simulation:
 
     @property
     def real_time_factor(self) -> float:
-        """Requested simulated seconds per second; 0 is as fast as possible."""
+        """Requested simulated seconds per second of wall time; 0 is as fast as possible."""
         return self._pacer.real_time_factor
 
     def set_real_time_factor(self, factor: float) -> None:
-        """Changes how fast the world is to run, from now on.
+        """Changes the requested real-time factor.
 
         Raises:
-            ValueError: If it is not valid, see `checked_real_time_factor`.
+            ValueError: If the factor is invalid, see `checked_real_time_factor`.
         """
         try:
             self._pacer.set_factor(checked_real_time_factor(factor))
@@ -270,7 +285,7 @@ class Simulation:
         self._publishers.set_factor(factor)
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Loops until it is over, on the thread that calls it."""
+        """Runs the loop in the calling thread until `is_over` returns True."""
         self._thread = threading.get_ident()
         parts = (self._move, flush_buffered_sockets, *self._helpers, self._publish)
         while not is_over():
@@ -314,11 +329,20 @@ class Simulation:
         self._publishers.publish_time()
 
     def _run_idle(self, ticks: float, end_s: float) -> int:
-        """Advances by ticks of which nothing is published, until a time [s]; returns their number."""
+        """Advances by ticks that do not publish anything, and returns their number.
+
+        Args:
+            ticks: Largest number of ticks.
+            end_s: Latest end, as a time of the monotonic clock [s].
+        """
         return self.world.run_idle(min(ticks, self._state.ticks_to_hash - 1), end_s)
 
     def _run_tick(self, is_last: bool = False) -> None:
-        """Advances by a tick; of the last one before a stop everything is published, due or not."""
+        """Advances by a tick and publishes the samples that are due.
+
+        Args:
+            is_last: Whether the world stops after this tick; then all samples are published, due or not.
+        """
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
@@ -349,7 +373,7 @@ class Simulation:
         return request
 
     def _abort_request(self, error: Exception) -> None:
-        """Ends the ticks of a request early, with all of the last one published."""
+        """Ends the running request for ticks early, and publishes all samples of its last tick."""
         request = self._end_request()
         self._halt()
         request.fail(error)
@@ -364,9 +388,9 @@ class Simulation:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
-        """Stops, and publishes nothing of a broken world until it is started or stepped again."""
+        """Stops the world after an error; its samples are not published until the next start or step."""
         if str(error) == self._failure:
-            return  # repeats the same error
+            return  # this error was reported before
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
         self.running, self._failure = False, str(error)
         if self._request is not None:

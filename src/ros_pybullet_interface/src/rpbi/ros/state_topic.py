@@ -9,15 +9,20 @@ import rospy
 from custom_ros_tools.ros.rospy_internals import DirectSending, close_poller_with
 
 QUEUE_SIZE = 1000
-"""Messages kept for a slow subscriber before its oldest are dropped: it never holds physics up."""
+"""Largest number of messages buffered for a slow subscriber; beyond it, the oldest are dropped, so that physics never
+waits for a subscriber."""
 
 
 class StateTopic(rospy.SubscribeListener):
     """A topic whose last message can be sent to new subscribers while the world is stopped.
 
-    A stopped world in simulated time has nothing new, and publishing again would repeat stamps; a late subscriber is
-    therefore served alone. One thread at a time publishes and serves. Up to `queue_size` messages are buffered for each
-    subscriber, the oldest dropped; with None, publishing waits until each is sent.
+    A stopped world in simulated time has no new messages, and publishing the last one again to all subscribers would
+    repeat its stamp. `serve_late` therefore sends the last message to new subscribers only. `publish` and `serve_late`
+    must not run in two threads at once.
+
+    Args:
+        queue_size: Largest number of messages buffered for each subscriber; beyond it, the oldest are dropped. With
+            None, publishing waits until the message is sent.
     """
 
     def __init__(self, topic: str, message_type: type, queue_size: int | None = QUEUE_SIZE) -> None:
@@ -33,12 +38,12 @@ class StateTopic(rospy.SubscribeListener):
         close_poller_with(self._publisher)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
-        """Notes a new subscriber; rospy calls it from a thread of its own."""
+        """Stores a new subscriber for `serve_late`; rospy calls this method from a thread of rospy's."""
         self._late.append(peer_publish)
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens; if not, no message need be built."""
+        """Whether the topic has subscribers; without them, callers need not build messages."""
         return self._publisher.get_num_connections() > 0
 
     def publish(self, message: Any) -> None:
@@ -47,19 +52,23 @@ class StateTopic(rospy.SubscribeListener):
         self._publisher.publish(message)
 
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Sends the last message to subscribers that came after it."""
+        """Sends the last message to subscribers that connected after it was published.
+
+        Args:
+            last_message: Returns the last message; called only if there are such subscribers.
+        """
         while self._late:
             self._late.popleft()(last_message())
 
     def close(self) -> None:
-        """Ends the topic."""
+        """Unregisters the topic."""
         self._publisher.unregister()
 
 
 class FastTopic(StateTopic):
-    """A topic of small messages that go out in the caller's own thread, which never waits, by `flush_buffered_sockets`.
+    """A topic of small messages, which `publish` buffers and `flush_buffered_sockets` sends in its caller's thread.
 
-    Messages for a slow subscriber are buffered.
+    Neither call waits for a slow subscriber.
     """
 
     def __init__(self, topic: str, message_type: type) -> None:
@@ -67,7 +76,7 @@ class FastTopic(StateTopic):
         self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
 
     def wrap_connections(self) -> None:
-        """Ensures that sending never waits for a subscriber, including new ones."""
+        """Wraps the connections of new subscribers too, so that sending never waits for a subscriber."""
         if self._sending is not None:
             self._sending.wrap_connections()
 

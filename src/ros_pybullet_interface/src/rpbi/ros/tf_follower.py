@@ -1,4 +1,4 @@
-"""Follows TF frames: passes their poses to the world, and logs problems at a limited rate."""
+"""Passes the poses of TF frames to the world, and logs problems at a limited rate."""
 
 import contextlib
 import math
@@ -21,22 +21,22 @@ from rpbi.plugins import is_foreign
 from .headers import named_frame, world_frame
 
 TF_MISSING_AFTER_S = 5.0
-"""Longest absence of a TF frame [s] of wall time; beyond it, a warning is logged."""
+"""Longest wait for the first transform of a frame [s] of wall time; beyond it, a warning is logged."""
 LONGEST_NAP_S = 0.1
-"""Longest sleep, after which a new frame to follow is noticed [s] of wall time."""
+"""Longest sleep of the thread [s] of wall time, so that it soon follows frames that were added."""
 LOOK_FROM, LOOK_UNTIL = 0.75, 1.5
-"""Shares of a period: from the first on, a transform that comes is looked at; where more are to come, till the last."""
+"""Shares of the period that decide when a frame is looked up, see `FollowedFrame.due_s`."""
 STALE_AGAIN_AFTER_S = 30.0
-"""Time until a stale frame is logged again [s] of wall time."""
+"""Shortest time between two warnings that the same frame is stale [s] of wall time."""
 
 
 class WatchedTf:
-    """Transforms received.
+    """Listens to TF, and records the arrival times of transforms of selected frames.
 
     Attributes:
-        watched: Frames whose arrival is noted.
-        came_s: Time of the last arrival of each [s] of wall time.
-        something_came: Set whenever one comes.
+        watched: The child frames whose arrival times are recorded.
+        came_s: Last arrival time of a transform, as a time of the monotonic clock [s], indexed by child frame.
+        something_came: Event that is set whenever a transform of a watched frame arrives.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,10 @@ class WatchedTf:
         self._listener = TfListener(self._buffer, self._note)
 
     def pose(self, parent: str, child: str) -> tuple[Pose, int] | None:
-        """Returns the newest pose of a frame in another and its stamp [ns], 0 if static; None if there is none."""
+        """Returns the newest pose of the child frame in the parent frame, and its stamp [ns]; None if TF has no pose.
+
+        The stamp is 0 if all transforms between the two frames are static.
+        """
         try:
             found = self._buffer.lookup_transform(parent, child, rospy.Time(0))
         except tf2_ros.TransformException:
@@ -63,10 +66,18 @@ class WatchedTf:
 
 
 def refusal(slot: str, taken: Input, error: Exception) -> Exception:
-    """Returns the reason why a value is refused: the error of its check, or one of another package.
+    """Returns the error to report when an input's value was refused.
+
+    An InterfaceError or ValueError is returned as it is. Other errors in code of another package are returned as a
+    PluginError.
+
+    Args:
+        slot: Body and name of the input, as `NAME/INPUT`.
+        taken: The input.
+        error: The error that was raised for the value.
 
     Raises:
-        Exception: The error, if it is a bug of this package.
+        Exception: `error` itself, if it is a bug of this package.
     """
     if isinstance(error, (InterfaceError, ValueError)):
         return error
@@ -76,10 +87,11 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
 
 
 class FollowedFrame:
-    """A pose input and the state of its frame.
+    """A pose input, and the state of the TF frame that it follows.
 
-    It is looked up when its transform arrives, about once a period: at other times, the steps of a motion would be
-    uneven. A frame without arrivals, which moves with its parent, is looked up once a period.
+    The frame is looked up about once a period, at the arrival of a transform. Look-ups at other times would make the
+    steps of a motion uneven. A frame without arriving transforms, which moves with its parent, is looked up once a
+    period.
     """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
@@ -96,14 +108,28 @@ class FollowedFrame:
         self.quiet_until_s = 0.0
 
     def due_s(self, came_s: float) -> float:
-        """Returns the time of the next look-up, after an arrival at a time."""
+        """Returns the time of the next look-up on the monotonic clock [s].
+
+        Without an arrival since the last look-up, it is one period after the last look-up. If a transform arrived less
+        than LOOK_FROM periods after the stamp last changed, it is LOOK_UNTIL periods after the last look-up, to wait
+        for the next transform. Otherwise, it is the time of the arrival.
+
+        Args:
+            came_s: Time of the last arrival on the monotonic clock [s].
+        """
         if came_s <= self.looked_s:
             return self.looked_s + self.period_s
         is_early = came_s < self.news_s + LOOK_FROM * self.period_s
         return self.looked_s + LOOK_UNTIL * self.period_s if is_early else came_s
 
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
-        """Stores its stamp; returns whether it is new."""
+        """Stores the frame's stamp, and returns whether the stamp has changed.
+
+        Args:
+            stamp_ns: Stamp of the frame's newest pose [ns].
+            now_s: Present time of the monotonic clock [s].
+            time_s: Present time of the world [s].
+        """
         self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
         if stamp_ns == self.last_stamp_ns:
             return False
@@ -111,18 +137,19 @@ class FollowedFrame:
         return True
 
     def age_s(self, now_s: float, time_s: float) -> float:
-        """Returns for how long its stamp has been the same, in wall time or in the world's, whichever is less."""
+        """Returns for how long the frame's stamp has not changed [s], in wall time or world time, whichever is less."""
         return min(now_s - self.news_s, time_s - self.news_time_s)
 
 
 class TfFollower:
-    """Looks up the TF frames that poses follow, in one thread, by wall time.
+    """Looks up the TF frames that bodies and sensors follow, and passes their poses to the world.
 
-    It listens to TF only once there is something to follow.
+    One thread does all look-ups, timed by the wall clock. The thread and the subscription to TF start with the first
+    followed frame.
 
     Args:
-        put: Hands a pose to a slot of the world.
-        time_s: Returns the world's time [s], by which a frame grows stale.
+        put: Passes a pose to the world; its arguments are a slot `NAME/INPUT` and the pose.
+        time_s: Returns the world's time [s], for the age of transforms.
     """
 
     def __init__(self, put: Callable[[str, Any], None], time_s: Callable[[], float]) -> None:
@@ -132,21 +159,27 @@ class TfFollower:
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
-        """Begins to follow a frame for a body or sensor."""
+        """Starts to follow the TF frame of a pose input.
+
+        Args:
+            name: The body or sensor.
+            slot: Body or sensor and name of the input, as `NAME/INPUT`.
+            pose_input: The input.
+        """
         self._followed = (*self._followed, FollowedFrame(name, slot, pose_input))
         if self._tf is None:
             self._tf = WatchedTf()
             threading.Thread(target=self._run, args=(self._tf,), name="tf follower", daemon=True).start()
 
     def leave(self, name: str) -> None:
-        """Stops following for a body or sensor."""
+        """Stops following the frames of a body or sensor."""
         self._followed = tuple(followed for followed in self._followed if followed.name != name)
 
     def repeat(self) -> None:
-        """Sends all last poses again."""
+        """Passes the last pose of every followed frame to the world again."""
         for followed in self._followed:
             if followed.last_pose is not None:
-                with contextlib.suppress(Exception):  # removed meanwhile, or refused as before
+                with contextlib.suppress(Exception):  # the body was removed, or the pose is refused as before
                     self._put(followed.slot, followed.last_pose)
 
     def _run(self, tf: WatchedTf) -> None:
@@ -182,11 +215,14 @@ class TfFollower:
                 self._put(followed.slot, pose)
             except Exception as error:
                 reason = refusal(followed.slot, followed.pose_input, error)
-                if followed in self._followed:  # else it has gone meanwhile
+                if followed in self._followed:  # otherwise the body was removed
                     self._warn(followed.slot, f"TF refused: {reason}")
 
     def _report_stale(self, followed: FollowedFrame, stamp_ns: int, now_s: float) -> None:
-        """Logs once that a frame is stale, unless it is static, and once that it is back."""
+        """Logs a warning when a frame becomes stale, and an info when its transforms arrive again.
+
+        Static frames are never stale.
+        """
         time_s = self._time_s()
         if followed.is_new(stamp_ns, now_s, time_s):
             if followed.is_stale:

@@ -1,4 +1,4 @@
-"""Waits for the messages of a tick, for programs that step a world."""
+"""Waits for the messages of a tick, for ROS nodes that step a world."""
 
 import threading
 import time
@@ -10,13 +10,13 @@ import rospy
 
 
 class TickListener:
-    """Keeps the newest message of each of some topics, and waits for those of a tick.
+    """Subscribes to topics, stores the newest message of each, and waits for the messages of a given tick.
 
-    Services and topics are different sockets: the answer to `rpbi/step_n` may be there before the messages of its last
-    tick. It works with ROS time that stands still, too, since it waits by the wall clock.
+    It is needed since services and topics use different sockets: the answer of `rpbi/step_n` may arrive before the
+    messages of its last tick. Waits use the wall clock, and so also end while ROS time is stopped.
 
     Args:
-        topics: Types of messages by topic; each has a header.
+        topics: Message types, indexed by topic; each type must have a header.
     """
 
     def __init__(self, topics: Mapping[str, type]) -> None:
@@ -28,14 +28,17 @@ class TickListener:
         }
 
     def wait_for_tick(self, stamp: genpy.Time, timeout_s: float = 5.0) -> dict[str, Any]:
-        """Waits for messages of a tick or later on all topics, and returns the newest of each.
+        """Waits until every topic has a message of a tick or later, and returns the newest message of each topic.
 
         Args:
-            stamp: Stamp of the tick, as `rpbi/step_n` returns it.
+            stamp: Stamp of the tick, as returned by `rpbi/step_n`.
             timeout_s: Longest wait [s] of wall time.
 
+        Returns:
+            The newest messages, indexed by topic.
+
         Raises:
-            TimeoutError: If topics have no such message; it names them.
+            TimeoutError: If a topic has no such message in time; the error names all such topics.
         """
         end_s = time.monotonic() + timeout_s
         with self._changed:
@@ -47,7 +50,7 @@ class TickListener:
             return dict(self._newest)
 
     def close(self) -> None:
-        """Unsubscribes."""
+        """Unsubscribes from all topics."""
         for subscriber in self._subscribers.values():
             subscriber.unregister()
 

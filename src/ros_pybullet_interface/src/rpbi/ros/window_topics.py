@@ -1,4 +1,4 @@
-"""PyBullet's window in ROS: its keys, mouse, image and camera."""
+"""Topics and service of PyBullet's window: its keys, mouse, image and camera."""
 
 import logging
 import struct
@@ -51,10 +51,10 @@ NUMBERS = Topic(
 )
 CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Present view of the window; 30 Hz.")
 WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
-"""Topics that the window publishes."""
+"""Topics that the node publishes for the window."""
 CAMERA_HZ = 30.0
 LARGEST_SHARE = 0.25
-"""Largest share of wall time for drawing; if that is not enough, images come less often."""
+"""Largest share of wall time that drawing may take; if drawing is slower, fewer images are published."""
 HELD_HZ = 60.0
 """Rate at which a held key is published [Hz] of wall time; presses and releases are published at once."""
 KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
@@ -63,13 +63,13 @@ NO_BUTTON = 255
 
 
 class GuiEvents:
-    """Publishes events of keys and mouse; those that had no subscribers are not published later.
+    """Publishes keyboard and mouse events of the window; new subscribers do not get earlier events.
 
     Args:
         window: The window.
-        clock: The world's clock.
-        keyboard: Whether keys are published.
-        mouse: Whether the mouse is.
+        clock: The world's clock, for the stamps.
+        keyboard: Whether to publish keyboard events.
+        mouse: Whether to publish mouse events.
     """
 
     def __init__(self, window: Window, clock: Clock, keyboard: bool, mouse: bool) -> None:
@@ -92,7 +92,7 @@ class GuiEvents:
             return
         is_due = self._held_rate.is_due()
         if is_due:
-            self._held_rate.rest(1.0 / HELD_HZ)  # however long ago the last key was held
+            self._held_rate.rest(1.0 / HELD_HZ)  # so that the next one is due a full period from now
         for event in events:
             if is_due or event.state != DOWN:
                 publisher.publish(self._key_message(event))
@@ -117,14 +117,14 @@ class GuiEvents:
 
 
 class VisualizerImage:
-    """Draws and publishes images while they have subscribers.
+    """Draws and publishes images of the window while their topics have subscribers.
 
     Args:
         window: The window.
-        clock: The world's clock.
-        hz: Most images a second of wall time.
-        width_px: Columns.
-        height_px: Rows.
+        clock: The world's clock, for the stamps.
+        hz: Highest rate of the images [Hz] of wall time.
+        width_px: Number of columns of an image.
+        height_px: Number of rows of an image.
     """
 
     def __init__(self, window: Window, clock: Clock, hz: float, width_px: int, height_px: int) -> None:
@@ -135,7 +135,7 @@ class VisualizerImage:
         self._numbers = rospy.Publisher(NUMBERS.name, Int64MultiArray, queue_size=2)
 
     def poll(self) -> None:
-        """Draws an image if it is due and has subscribers."""
+        """Draws and publishes an image, if one is due and has subscribers."""
         if not self._rate.is_due():
             return
         start_s = time.monotonic()
@@ -158,24 +158,27 @@ class VisualizerImage:
 
 
 class _Numbers(Int64MultiArray):
-    """Red, green, blue and alpha of each pixel; serialised in one piece, since one by one takes 0.1 s."""
+    """Message with red, green, blue and alpha of each pixel.
+
+    All numbers are serialised at once; rospy would serialise them one by one, which takes 0.1 s.
+    """
 
     def __init__(self, rgba: npt.NDArray[np.uint8]) -> None:
         super().__init__()
         self._rgba = rgba
 
     def serialize(self, buff: IO[bytes]) -> None:
-        """Writes an empty layout, the count of the numbers and the numbers."""
+        """Writes an empty layout, the number of values, and the values."""
         buff.write(struct.pack("<III", 0, 0, self._rgba.size))
         buff.write(self._rgba.astype("<i8").tobytes())
 
 
 class DebugCamera:
-    """Publishes the camera of the window while it has subscribers.
+    """Publishes and sets the window's camera.
 
     Args:
-        window: The window; without it, nothing is published, and nothing can be changed.
-        configured: The initial camera of a window.
+        window: The window; None if there is no window, and then the camera is neither published nor set.
+        configured: Camera from the main YAML file, which `get` returns if there is no window.
     """
 
     def __init__(self, window: Window | None, configured: ResetDebugVisualizerCamera) -> None:
@@ -184,14 +187,14 @@ class DebugCamera:
         self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
     def poll(self) -> None:
-        """Publishes it if it is due."""
+        """Publishes the camera, if a message is due and has subscribers."""
         if self._window is None or self._publisher is None or not self._rate.is_due():
             return
         if self._publisher.get_num_connections():
             self._publisher.publish(_camera_message(self._window.camera()))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service that returns it and the topic that changes it."""
+        """Opens the service that returns the camera and the topic that sets it."""
         self._ask = ask
         serve(GET, self)
         subscribe(RESET, self)
@@ -202,11 +205,11 @@ class DebugCamera:
         return _camera_message(self._configured if window is None else self._ask(window.camera))
 
     def reset(self, message: CameraMessage) -> None:
-        """Moves the camera of the window.
+        """Sets the window's camera.
 
         Raises:
             InterfaceError: If there is no window.
-            ValueError: If a value in the message is not valid.
+            ValueError: If a value in the message is invalid.
         """
         given = {key: getattr(message, key) for key in ResetDebugVisualizerCamera.model_fields}
         try:
@@ -233,7 +236,7 @@ RESET = Topic(
 
 
 class WindowTopics:
-    """Opens the configured topics of the window, and warns if there is no window."""
+    """Opens the configured topics of the window; without a window, warns of configuration keys without effect."""
 
     def __init__(self, world: World) -> None:
         self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)
@@ -245,7 +248,7 @@ class WindowTopics:
             self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the services that the simulation thread answers."""
+        """Opens the service and the topic of the window's camera, whose requests go to the simulation thread."""
         self._camera.serve(ask)
 
 
@@ -261,7 +264,7 @@ def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callabl
 
 
 def published_topics(config: WorldConfig) -> list[Topic]:
-    """Returns the topics of the window that a world with this configuration publishes."""
+    """Returns the window topics that are published with a given configuration; an empty list without a window."""
     if config.connect.connection_mode == pybullet.DIRECT:
         return []
     return [topic for topic in WINDOW_TOPICS if not topic.key or getattr(config, topic.key)]

@@ -1,4 +1,4 @@
-"""The node that publishes camera images, inside the renderer process."""
+"""Publishes camera images in ROS, as a node of its own in the renderer process."""
 
 import sys
 import time
@@ -25,64 +25,63 @@ SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
 
 warnings.filterwarnings("ignore", "The publisher should be created", SyntaxWarning)  # None is meant: rospy then waits
 QUEUE_SIZE = 2
-"""Images kept for a slow subscriber: a stopped one must not fill the memory."""
+"""Largest number of images buffered for a subscriber, so that a stopped subscriber does not fill the memory."""
 RECORDER_QUEUE_SIZE = 100
-"""Images kept for a recorder, as many as `rosbag record` keeps."""
+"""Largest number of images buffered for a recorder, the same as in `rosbag record`."""
 LONGEST_WAIT_S = 5.0
-"""Longest wait for subscribers that the master has registered [s]."""
+"""Longest wait for the connections of subscribers that are registered at the ROS master [s]."""
 
 
 class ImagePublisher:
-    """Publishes frames on the topics of each camera, and only those that somebody subscribes to."""
+    """Publishes the images of each camera on those of the camera's topics that have subscribers."""
 
     def __init__(self) -> None:
-        # Without ROS time, since it must never wait for the clock: stamps come with the frames.
+        # Without ROS time, since the node must never wait for /clock; the frames contain their stamps.
         init_node("rpbi_camera", ros_time=False)
         self._cameras: dict[str, _CameraTopics] = {}
 
     def add(self, camera: Camera) -> None:
-        """Advertises the topics of a camera; if it is synchronous, waits for existing subscribers."""
+        """Advertises the topics of a camera; if it is synchronous, waits until existing subscribers have connected."""
         topics = self._cameras[camera.name] = _CameraTopics(camera)
         if camera.synchronous:
             topics.wait_for_subscribers()
 
     def remove(self, name: str) -> None:
-        """Ends the topics of a camera."""
+        """Unregisters the topics of a camera."""
         self._cameras.pop(name).close()
 
     def demands(self) -> Mapping[str, Demand]:
-        """Returns what is subscribed to, by camera.
+        """Returns the streams that have subscribers, indexed by camera name.
 
         Raises:
-            SystemExit: If somebody has shut down the node: without it the process is of no use.
+            SystemExit: If the node was shut down from outside, for instance by `rosnode kill`.
         """
         if rospy.is_shutdown():
             sys.exit(f"{rospy.get_name()} was shut down")
         return {name: topics.demand() for name, topics in self._cameras.items()}
 
     def write(self, frame: Frame) -> None:
-        """Publishes a frame."""
+        """Publishes the images of a frame on the topics of its camera."""
         self._cameras[frame.camera.name].publish(frame)
 
     def close(self) -> None:
-        """Unregisters from the ROS master."""
+        """Shuts down the node, which unregisters it from the ROS master."""
         rospy.signal_shutdown("the simulator has ended")
 
 
 def camera_node(simulator: str) -> str:
-    """Returns the name of the node of the renderer process, of the simulator's name."""
+    """Returns the name of the node that publishes the images: the simulator's node name with `_camera` appended."""
     return f"{simulator}_camera"
 
 
 def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
-    """Returns the arguments with which the renderer process is the simulator's companion.
+    """Returns the command-line arguments of the renderer process.
+
+    They are the simulator's remappings and namespace, and a node name with `_camera` appended to the simulator's.
 
     Args:
         node_name: The simulator's resolved node name.
-        argv: The simulator's own arguments, remappings included.
-
-    Returns:
-        Its remappings, but the name of the node is its name with `_camera` after it.
+        argv: The simulator's command-line arguments, including remappings.
     """
     remappings = [item for item in argv if ":=" in item and not item.startswith(("__name:=", "__log:=", "_"))]
     namespace = [item for item in argv if item.startswith("__ns:=")]
@@ -90,7 +89,11 @@ def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
 
 
 class _Topic(StateTopic):
-    """A topic that also counts its subscribers so far; one that `waits` blocks until each message is sent."""
+    """A topic that counts all subscribers that have ever connected.
+
+    Args:
+        waits: Whether `publish` waits until the message is sent; otherwise messages are buffered.
+    """
 
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0
@@ -107,7 +110,7 @@ class _Topic(StateTopic):
         self.seen += 1
 
     def subscriber_count(self) -> int:
-        """Returns how many subscribers are connected."""
+        """Returns the number of subscribers that are connected now."""
         count: int = self._publisher.get_num_connections()
         return count
 
@@ -126,7 +129,10 @@ class _CameraTopics:
         self._published_ns = -1
 
     def wait_for_subscribers(self) -> None:
-        """Waits until all subscribers of the master are connected, up to `LONGEST_WAIT_S`: some may be dead."""
+        """Waits until all subscribers that are registered at the ROS master have connected.
+
+        It waits for `LONGEST_WAIT_S` at most, since registered subscribers may have ended.
+        """
         registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
         end_s = time.monotonic() + LONGEST_WAIT_S
         for name, (_, topic) in self._topics.items():
@@ -135,13 +141,13 @@ class _CameraTopics:
                 time.sleep(0.01)
 
     def demand(self) -> Demand:
-        """Returns what is subscribed to."""
+        """Returns the streams that have subscribers, and the number of subscribers so far."""
         topics = self._topics.values()
         streams = frozenset(stream for stream, topic in topics if topic.has_subscribers)
         return Demand(streams, sum(topic.seen for _, topic in topics))
 
     def publish(self, frame: Frame) -> None:
-        """Publishes a frame; one with the last stamp is sent to new subscribers only."""
+        """Publishes the images of a frame; a frame with the same stamp as the last one goes to new subscribers only."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
         again = frame.stamp_ns == self._published_ns
         for stream, topic in self._topics.values():
@@ -149,7 +155,7 @@ class _CameraTopics:
                 continue
             message = self._message(stream, frame, header)
             if message is None:
-                continue  # its first subscriber came while the frame was drawn
+                continue  # the stream's first subscriber connected after drawing had started
             if again:
                 topic.serve_late(partial(lambda late: late, message))
             else:
@@ -157,7 +163,7 @@ class _CameraTopics:
         self._published_ns = frame.stamp_ns
 
     def close(self) -> None:
-        """Ends the topics."""
+        """Unregisters the topics."""
         for _, topic in self._topics.values():
             topic.close()
 

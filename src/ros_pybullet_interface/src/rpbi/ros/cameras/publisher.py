@@ -1,4 +1,4 @@
-"""Sends scenes to the renderer process, which publishes the images."""
+"""Sends scenes to the renderer process, which draws and publishes the camera images."""
 
 import contextlib
 import os
@@ -28,14 +28,14 @@ LONGEST_WAIT_S = 20.0
 
 
 class ScenePublisher:
-    """Feeds the renderer process, and reads cameras only while their images have subscribers."""
+    """Runs the renderer process and sends scenes to it, only for cameras whose images have subscribers."""
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._sensors: Mapping[str, RgbdSensor] = {}
         self._synchronous: tuple[RgbdSensor, ...] = ()
         self._awaited: list[SceneSample] = []
-        # a window without a graphics card would leave a renderer of low priority hardly any processor time
+        # without a graphics card, drawing a window would leave a low-priority renderer hardly any processor time
         priority = ["--keep-priority"] if world.window else []
         self._renderer = RenderClient(
             (),
@@ -46,7 +46,7 @@ class ScenePublisher:
         )
 
     def poll(self) -> None:
-        """Maintains the process; called at every pass of the loop."""
+        """Updates the cameras and exchanges messages with the renderer process; each pass of the loop calls it."""
         if self._sensors is not self._world.cameras:
             self._update_cameras(self._world.cameras)
         self._renderer.poll()
@@ -54,10 +54,12 @@ class ScenePublisher:
             sensor.wanted = name in self._renderer.wanted
 
     def before_tick(self) -> None:
-        """Waits until synchronous cameras are ready for the coming tick.
+        """Waits until all synchronous cameras are ready for the next tick.
+
+        A camera is ready if the renderer has reported its subscribers and, with subscribers, if its pose is known.
 
         Raises:
-            PhysicsError: If that takes too long.
+            PhysicsError: If a camera is not ready after LONGEST_WAIT_S.
         """
         if self._sensors is not self._world.cameras:
             self.poll()
@@ -70,16 +72,16 @@ class ScenePublisher:
                 self._wait_for(partial(_is_placed_or_unwanted, sensor), name, missing)
 
     def publish(self, sample: SceneSample, stamp_ns: int) -> None:
-        """Renders and publishes a scene."""
+        """Sends a scene to the renderer process, which draws and publishes its images."""
         self._renderer.send(sample)
         if self._sensors[sample.name].config.synchronous:
             self._awaited.append(sample)
 
     def flush(self) -> None:
-        """Waits for the images of synchronous cameras.
+        """Waits until the renderer process has published the images of the scenes of synchronous cameras.
 
         Raises:
-            PhysicsError: If one does not come.
+            PhysicsError: If an image is not published in time, or the renderer has ended.
         """
         if not self._awaited:
             return
@@ -97,26 +99,29 @@ class ScenePublisher:
         self._renderer.serve_late()
 
     def restart(self) -> None:
-        """Drops stored scenes after a reset."""
+        """Drops all scenes that wait to be drawn or are kept for new subscribers, after a reset."""
         self._renderer.forget_scenes()
 
     def forget(self, name: str) -> None:
-        """Removes a removed body from scenes that are still to be drawn."""
+        """Deletes a removed body from the scenes that are stored."""
         self._renderer.forget_body(name)
 
     def facts(self) -> dict[str, str]:
-        """Returns its values for the diagnostics."""
+        """Returns the renderer's name as an entry for the diagnostics; an empty mapping without cameras."""
         return {"camera_renderer": self._renderer.renderer or "starting"} if self._sensors else {}
 
     def fault(self) -> str:
-        """Returns why the renderer does not answer, empty if it does."""
+        """Returns why the renderer does not answer; an empty text if it answers."""
         return self._renderer.fault
 
     def close(self) -> None:
-        """Ends the process at normal priority, since it has to unregister from the ROS master first."""
+        """Ends the renderer process.
+
+        It first gets normal priority, since it has to unregister from the ROS master before it ends.
+        """
         if self._renderer.process_id is not None:
             nice = os.getpriority(os.PRIO_PROCESS, 0)
-            run_normally(self._renderer.process_id, nice)  # otherwise its end might take long on a busy machine
+            run_normally(self._renderer.process_id, nice)  # otherwise ending might take long on a busy machine
         if not self._renderer.stop():
             _unregister(camera_node(rospy.get_name()))
 
@@ -132,10 +137,20 @@ class ScenePublisher:
         self._synchronous = tuple(sensor for sensor in cameras.values() if sensor.config.synchronous)
 
     def _wait_for(self, condition: Callable[[], bool], name: str, missing: str, needs_renderer: bool = False) -> None:
-        """Waits for something of a synchronous camera, or until the node shuts down."""
+        """Waits until a condition for a synchronous camera holds, or the node shuts down.
+
+        Args:
+            condition: Returns whether the condition holds.
+            name: The camera.
+            missing: What is missing, for the error message.
+            needs_renderer: Whether to fail at once if the renderer process has ended.
+
+        Raises:
+            PhysicsError: If the condition does not hold after LONGEST_WAIT_S.
+        """
         end_s = time.monotonic() + LONGEST_WAIT_S
         while not (condition() or rospy.core.is_shutdown_requested()):
-            flush_buffered_sockets()  # what it waits for may depend on messages of earlier ticks
+            flush_buffered_sockets()  # the condition may depend on messages of earlier ticks
             self.poll()
             self._world.apply_inputs()
             if needs_renderer and not self._renderer.is_up:
@@ -147,7 +162,7 @@ class ScenePublisher:
 
 
 def _unregister(node: str) -> None:
-    """Unregisters a killed node from the ROS master."""
+    """Unregisters a node from the ROS master, after the node was killed."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         cleanup_master_blacklist(rosgraph.Master(rospy.get_name()), [node])
 

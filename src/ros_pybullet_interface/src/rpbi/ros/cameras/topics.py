@@ -1,4 +1,4 @@
-"""The topics of a camera, and what it sees as messages."""
+"""Topics of a camera, and functions that convert camera frames to messages."""
 
 import io
 from typing import Any
@@ -44,7 +44,7 @@ IMAGE_TOPICS = (
     # By the rule of image_transport
     ("info", Topic("rpbi/{name}/camera_info", CameraInfo, meaning="Intrinsics of the segmentation.")),
 )
-"""Streams, as in `render.frame.Demand`, and their topics."""
+"""Topics that every camera has, each with its stream (see `render.frame.Demand`)."""
 CLOUD_TOPIC = (
     "points",
     Topic(
@@ -57,7 +57,12 @@ CLOUD_TOPIC = (
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
-    """Returns the streams and topics of a camera by their relative names."""
+    """Returns the stream and the topic for each topic name of a camera.
+
+    Args:
+        topic_name: Name of the camera in its topics.
+        pointcloud: Whether the camera publishes point clouds.
+    """
     rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
     return {topic.name.format(name=topic_name): (stream, topic) for stream, topic in rows}
 
@@ -75,12 +80,12 @@ def camera_info(camera: Camera) -> CameraInfo:
 
 
 def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
-    """Returns an image of a frame as a message, None if the frame has none of it.
+    """Converts one image of a camera frame to a message; returns None if the frame lacks the image.
 
     Args:
-        stream: `colour` (rgb8), `depth` (32FC1, metres) or `segmentation` (mono16, 65535 where nothing is).
-        frame: The frame.
-        header: Stamp and frame of the message.
+        stream: Which image: `colour` (rgb8), `depth` (32FC1 [m]) or `segmentation` (mono16; 65535 for background).
+        frame: The camera frame.
+        header: Header of the message.
     """
     pixels: npt.NDArray[Any] | None
     if stream == "colour":
@@ -99,7 +104,7 @@ def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
 
 
 def compressed_message(frame: Frame, header: Header) -> CompressedImage | None:
-    """Returns the colour image of a frame as JPEG, None if the frame has none."""
+    """Converts the colour image of a camera frame to a JPEG message; returns None if the frame has no colour image."""
     if frame.colour is None:
         return None
     from PIL import Image as Picture  # slow to import, and seldom used
@@ -110,11 +115,11 @@ def compressed_message(frame: Frame, header: Header) -> CompressedImage | None:
 
 
 def cloud_message(points: npt.NDArray[np.float32], header: Header) -> PointCloud2:
-    """Returns points as an organised cloud, pixel by pixel.
+    """Converts the points of an image to an organised point cloud, with one point for each pixel.
 
     Args:
-        points: x, y, z [m], NaN where nothing is, and the colour; shape (height, width, 4).
-        header: Stamp and frame of the message.
+        points: x, y, z [m] and packed colour of each pixel, shape (height, width, 4); x, y, z are NaN for background.
+        header: Header of the message.
     """
     height, width = points.shape[:2]
     fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate(("x", "y", "z", "rgb"))]

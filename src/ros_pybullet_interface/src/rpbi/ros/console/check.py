@@ -44,7 +44,7 @@ def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
 
 
 def _slow_cameras(world: World) -> Iterator[Problem]:
-    """Yields a warning if the images of a second take this machine longer, with all cameras together."""
+    """Yields a warning if this machine is too slow to draw the images of all cameras at their rates."""
     times = drawing_times(world)
     rates = {camera.config.name: camera.config.hz for camera in world.loaded.cameras}
     busy = {name: time_s * rates[name] for name, time_s in times.items() if name in rates}
@@ -58,7 +58,7 @@ def _slow_cameras(world: World) -> Iterator[Problem]:
 
 
 class _Warnings(logging.Handler):
-    """Prints warnings, also those that are logged, and counts them."""
+    """Prints and counts warnings, including logged ones."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -73,7 +73,7 @@ class _Warnings(logging.Handler):
         print(f"warning: {printable_lines(message)}", file=sys.stderr)
 
     def counted(self) -> str:
-        """Returns their number, for the end of a line."""
+        """Returns the number of warnings as text for the end of a line, such as `, 2 warnings`; empty for 0."""
         return f", {_counted(self._count, 'warning')}" if self._count else ""
 
 
