@@ -1,4 +1,4 @@
-"""External forces and torques on the links of a body, for a time or until they are replaced."""
+"""External forces and torques on the links of a body."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rpbi.geometry import LinkWrench, Pose, rotated
 from rpbi.plain_values import as_tuple
 
 TIMEOUT_S = 0.5
-"""Duration of a wrench received by topic [s] of the world's time; it ends then unless renewed."""
+"""Time for which a wrench received on a topic acts [s] of the world's time, unless a newer wrench replaces it."""
 
 
 class ExternalWrench(NamedTuple):
@@ -24,10 +24,11 @@ class ExternalWrench(NamedTuple):
     Attributes:
         force: Force [N].
         torque: Torque [N m].
-        link: Name of the link, perhaps with `NAME/` of the body before it; empty or NAME for the root link.
-        point: Where the force acts, in the link's URDF frame [m].
-        in_link_axes: Whether force and torque have the link's axes and turn with it, else those of the world.
-        duration_s: For how long [s] of the world's time; None until another one replaces it.
+        link: `LINK` or `BODY/LINK`; empty or `BODY` for the root link.
+        point: Point of application, in the link's URDF frame [m].
+        in_link_axes: Whether force and torque are given in the link's axes, and so rotate with the link. If not, they
+            are given in the world's axes.
+        duration_s: Duration [s] of the world's time; None to act until another wrench replaces this one.
     """
 
     force: Vector
@@ -39,21 +40,21 @@ class ExternalWrench(NamedTuple):
 
 
 class ExternalWrenches:
-    """External wrenches on one body; a link has one, and a newer one replaces it.
+    """Applies external wrenches to one body. A new wrench on a link replaces the link's previous wrench.
 
     Args:
-        body: The body; it is not kept.
+        body: The body; no reference to the object is kept.
 
     Attributes:
-        can_act: Whether one of its links can move.
-        loads: Wrenches that acted in the last step.
+        can_act: Whether at least one link of the body can move.
+        loads: Wrenches that were applied for the last step.
     """
 
     def __init__(self, body: Any) -> None:
         self._pb, self._body_id, self._name, self._root_link = body.pb, body.body_id, body.name, body.root_link
         self._dt_s: float = self._pb.getPhysicsEngineParameters()["fixedTimeStep"]
         self._acting: dict[int, tuple[ExternalWrench, float]] = {}
-        """By PyBullet's index of the link: the wrench, and for how many more ticks."""
+        """Wrench and number of remaining ticks, keyed by PyBullet's link index."""
         self.loads: list[LinkWrench] = []
         static = self._pb.getDynamicsInfo(body.body_id, -1)[0] == 0.0
         links = [body.root_link, *map(body.link_name, body.link_indices)]
@@ -64,15 +65,18 @@ class ExternalWrenches:
 
     @property
     def acts(self) -> bool:
-        """Whether a wrench acts in the next tick."""
+        """Whether at least one wrench acts in the next tick."""
         return bool(self._acting)
 
     def check(self, given: ExternalWrench | Mapping[str, Any]) -> ExternalWrench:
-        """Returns a wrench with the name of its link, from one or a mapping of its fields; any thread may call it.
+        """Checks a wrench, and returns it with the plain name of the link. Any thread may call this method.
+
+        Args:
+            given: A wrench, or a mapping of the fields of `ExternalWrench`.
 
         Raises:
             UnknownNameError: If the body has no such link.
-            ValueError: If the link is static, or a number is not finite or too large.
+            ValueError: If the link is static, a number is not finite or too large, or the duration is not positive.
         """
         name, wrench = self._name, as_tuple(ExternalWrench, given)
         link = wrench.link.removeprefix(f"{name}/") if wrench.link != name else ""
@@ -92,9 +96,9 @@ class ExternalWrenches:
         return wrench._replace(link=link)
 
     def set(self, wrench: ExternalWrench) -> None:
-        """Applies a checked wrench from the next tick on; one without force and torque ends the previous one.
+        """Applies a wrench returned by `check`, from the next tick on, and wakes the body if it sleeps.
 
-        Sleeping bodies are woken.
+        A wrench with zero force and zero torque ends the previous wrench on the link.
         """
         index = self._indices[wrench.link]
         if not any(wrench.force) and not any(wrench.torque):
@@ -105,10 +109,10 @@ class ExternalWrenches:
         self._pb.changeDynamics(self._body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
 
     def apply(self, link_pose: Callable[[int], Pose]) -> None:
-        """Applies the wrenches for a tick: PyBullet clears forces after each step.
+        """Applies the wrenches for one tick. PyBullet clears external forces after each step.
 
         Args:
-            link_pose: Returns the pose of a link's URDF frame in the world by PyBullet's index.
+            link_pose: Function from PyBullet's link index to the pose of the link's URDF frame in the world.
         """
         self.loads = [_load(index, wrench, link_pose(index)) for index, (wrench, _) in self._acting.items()]
         for link, force, torque, point in self.loads:

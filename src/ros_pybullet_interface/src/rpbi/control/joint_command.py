@@ -1,4 +1,4 @@
-"""Commands to some joints of a robot."""
+"""Position, velocity or effort commands to some joints of a robot."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from rpbi.plain_values import joint_values
 
 
 class WrongQuantityError(ValueError):
-    """A command lacks the required quantity."""
+    """A command lacks the quantity that the robot needs: position, velocity or effort."""
 
 
 class JointCommand(NamedTuple):
-    """Values for some of a robot's joints; the others keep theirs.
+    """Commands to n joints of a robot; joints that are not named keep their present targets.
 
-    An input of the world, which the robot checks against its own joints; `JointValues` are checked by themselves.
+    A command is not validated when it is created. The robot that receives the command checks the values.
 
     Attributes:
         names: n joint names.
-        position: n positions [rad or m], or none.
-        velocity: n velocities [rad/s or m/s], or none.
-        effort: n torques or forces [N m or N], or none.
-        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
+        position: n positions [rad or m], or empty.
+        velocity: n velocities [rad/s or m/s], or empty.
+        effort: n torques or forces [N m or N], or empty.
+        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
     """
 
     names: Sequence[str]
@@ -35,10 +35,14 @@ class JointCommand(NamedTuple):
 
     @classmethod
     def of(cls, given: JointCommand | Mapping[str, float], quantity: str) -> JointCommand:
-        """Returns a target; a mapping of joints to numbers is converted to one of that quantity.
+        """Converts a mapping from joint names to numbers to a command; returns a command unchanged.
+
+        Args:
+            given: The command or the mapping.
+            quantity: Quantity of the mapping's numbers: `position`, `velocity` or `effort`.
 
         Raises:
-            ValueError: If it is neither.
+            ValueError: If `given` is neither a command nor a mapping.
         """
         if isinstance(given, cls):
             return given
@@ -49,14 +53,14 @@ class JointCommand(NamedTuple):
         return cls(tuple(values), **given_values)
 
     def values_of(self, quantity: str, reason: str) -> Sequence[float]:
-        """Returns the values of one quantity.
+        """Returns the values of one quantity, and refuses a command without these values.
 
         Args:
             quantity: `position`, `velocity` or `effort`.
-            reason: Why it must be this one, for the message.
+            reason: Why this quantity is needed, for the error message.
 
         Raises:
-            WrongQuantityError: If joints are named and it has none for them.
+            WrongQuantityError: If the command names joints, but has no values of the quantity.
         """
         values: Sequence[float] = getattr(self, quantity)
         if not values and self.names:

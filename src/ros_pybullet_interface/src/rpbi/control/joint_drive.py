@@ -1,4 +1,4 @@
-"""Drives the joints of one robot: its motors, and the targets or the motion that they follow."""
+"""Drives the joints of one robot: motors follow streamed targets or a motion."""
 
 from collections.abc import Callable, Iterable
 
@@ -13,15 +13,17 @@ from .target_stream import TargetStreams
 
 
 class JointDrive:
-    """Follows targets, and runs at most one motion of a robot at a time; a newer one replaces it.
+    """Makes the joints of one robot follow streamed targets, and runs at most one motion at a time.
+
+    A new motion replaces the present one.
 
     Args:
-        interpolation: Interpolation between position targets of a stream: `hold`, `linear` or `smooth`.
-        buffer_s: Longest delay of targets by the jitter buffer [s].
+        interpolation: Interpolation between streamed position targets: `hold`, `linear` or `smooth`.
+        buffer_s: Delay of the jitter buffer [s]; 0 plays targets as they come.
 
     Attributes:
         dt_s: Length of a tick [s].
-        motion: The motion that runs, if any.
+        motion: The running motion; None if there is no motion.
     """
 
     def __init__(
@@ -42,12 +44,12 @@ class JointDrive:
         self._pb, self._body_id = pb, body_id
         self._has_begun = False
         self.controlled: Callable[[], frozenset[int]] = frozenset
-        """Returns the joints that a controller drives."""
+        """Function that returns PyBullet's indices of the joints that a controller drives."""
         self._interpolates = interpolation != "hold"
         self._streams = TargetStreams(motors, name, self.dt_s, interpolation == "smooth", buffer_s)
 
     def follow(self, commands: Iterable[ResolvedCommand]) -> None:
-        """Follows targets from now on, unless the control mode has changed since they were checked."""
+        """Accepts new targets for the joints. Targets checked for another control mode than the present are ignored."""
         if self._interpolates and self.motors.mode in POSITION_MODES:
             self._streams.follow(commands)
         else:
@@ -55,20 +57,24 @@ class JointDrive:
                 self.motors.follow(command)
 
     def drop_targets(self, joints: Iterable[int] | None = None) -> None:
-        """Drops the streams of targets of joints, or all targets."""
+        """Drops the target streams of joints, which then hold.
+
+        Args:
+            joints: Joint indices; None drops all streams and all waiting targets.
+        """
         if joints is None:
             self._streams.clear()
         else:
             self._streams.drop(joints)
 
     def measured(self) -> JointMotion:
-        """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
+        """Returns the measured position [rad or m] and velocity [rad/s or m/s] of each driven joint, keyed by index."""
         indices = [joint.index for joint in self.model.driven]
         states = self._pb.getJointStates(self._body_id, indices) if indices else ()
         return {index: (state[0], state[1]) for index, state in zip(indices, states)}
 
     def run(self, motion: Motion) -> None:
-        """Starts a motion; one that runs is ended with a reason.
+        """Starts a motion at the next tick. A motion that runs already is halted.
 
         Raises:
             ValueError: If the robot is under torque control, or a controller drives one of its joints.
@@ -83,7 +89,11 @@ class JointDrive:
         self.motion, self._has_begun = motion, False
 
     def halt(self, reason: str) -> None:
-        """Ends the motion that runs, if any; its joints hold where they are."""
+        """Ends the running motion, if there is one; its joints hold their positions.
+
+        Args:
+            reason: Reason for the message of the motion's result.
+        """
         if self.motion is not None:
             measured = self.measured()
             self.motion.halt(reason, measured)
@@ -93,11 +103,11 @@ class JointDrive:
 
     @property
     def is_idle(self) -> bool:
-        """Whether neither a target nor a motion moves the set points."""
+        """Whether neither a target stream nor a motion changes the set points."""
         return self.motion is None and self._streams.rest
 
     def advance(self, tick: int) -> None:
-        """Sets the motors to the positions of targets and motion after this tick."""
+        """Advances the target streams and the motion by a tick, and commands the motors accordingly."""
         motion = self.motion
         self._streams.advance(tick, frozenset() if motion is None else motion.joints)
         if motion is None:

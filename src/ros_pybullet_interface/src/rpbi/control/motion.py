@@ -1,4 +1,4 @@
-"""Motions, which drive some joints of a robot tick by tick until they end."""
+"""Base class of motions. A motion drives some joints of a robot tick by tick until it succeeds or fails."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -6,14 +6,14 @@ from concurrent.futures import Future
 from typing import ClassVar, NamedTuple
 
 JointMotion = Mapping[int, tuple[float, float]]
-"""Position [rad or m] and velocity [rad/s or m/s] by joint index."""
+"""Position [rad or m] and velocity [rad/s or m/s] of joints, keyed by joint index."""
 
 
 class MotionResult(NamedTuple):
     """Outcome of a motion.
 
     Attributes:
-        success: Whether it reached its goal.
+        success: Whether the motion reached its goal.
         message: Description of the outcome, with the reason.
     """
 
@@ -22,17 +22,19 @@ class MotionResult(NamedTuple):
 
 
 class Motion(ABC):
-    """Drives some joints of one robot; `JointDrive.run` starts it, on the simulation thread, which makes all calls.
+    """Drives some joints of one robot. `JointDrive.run` starts a motion.
+
+    The simulation thread makes all calls.
 
     Args:
-        joints: Indices of the joints that it drives.
+        joints: Indices of the joints that the motion drives.
 
     Attributes:
-        result: Future of the outcome, set when the motion ends for any reason.
+        result: Future of the outcome. The future is set when the motion ends, for whatever reason.
     """
 
     can_wait: ClassVar[bool] = False
-    """Whether it continues after the world was stopped; others are aborted by a stop."""
+    """Whether the motion continues after the simulation was stopped and restarted; if not, a stop aborts the motion."""
 
     def __init__(self, joints: frozenset[int]) -> None:
         self.joints = joints
@@ -40,31 +42,41 @@ class Motion(ABC):
 
     @property
     def is_over(self) -> bool:
-        """Whether it has ended."""
+        """Whether the motion has ended."""
         return self.result.done()
 
     @abstractmethod
     def begin(self, time_s: float, measured: JointMotion) -> None:
-        """Starts at the world's time now [s], from the state of all driven joints of the robot."""
+        """Starts the motion.
+
+        Args:
+            time_s: The world's present time [s].
+            measured: Measured state of all driven joints of the robot.
+        """
 
     @abstractmethod
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Returns the set points for one tick; a motion that has reached its end calls `end` in it.
+        """Computes the set points for one tick. An implementation calls `end` when the motion is complete or fails.
 
         Args:
-            time_s: The world's time at the end of that tick [s].
-            measured: State of all driven joints at its beginning.
+            time_s: The world's time at the end of the tick [s].
+            measured: Measured state of all driven joints at the beginning of the tick.
 
         Returns:
-            Set points of `joints`, or of fewer: the others keep theirs. They are the positions at the beginning of the
-            tick, and the velocities that lead to the positions at its end (see `Motors.track`).
+            Set points of `joints` or a subset; missing joints keep their set points. The position is the desired one at
+            the beginning of the tick. The velocity leads to the desired position at the end (see `Motors.track`).
         """
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends before the goal for a reason from outside, such as `the simulation was stopped`."""
+        """Ends the motion before its goal, as a failure.
+
+        Args:
+            reason: External cause, such as `the simulation was stopped`.
+            measured: Measured state of all driven joints.
+        """
         self.end(False, reason)
 
     def end(self, success: bool, message: str) -> None:
-        """Ends, unless it has ended already."""
+        """Ends the motion with a result, unless the motion has ended already."""
         if not self.is_over:
             self.result.set_result(MotionResult(success, message))

@@ -1,4 +1,4 @@
-"""The motors of a robot: control modes, set points, and how long they last."""
+"""The motors of a robot: control modes, set points, and the expiry of velocity and effort targets."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ from .joint_command import JointCommand
 log = logging.getLogger(__name__)
 
 PERIOD_S = 5.0
-"""Shortest time between two reports of one joint [s] of wall time."""
+"""Shortest interval between two warnings about the same joint [s] of wall time."""
 
 
 class LimitReports:
-    """Logs when a joint exceeds its limits, once until it is back, and at most once in `PERIOD_S`."""
+    """Logs a warning when a joint leaves its position limits, at most one per joint within `PERIOD_S`.
+
+    The joint must return to its limits before the next warning.
+    """
 
     not_in_keyframes = ("_beyond", "_reported_s")
 
@@ -33,7 +36,13 @@ class LimitReports:
         self._reported_s: dict[int, float] = {}
 
     def observe(self, joint: Joint, position: float, what: str) -> None:
-        """Checks a position [rad or m]; `what` is the consequence for the log line, such as `it goes to the limit`."""
+        """Logs a warning if a position is outside the joint's limits, unless the joint was reported recently.
+
+        Args:
+            joint: The joint.
+            position: Measured or desired position of the joint [rad or m].
+            what: End of the warning: the consequence, such as `it goes to the limit`.
+        """
         if joint.allows(position):
             self._beyond.discard(joint.index)
             return
@@ -51,22 +60,22 @@ QUANTITIES = {
     pybullet.TORQUE_CONTROL: "effort",
     IMPEDANCE_CONTROL: "position",
 }
-"""Quantity of a target in each control mode."""
+"""Quantity that targets must contain, keyed by control mode."""
 MAX_WAITING_TARGETS = 100
-"""Largest number of targets that wait for one tick; beyond it, the last ones are merged."""
+"""Largest number of targets that are queued for one tick; further targets are merged into the last one."""
 MODE_NAMES = {CONTROL_MODES.parse(name): name for name in CONTROL_MODES.names}
 POSITION_MODES = (pybullet.POSITION_CONTROL, IMPEDANCE_CONTROL)
-"""Modes in which targets are positions, which never expire."""
+"""Control modes with position targets, which never expire."""
 
 
 class ResolvedCommand(NamedTuple):
-    """A target checked for a control mode.
+    """A target that was checked for a control mode.
 
     Attributes:
         mode: The control mode.
-        values: Positions, velocities or efforts by joint index.
-        velocities: With positions, the velocities there, for the same joints; may be empty.
-        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
+        values: Positions, velocities or efforts, keyed by joint index.
+        velocities: For position targets: velocities at the target positions, keyed by joint index; may be empty.
+        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
     """
 
     mode: int
@@ -75,25 +84,24 @@ class ResolvedCommand(NamedTuple):
     stamp_ns: int = 0
 
     def merged(self, newer: ResolvedCommand) -> ResolvedCommand:
-        """Merges both: the newer one replaces the older joint by joint, or as a whole if the mode changed between
-        them."""
+        """Returns this target updated by a newer one, without velocities; the newer target alone if modes differ."""
         return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
 
 
 def coalesce(older: tuple[ResolvedCommand, ...], newer: tuple[ResolvedCommand, ...]) -> tuple[ResolvedCommand, ...]:
-    """Returns the commands of both, the last ones merged if there are too many."""
+    """Joins two sequences of targets. If `older` is full, merges `newer` into its last target."""
     if len(older) < MAX_WAITING_TARGETS:
         return older + newer
     return (*older[:-1], older[-1].merged(*newer))
 
 
 class MotorGains(NamedTuple):
-    """Gains of some joints.
+    """New motor gains of n joints.
 
     Attributes:
-        names: The joints.
-        position: PyBullet's position gain of each; empty to leave them as they are.
-        velocity: PyBullet's velocity gain of each; empty to leave them as they are.
+        names: n joint names.
+        position: n gains for PyBullet's `positionGain`; empty to keep the present gains.
+        velocity: n gains for PyBullet's `velocityGain`; empty to keep the present gains.
     """
 
     names: Sequence[str]
@@ -102,22 +110,25 @@ class MotorGains(NamedTuple):
 
 
 class Motors:
-    """Drives the joints of one robot within the efforts and velocities of its URDF.
+    """Commands the motors of one robot, within the limits of its URDF.
 
-    Positions hold until the next target. Velocities and efforts that are not renewed return to 0 after some simulated
-    time: the robot stops when its sender stops.
+    A position target holds until the next target. Velocity and effort targets that are not renewed return to 0 after
+    `timeout_s`, so that the robot stops when its sender stops. `limited` documents what is clipped.
 
     Args:
-        gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
-        enforce_effort_limits: Whether motors are held to the efforts of the URDF.
+        mode: Initial control mode.
+        gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index; PyBullet's defaults otherwise.
+        limit_reports: Logs position targets beyond the joints' limits.
+        enforce_effort_limits: Whether efforts are limited to those of the URDF.
         timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
 
     Attributes:
-        targets: Set points of the motors by joint index: positions, velocities or efforts, by the control mode.
-        impedance_setpoints: Position [rad or m] and velocity for springs to hold at the coming tick, by joint index,
-            where they differ from the targets.
-        applied_efforts: Efforts [N m or N] by joint index that torque targets, springs or a controller applied in the
-            last tick; PyBullet does not report them.
+        targets: Set points of the motors, keyed by joint index. The control mode decides whether these are positions,
+            velocities or efforts.
+        impedance_setpoints: Positions [rad or m] and velocities [rad/s or m/s] that `track` set for the springs of
+            `IMPEDANCE_CONTROL`, keyed by joint index. They override `targets`.
+        applied_efforts: Efforts [N m or N] of torque targets, springs or a controller in the last tick, keyed by joint
+            index. PyBullet does not report these efforts.
     """
 
     def __init__(
@@ -146,19 +157,23 @@ class Motors:
         self._timeout_ticks = max(1, round(timeout_s / self._dt_s))
         self._indices = [joint.index for joint in model.driven]
         self._expiry: dict[int, int] = {}
-        """Tick at which the target of a joint expires, by joint index."""
+        """Tick at which a joint's target expires, keyed by joint index."""
         self._renewed: set[int] = set()
         self._told: dict[int, tuple[int, dict[str, Any]]] = {}
-        """The mode of PyBullet's motor of each joint, and its newest arguments; PyBullet keeps them."""
+        """Control mode and arguments last sent to PyBullet's motor of each joint, keyed by joint index."""
         self.switch(mode)
 
     def resume(self) -> None:
-        """Sends the newest arguments of all motors again, to another client that has the same robot."""
+        """Sends the last commands of all motors again, for a new PyBullet client with the same robot."""
         for index, (mode, arguments) in self._told.items():
             self._tell(index, mode, arguments)
 
     def switch(self, mode: int) -> None:
-        """Changes the control mode: the robot holds its position, or under torque control moves freely."""
+        """Changes the control mode, and drops all targets.
+
+        In position modes the robot then holds its measured positions. Under velocity control it stands still, and
+        under torque control it moves freely.
+        """
         self.mode = mode
         self._expiry.clear()
         self._renewed.clear()
@@ -171,11 +186,11 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def set_gains(self, gains: MotorGains) -> None:
-        """Changes gains from the coming tick on; when it raises, nothing has changed.
+        """Changes motor gains from the next tick on. If the method raises, no gain has changed.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If there is nothing to change, lengths differ or a gain is negative or not finite.
+            ValueError: If `gains` is empty, lengths differ, or a gain is negative or not finite.
         """
         changed: dict[int, dict[str, float]] = {}
         for key, values in (("positionGain", gains.position), ("velocityGain", gains.velocity)):
@@ -192,15 +207,15 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def check(self, target: JointCommand) -> ResolvedCommand:
-        """Checks a target against the present control mode; any thread may call it.
+        """Checks a target for the present control mode, and resolves joint names to indices. Any thread may call it.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If the target has nothing for this mode, lengths differ or a number is not finite.
+            ValueError: If the target lacks the quantity of the mode, lengths differ, or a number is not finite.
         """
         mode = self.mode
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
-        # also checks quantities that are not used: a target with a non-finite number is refused
+        # Also checks quantities that the mode does not use: a target with a non-finite number is refused.
         resolved = {
             quantity: self._model.resolve(target.names, given)
             for quantity in dict.fromkeys(QUANTITIES.values())
@@ -210,7 +225,10 @@ class Motors:
         return ResolvedCommand(mode, resolved[QUANTITIES[mode]], velocities, target.stamp_ns)
 
     def follow(self, command: ResolvedCommand) -> None:
-        """Follows a target from now on, unless the control mode has changed since it was checked."""
+        """Sets the motors to a target, clipped to the joints' limits.
+
+        A target that was checked for another control mode is ignored.
+        """
         if command.mode != self.mode:
             return
         for index, value in command.values.items():
@@ -221,16 +239,25 @@ class Motors:
                 self._drive(index, value)
 
     def hold(self, positions: Mapping[int, float]) -> None:
-        """Holds joints by index at positions [rad or m], which are within their limits."""
+        """Holds joints at positions.
+
+        Args:
+            positions: Positions [rad or m], keyed by joint index. They are not clipped to the joints' limits.
+        """
         for index, position in positions.items():
             self.targets[index] = position
             self._drive(index, position)
 
     def track(self, index: int, position: float, velocity: float) -> None:
-        """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
+        """Makes a joint move with a velocity during the next tick, in any control mode. Nothing is clipped.
 
-        PyBullet's position motor moves by the velocity, plus its gain times the difference to the position before the
-        tick. `position` is therefore the one before the tick; `velocity` leads to the desired one after it.
+        PyBullet's position motor drives at `velocity` plus a correction: its gain times the difference between
+        `position` and the measured position, both before the tick.
+
+        Args:
+            index: Joint index.
+            position: Desired position before the tick [rad or m].
+            velocity: Velocity that leads to the desired position after the tick [rad/s or m/s].
         """
         if self.mode == IMPEDANCE_CONTROL:
             self.impedance_setpoints[index] = position, velocity
@@ -241,14 +268,23 @@ class Motors:
             self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
-        """Ends tracking: joints hold their last position, or stand still under velocity control."""
+        """Ends tracking of joints; their targets, which depend on the control mode, drive the motors again.
+
+        In position modes the joints hold the last tracked position. Under velocity control they stand still.
+        """
         for index in indices:
             if self.mode == pybullet.VELOCITY_CONTROL:
                 self.targets[index] = 0.0
             self._drive(index, self.targets[index])
 
     def reset_setpoints(self, positions: Mapping[int, float]) -> None:
-        """Resets set points after joints were put at positions [rad or m], by index: held there, or not driven."""
+        """Resets set points after the joints' positions were set from outside.
+
+        In position modes the joints hold the new positions. In other modes velocities or efforts become 0.
+
+        Args:
+            positions: The new positions [rad or m], keyed by joint index.
+        """
         for index, position in positions.items():
             self._expiry.pop(index, None)
             self._renewed.discard(index)
@@ -256,21 +292,30 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def hold_measured(self, indices: Iterable[int]) -> None:
-        """Holds joints by index at their measured positions, after a controller has driven them."""
+        """Resets set points to the measured positions of joints that a controller no longer drives.
+
+        See `reset_setpoints` for the effect in each control mode.
+        """
         states = {index: self._pb.getJointState(self._body_id, index)[0] for index in indices}
         for index in states:
             self.applied_efforts.pop(index, None)
         self.reset_setpoints(states)
 
     def disable(self, indices: Iterable[int]) -> None:
-        """Switches PyBullet's motors of joints off, by index, for `apply_efforts`."""
+        """Switches off PyBullet's motors of joints, given by index, so that `apply_efforts` can drive these joints."""
         for index in indices:
             self._expiry.pop(index, None)
             self._renewed.discard(index)
             self._release(index)
 
     def apply_efforts(self, efforts: Mapping[int, float]) -> None:
-        """Applies efforts [N m or N] by joint index for one tick, within the joints' own."""
+        """Applies efforts for one tick, clipped to the joints' effort limits.
+
+        Without `enforce_effort_limits` efforts are not clipped.
+
+        Args:
+            efforts: Efforts [N m or N], keyed by joint index.
+        """
         limits = self._effort_limits
         limited = {index: min(max(effort, -limits[index]), limits[index]) for index, effort in efforts.items()}
         self._pb.setJointMotorControlArray(
@@ -280,16 +325,17 @@ class Motors:
 
     @property
     def is_idle(self) -> bool:
-        """Whether no target expires, and no effort has to be applied at each tick."""
+        """Whether the motors need no calls at each tick: targets do not expire, and efforts are not applied."""
         keeps = self.mode in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL)
         return keeps and not self._renewed and not self._expiry
 
     def before_step(self, tick: int, feed_forward: Mapping[int, float], driven_by_others: Collection[int] = ()) -> None:
-        """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only.
+        """Sets expired targets to 0. Under torque control, also applies the efforts of the tick.
 
         Args:
-            feed_forward: Efforts [N m or N] by joint index that are added to the targets under torque control.
-            driven_by_others: Joints by index that are left alone.
+            tick: Number of the coming tick.
+            feed_forward: Efforts [N m or N] added to effort targets under torque control, keyed by joint index.
+            driven_by_others: Indices of joints to which no effort targets are applied.
         """
         if self._renewed:
             self._expiry.update(dict.fromkeys(self._renewed, tick + self._timeout_ticks))
@@ -308,7 +354,15 @@ class Motors:
                 self._drive(index, 0.0)
 
     def limited(self, index: int, value: float) -> float:
-        """Returns a position, velocity or effort clipped to the limits of the joint."""
+        """Clips a target to the limits of a joint, and returns the result.
+
+        The control mode decides which limit applies. In position modes this is the position range, and a value outside
+        is logged. Under velocity control it is the URDF's velocity, under torque control the URDF's effort.
+
+        Args:
+            index: Joint index.
+            value: Position [rad or m], velocity [rad/s or m/s] or effort [N m or N].
+        """
         joint = self._model.joints[index]
         if self.mode in POSITION_MODES:
             self._limit_reports.observe(joint, value, "it goes to the limit")
@@ -318,11 +372,14 @@ class Motors:
         return min(max(value, -self._effort_limits[index]), self._effort_limits[index])
 
     def nearest_allowed(self, index: int, position: float) -> float:
-        """Returns the position [rad or m] within the limits of a joint that is nearest to one."""
+        """Clips a position [rad or m] to the limits of a joint, and returns the result."""
         return self._model.joints[index].nearest_allowed(position)
 
     def _drive(self, index: int, value: float) -> None:
-        """Sets the set point of one motor; PyBullet keeps it. Under torque control and impedance it is released."""
+        """Sends a set point to one of PyBullet's motors.
+
+        Under torque and impedance control, switches the motor off instead.
+        """
         if self.mode == pybullet.POSITION_CONTROL:
             arguments = {"targetPosition": value, **self._position_arguments[index]}
         elif self.mode == pybullet.VELOCITY_CONTROL:
@@ -340,7 +397,7 @@ class Motors:
         self._pb.setJointMotorControl2(self._body_id, index, mode, **arguments)
 
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
-        """Returns the arguments of PyBullet's position motor of a joint, except its set point."""
+        """Returns the arguments of a joint's position motor for PyBullet, without the set point."""
         arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
         effort = self._model.effort_limit(joint)
         if self._enforce_effort_limits and math.isfinite(effort):

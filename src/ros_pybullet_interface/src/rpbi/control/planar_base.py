@@ -1,4 +1,4 @@
-"""Bases that drive in a plane: their velocities, limits and motors."""
+"""Mobile bases that drive in a plane: velocities, limits and motors."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
 
 PLANAR_JOINTS = (0, 1, 2)
-"""PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""
+"""PyBullet's indices of the joints along x, along y and about z, and also of these joints' child links."""
 ROUNDING = 1e-6
-"""Components out of the plane up to this count as zero [m/s, rad/s]."""
+"""Largest velocity component out of the plane that is accepted as zero [m/s, rad/s]."""
 
 
 class PlanarVelocity(NamedTuple):
     """Velocity of a base in its plane.
 
     Attributes:
-        x: Forwards [m/s], in the base frame unless noted otherwise.
-        y: To the left [m/s].
-        yaw: Counter-clockwise [rad/s].
+        x: Velocity forwards [m/s], in the base frame unless noted otherwise.
+        y: Velocity to the left [m/s].
+        yaw: Angular velocity, counter-clockwise [rad/s].
     """
 
     x: float = 0.0
@@ -39,10 +39,10 @@ class PlanarVelocity(NamedTuple):
 
     @classmethod
     def checked(cls, twist: Twist | Mapping[str, Any]) -> PlanarVelocity:
-        """Returns the planar velocity in a twist, or in a mapping of its fields.
+        """Converts a twist, or a mapping of the fields of `Twist`, to a planar velocity.
 
         Raises:
-            ValueError: If a number is not finite or points out of the plane; it names the field.
+            ValueError: If a component is not finite, or points out of the plane. The message names the component.
         """
         given = {
             f"{part}.{axis}": value
@@ -58,18 +58,23 @@ class PlanarVelocity(NamedTuple):
         return cls(given["linear.x"], given["linear.y"], given["angular.z"])
 
     def turned(self, yaw: float) -> PlanarVelocity:
-        """Returns the same velocity expressed in a frame in which the present one has a yaw angle [rad]."""
+        """Returns the velocity rotated about z by a yaw angle [rad], for example from the base frame to the plane."""
         cos, sin = math.cos(yaw), math.sin(yaw)
         return PlanarVelocity(cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw)
 
     def limited(self, linear: float, angular: float) -> PlanarVelocity:
-        """Returns it with at most a speed [m/s] and a rotation [rad/s]; its direction stays."""
+        """Returns the velocity scaled down to limits; the direction of the translation does not change.
+
+        Args:
+            linear: Largest speed in the plane [m/s].
+            angular: Largest yaw rate [rad/s].
+        """
         speed = math.hypot(self.x, self.y)
         share = min(1.0, linear / speed) if speed else 1.0
         return PlanarVelocity(self.x * share, self.y * share, min(max(self.yaw, -angular), angular))
 
     def towards(self, goal: PlanarVelocity, linear: float, angular: float) -> PlanarVelocity:
-        """Returns the velocity after a change towards a goal by at most `linear` [m/s] and `angular` [rad/s]."""
+        """Returns the velocity moved towards a goal velocity by at most `linear` [m/s] and `angular` [rad/s]."""
         change = PlanarVelocity(goal.x - self.x, goal.y - self.y, goal.yaw - self.yaw).limited(linear, angular)
         return PlanarVelocity(self.x + change.x, self.y + change.y, self.yaw + change.yaw)
 
@@ -97,22 +102,24 @@ class PlanarBaseConfig(ConfigModel):
 
 
 GRAVITY = 9.81
-"""Gravity for the default force limits [m/s^2], whatever the world's is."""
+"""Gravity from which default force limits are computed [m/s^2], independent of the world's gravity."""
 POSITION_GAIN = 0.1
-"""Share of its lag that the base recovers in a tick."""
+"""Share of the position error between set point and base that the motors correct in a tick."""
 CATCH_UP_SPEED = (0.5, 0.5, 1.0)
-"""Largest additional speed to recover lag [m/s, m/s, rad/s]; lag beyond it is dropped, since an obstacle blocks the
-base."""
+"""Largest additional speed along x, y and about z to correct position errors [m/s, m/s, rad/s].
+
+A larger error means that an obstacle blocks the base. The set point is then moved towards the base.
+"""
 
 
 def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
-    """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF.
+    """Inserts joints along x, along y and about z, with massless links, above the root link of a URDF.
 
     Returns:
-        The parts that PyBullet reads, with the chain, whose fixed end is the root.
+        The `robot` element for PyBullet. Its new root link is the fixed end of the inserted joints.
 
     Raises:
-        ConfigError: If the file is not a tree of links.
+        ConfigError: If the URDF is not a tree of links.
     """
     robot = for_pybullet(document, files)
     world, x, y, yaw = (f"planar_base/{name}" for name in ("world", "x", "y", "yaw"))
@@ -126,37 +133,39 @@ def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
 
 
 class PlanarBase:
-    """Drives the planar joints of a robot by velocity, with limited force.
+    """Drives the planar joints of a robot at commanded velocities, with limited force.
 
-    The motors follow a set point that moves with the limited velocity, so nothing drifts. An obstacle that needs more
-    force stops or pushes the base; the set point then stays near it, as wheels slip.
+    The motors track a set point that moves at the commanded velocity within the limits, so that the base does not
+    drift. If an obstacle blocks or pushes the base, the set point stays near the base, as if wheels slipped.
 
     Args:
-        body_id: PyBullet's id of the robot, which was loaded with planar joints.
+        body_id: PyBullet's id of a robot that was loaded with planar joints.
+        config: Limits of velocity, acceleration and force.
+        dt_s: Length of a tick [s].
     """
 
     def __init__(self, pb: Client, body_id: int, config: PlanarBaseConfig, dt_s: float) -> None:
         self._pb, self._body_id, self._config, self._dt_s = pb, body_id, config, dt_s
         self._timeout_ticks = max(1, round(config.cmd_vel_timeout_s / dt_s))
         self._expiry: int | None = None
-        """Tick at which the command expires; None if it was renewed since the last one."""
+        """Tick at which the command expires; None if a command came since the last tick."""
         self._command = PlanarVelocity()
         self._forces = self._force_limits()
         self._max_lags = tuple(speed * dt_s / POSITION_GAIN for speed in CATCH_UP_SPEED)
         self.rest()
 
     def follow(self, velocity: PlanarVelocity) -> None:
-        """Drives at a velocity in the base frame until the next one or the time-out, as fast as the limits allow."""
+        """Commands a velocity in the base frame, clipped to the limits, until the next command or the time-out."""
         self._command = velocity.limited(self._config.max_linear_velocity, self._config.max_angular_velocity)
         self._expiry = None
 
     def rest(self) -> None:
-        """Resets the set point to the present joint positions, at rest."""
+        """Sets the set point to the measured joint positions, at rest. The command is kept."""
         self._velocity = PlanarVelocity()
         self._set_point = [state[0] for state in self._joint_states()]
 
     def before_step(self, tick: int) -> None:
-        """Advances the set point by a tick."""
+        """Advances the set point by a tick, and commands the motors."""
         if self._expiry is None:
             self._expiry = tick + self._timeout_ticks
         elif tick >= self._expiry:
@@ -171,7 +180,7 @@ class PlanarBase:
             if abs(lag) > max_lag:
                 self._set_point[axis] = position + math.copysign(max_lag, lag)
                 velocity[axis], is_held_up = speed, True
-        if is_held_up:  # continue from its present velocity
+        if is_held_up:  # continue from the measured velocity
             self._velocity = PlanarVelocity(*velocity).turned(-yaw)
         self._pb.setJointMotorControlArray(
             self._body_id,
@@ -186,12 +195,12 @@ class PlanarBase:
         self._set_point = [place + speed * self._dt_s for place, speed in zip(self._set_point, velocity)]
 
     def pose_in_plane(self) -> Pose:
-        """Returns the pose of the root link's frame in the frame that the plane was put into the world with."""
+        """Returns the pose of the root link's frame in the frame of the plane."""
         x, y, yaw = (state[0] for state in self._joint_states())
         return Pose((x, y, 0.0), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
 
     def velocity_in_plane(self) -> PlanarVelocity:
-        """Returns the velocity of the root link's frame, expressed in the frame of the plane."""
+        """Returns the velocity of the root link's frame, in the frame of the plane."""
         return PlanarVelocity(*(state[1] for state in self._joint_states()))
 
     def _joint_states(self) -> tuple[tuple[float, ...], ...]:
@@ -199,10 +208,10 @@ class PlanarBase:
         return states
 
     def _force_limits(self) -> tuple[float, float, float]:
-        """Returns the force along x and y [N] and the torque about z [N m] that the motors have.
+        """Returns the motors' largest forces along x and y [N] and largest torque about z [N m].
 
-        Defaults are those of wheels with a friction coefficient of 1: the robot's weight, and its weight at its radius
-        of gyration.
+        Defaults correspond to wheels with a friction coefficient of 1. The force is then the robot's weight, and the
+        torque is the weight times the radius of gyration.
         """
         joints = range(self._pb.getNumJoints(self._body_id))
         infos = [self._pb.getJointInfo(self._body_id, index) for index in joints]

@@ -1,4 +1,4 @@
-"""Bodies that follow a stream of poses with a velocity, so that contact forces are correct."""
+"""Moves bodies along a stream of poses by setting velocities, so that contact forces are correct."""
 
 from __future__ import annotations
 
@@ -17,33 +17,38 @@ from rpbi.geometry import Pose
 log = logging.getLogger(__name__)
 
 INTERVALS = 5
-"""Number of last intervals between poses whose longest is the stream's period."""
+"""Number of recent intervals between poses; the longest of these is the stream's period."""
 LONGEST_GROWTH = 2
-"""Largest growth of the longest interval by a new one; a longer interval is a pause, and clipped to it."""
+"""Largest ratio of a new interval to the period. A longer interval is a pause, and is clipped."""
 JUMP_S = 0.1
-"""Longest motion to a pose at the largest speeds [s], or two periods if that is longer; a pose further away is a
-jump."""
+"""Distance beyond which a new pose counts as a jump, as travel time at the largest speeds [s].
+
+If two periods of the stream are longer, two periods count instead.
+"""
 QUIET_S = 5.0
-"""Time after a warning of a jump without another [s] of the world's time."""
+"""Shortest interval between two warnings about jumps [s] of the world's time."""
 
 MAX_TICKS = 10_000
-"""Largest number of ticks over which a path is smoothed."""
+"""Largest length of the moving average [ticks]."""
 
 _Numbers = npt.NDArray[np.float64]
 
 
 class PosePath:
-    """Smooths a stream of poses, tick by tick.
+    """Interpolates a stream of poses smoothly, tick by tick.
 
-    Straight lines lead to each pose, in the longest of the last few intervals between poses, or longer at the largest
-    speeds. The path is the moving average of these lines: the velocity changes evenly, without overshoot. Quaternions
-    are averaged as vectors, signs aligned.
+    A straight line leads to each new pose. It lasts for one period of the stream, or longer if the largest speeds
+    demand it. The path is the moving average of these lines, so that velocity changes evenly and never overshoots.
+    Quaternions are averaged as vectors with aligned signs.
 
     Args:
-        start: Pose at the beginning, at rest.
-        ticks: Expected interval between poses [ticks], over which the mean is taken.
-        max_step: Largest translation in a tick [m].
-        max_turn: Largest rotation in a tick [rad].
+        start: Initial pose, at rest.
+        ticks: Expected interval between poses, and length of the moving average [ticks].
+        max_step: Largest translation per tick [m].
+        max_turn: Largest rotation per tick [rad].
+
+    Attributes:
+        goal: The newest pose.
     """
 
     def __init__(self, start: Pose, ticks: int, max_step: float, max_turn: float) -> None:
@@ -57,7 +62,7 @@ class PosePath:
         self._window = deque([self._line] * ticks)
         self._sum = self._line * ticks
         self.ticks_left = 0
-        """Ticks until it rests at its goal."""
+        """Number of ticks until the path ends at its goal."""
 
     @property
     def period(self) -> int:
@@ -65,13 +70,18 @@ class PosePath:
         return max(self._intervals)
 
     def ticks_to(self, pose: Pose) -> float:
-        """Returns the ticks from the end of the line to a pose at the largest speeds."""
+        """Returns the travel time [ticks] from the present line position to a pose at the largest speeds."""
         way = _numbers(pose, self._line) - self._line
-        turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # at the speed in the middle of the line
+        turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # rotation is fastest in the middle of the line
         return max(float(np.linalg.norm(way[:3])) / self._max_step, turn / self._max_turn)
 
     def push(self, pose: Pose, tick: int) -> None:
-        """Sets the goal to a pose received before a tick."""
+        """Sets a new goal.
+
+        Args:
+            pose: The goal.
+            tick: Number of the tick before which the pose was received.
+        """
         if self._taken_at is not None:
             self._intervals.append(min(tick - self._taken_at, LONGEST_GROWTH * self.period))
         self._taken_at = tick
@@ -82,7 +92,7 @@ class PosePath:
         self.ticks_left = self._line_ticks + len(self._window) - 1
 
     def next(self) -> Pose:
-        """Advances by a tick, and returns the pose after it."""
+        """Advances the path by one tick, and returns the pose at the end of the tick."""
         if self._line_ticks:
             self._line_ticks -= 1
             self._line = self._line + self._step
@@ -96,7 +106,7 @@ class PosePath:
 
 
 def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
-    """Returns position and quaternion, the latter with the sign that is nearer to another one."""
+    """Returns position and quaternion of a pose as 7 numbers; the quaternion's sign is the one nearer to `near`."""
     numbers = np.array([*pose.position, *pose.quat_xyzw])
     if near is not None and numbers[3:] @ near[3:] < 0.0:
         numbers[3:] *= -1.0
@@ -104,15 +114,17 @@ def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
 
 
 class PoseFollower:
-    """Moves a fixed base of one PyBullet body along a stream of poses.
+    """Moves the fixed base of one PyBullet body along a stream of poses.
 
-    A base without mass moves at its set velocity, and contacts are solved with it: it carries and pushes other bodies,
-    with friction, and nothing stops it. Before each tick its velocity is set to reach the path's next pose. The first
-    pose, and any beyond a jump, is set at once, at rest.
+    Before each tick, the velocity of the base is set such that the base reaches the next pose of the path. PyBullet
+    moves a base without mass at exactly this velocity and solves contacts with it. The base therefore carries and
+    pushes other bodies, and no contact stops the base. The first pose, and a pose after a jump, is set without a path.
 
     Args:
-        name: The body, for messages.
-        centre: The pose of its centre of mass, which PyBullet moves, in the frame that follows.
+        name: Name of the body, for messages.
+        body_id: PyBullet's id of the body.
+        centre: Pose of the base's centre of mass, which PyBullet moves, in the frame that follows the poses.
+        object_tf: Configuration of the stream: frame name, rate and largest speeds.
     """
 
     def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
@@ -124,27 +136,27 @@ class PoseFollower:
         self._waiting: Pose | None = None
         self._is_moving = False
         self._quiet_until = 0
-        """Tick from which a jump is logged again."""
+        """Tick from which the next jump is logged."""
 
     def push(self, pose: Pose) -> None:
-        """Sets the goal from the next tick on; the first pose is set at once."""
+        """Sets a new goal from the next tick on. The first pose is set at once, without a path."""
         if self._path is None:
             self.put(pose)
         else:
             self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Sets the following frame to a pose at once, at rest."""
+        """Sets the frame to a pose at once, at rest."""
         self._waiting = None
         self._begin(pose @ self._centre)
 
     @property
     def is_idle(self) -> bool:
-        """Whether no pose has come that the base is to reach or follow."""
+        """Whether there is no path and no new pose."""
         return self._path is None and self._waiting is None
 
     def before_step(self, tick: int) -> None:
-        """Sets the velocity of the base for the coming tick."""
+        """Sets the velocity of the base for the next tick."""
         path = self._path
         if path is None:
             return
@@ -156,7 +168,7 @@ class PoseFollower:
             self._rest_at(path.goal)
 
     def _aim(self, path: PosePath, pose: Pose, tick: int) -> PosePath:
-        """Extends the path to a pose; beyond a jump it restarts there."""
+        """Extends the path to a pose. If the pose is a jump, sets the base to the pose and starts a new path."""
         self._waiting = None
         if path.ticks_to(pose) <= max(JUMP_S / self._dt_s, 2 * path.period):
             path.push(pose, tick)
@@ -180,14 +192,14 @@ class PoseFollower:
         return PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
 
     def _rest_at(self, pose: Pose) -> None:
-        self._pb.resetBasePositionAndOrientation(self._body_id, *pose)  # which takes its velocity too
+        self._pb.resetBasePositionAndOrientation(self._body_id, *pose)  # also sets the velocity to 0
         self._is_moving = False
 
     def _drive_to(self, pose: Pose) -> None:
-        """Sets the velocity that leads to a pose in a tick."""
+        """Sets the velocity with which the base reaches a pose within one tick."""
         position, quat = self._pb.getBasePositionAndOrientation(self._body_id)
         way, turn = minus(pose.position, position), rotation_between(quat, pose.quat_xyzw)
-        # PyBullet moves a rotating base by d + r x d, so the velocity is the inverse of that
+        # PyBullet moves a rotating base by d + r x d, where d and r are translation and rotation; this is the inverse.
         across = cross(turn, way)
         straight = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
         linear, angular = scaled(1.0 / self._dt_s, straight), scaled(1.0 / self._dt_s, turn)
@@ -195,35 +207,38 @@ class PoseFollower:
         self._is_moving = True
 
     def _velocity_before(self, velocity: Vector) -> Vector:
-        """Returns the velocity [m/s] before the forces of a tick act; no forces act on a base without mass."""
+        """Returns the velocity [m/s] to set so that the base has `velocity` after the forces of the tick.
+
+        Forces do not change the velocity of a base without mass.
+        """
         return velocity
 
 
 class TrackedBase(PoseFollower):
-    """Moves the base of a dynamic body along a stream of poses while they come; in between, physics moves it.
+    """Moves the base of a dynamic body along a stream of poses; without poses, physics moves the body.
 
-    Before each tick its velocity is set along the path, less the change by gravity in that tick: contacts are solved
-    with that velocity and the body's own mass. Without a pose for `timeout_s` of the world's time it moves freely;
-    later poses lead on from its present pose.
+    Before each tick, the velocity of the base is set along the path, minus the velocity change by gravity in the tick.
+    Contacts are solved with that velocity and the body's own mass. If no pose comes for `timeout_s` of the world's
+    time, the body moves freely. The next pose then starts a path from the body's present pose.
     """
 
     def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
         super().__init__(pb, name, body_id, centre, object_tf)
         self._is_known = False
         self._taken_at = 0
-        """Tick before which the last pose came."""
+        """Tick before which the newest pose came."""
         self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
 
     def push(self, pose: Pose) -> None:
-        """Sets the goal from the next tick on; the first pose is set at once."""
+        """Sets a new goal from the next tick on. The first pose is set at that tick, without a path."""
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Leaves the body to physics until the next pose comes, after it was set to a pose."""
+        """Drops path and goal after the body was set to a pose; physics moves the body until the next pose comes."""
         self._path = self._waiting = None
 
     def before_step(self, tick: int) -> None:
-        """Sets the velocity of the base for the coming tick, if it is tracked."""
+        """Sets the velocity of the base for the next tick, unless physics moves the body."""
         if self._waiting is not None:
             self._taken_at = tick
             if self._path is None:

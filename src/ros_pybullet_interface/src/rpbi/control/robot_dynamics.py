@@ -1,4 +1,4 @@
-"""The dynamics and kinematics of a robot, as its URDF has them."""
+"""Dynamics and kinematics of a robot, computed from its URDF."""
 
 from collections.abc import Sequence
 
@@ -17,24 +17,26 @@ NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 class RobotDynamics:
-    """A robot with n driven joints and a base that does not move, in a client of its own.
+    """Computes the dynamics and kinematics of a robot with n driven joints and a base at rest.
 
-    PyBullet computes with the recursive Newton-Euler and composite-rigid-body algorithms; its results are those of
-    Pinocchio to rounding, at 1 to 5 microseconds a call. Attached bodies, and changes of the robot since it was loaded,
-    are not modelled. Joint values are in the order of `JointModel.driven`.
+    Loads the robot a second time, into a PyBullet client of its own, at the first computation. PyBullet uses the
+    recursive Newton-Euler and composite-rigid-body algorithms. The results agree with Pinocchio's to rounding, and a
+    call takes 1 to 5 microseconds. Attached bodies, and changes of the robot after loading, are not modelled. Joint
+    values are in the order of `JointModel.driven`.
 
-    PyBullet's inverse dynamics ignore the orientation of the base; the robot stands upright at the origin, and gravity
-    is rotated instead.
+    PyBullet's inverse dynamics ignore the orientation of the base. Therefore, gravity is rotated into the base frame
+    while the second robot remains upright at the origin.
 
     Args:
-        world: The client that it lives in, whose gravity counts.
-        load: Arguments that it was loaded with.
-        inertia_from_urdf: Whether its moments of inertia are the URDF's.
+        world: Client of the simulated robot; its gravity is used.
+        model: The robot's joints.
+        load: Arguments with which the simulated robot was loaded.
+        inertia_from_urdf: Whether moments of inertia are taken from the URDF rather than computed by PyBullet.
     """
 
     def __init__(self, world: Client, model: JointModel, load: LoadURDF, inertia_from_urdf: bool) -> None:
         self.joints = model.driven
-        """The n joints; those that are coupled to them move with them."""
+        """The n driven joints, without the joints that are coupled to a driven joint."""
         self._moving = model.moving
         self._world = world
         self._load_arguments = load.kwargs()
@@ -42,22 +44,25 @@ class RobotDynamics:
         self._zeros = [0.0] * len(model.moving)
         self._by_driven: AffineMap | None = model.by_driven if model.couplings else None
         self._base_joints = len(model.joints) - len(model.own)
-        self._client: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
+        self._client: Client | None = None  # created at first use; the renderer's copy of a robot never needs it
         self._body_id = -1
         self._gravity: Vector | None = None
         self._points: dict[tuple[int, Vector], Vector] = {}
-        """Points of links as PyBullet has them: from the link's origin, along the axes of its inertial frame."""
+        """Points relative to the link's origin in the axes of the link's inertial frame, as PyBullet expects them.
+
+        Keyed by link index and the point in the link's frame [m].
+        """
         self._turned: Quaternion | None = None
         self._turn = np.eye(3)
 
     def mass_matrix(self, q: Sequence[float]) -> Array:
-        """Returns the mass matrix at joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
+        """Returns the mass matrix at n joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
         pb = self._client or self._load()
         mass = np.array(pb.calculateMassMatrix(self._body_id, self._positions(q)))
         return mass if self._by_driven is None else self._by_driven.factors.T @ mass @ self._by_driven.factors
 
     def bias(self, base: Pose, q: Sequence[float], velocity: Sequence[float]) -> Array:
-        """Returns the efforts that keep joint velocities constant: gravity, Coriolis and centrifugal forces.
+        """Returns the efforts that compensate gravity, Coriolis and centrifugal forces.
 
         Args:
             base: Pose of the root link in the world.
@@ -79,7 +84,7 @@ class RobotDynamics:
         return efforts_of_driven
 
     def gravity(self, base: Pose, q: Sequence[float]) -> Array:
-        """Returns the n efforts [N m or N] that hold the robot still against gravity; see `bias`."""
+        """Returns the n efforts [N m or N] that compensate gravity at rest; arguments as of `bias`."""
         return self.bias(base, q, [0.0] * len(self.joints))
 
     def jacobian(self, base: Pose, q: Sequence[float], link: int, point: Vector = (0.0, 0.0, 0.0)) -> Array:
@@ -92,7 +97,8 @@ class RobotDynamics:
             point: The point in the link's frame [m].
 
         Returns:
-            Shape (6, n), in the axes of the world: velocity of the point [m/s], then rotation of the link [rad/s].
+            Shape (6, n), in the axes of the world. Rows 0 to 2 give the velocity of the point [m/s], rows 3 to 5 the
+            angular velocity of the link [rad/s].
         """
         pb = self._client or self._load()
         link -= self._base_joints
@@ -110,7 +116,13 @@ class RobotDynamics:
         return jacobian if self._by_driven is None else jacobian @ self._by_driven.factors
 
     def pose(self, base: Pose, q: Sequence[float], link: int) -> Pose:
-        """Returns the pose in the world of the URDF frame of a link, by PyBullet's index, at joint positions."""
+        """Returns the pose of a link's URDF frame in the world (forward kinematics).
+
+        Args:
+            base: Pose of the root link in the world.
+            q: n joint positions [rad or m].
+            link: PyBullet's index of the link.
+        """
         pb = self._client or self._load()
         for joint, position in zip(self._moving, self._positions(q)):
             pb.resetJointState(self._body_id, joint.index - self._base_joints, position)
@@ -118,13 +130,13 @@ class RobotDynamics:
         return base @ Pose(state[4], state[5])
 
     def close(self) -> None:
-        """Closes its client."""
+        """Closes the PyBullet client that holds the second robot."""
         if self._client is not None:
             self._client.disconnect()
             self._client = None
 
     def _positions(self, q: Sequence[float]) -> Sequence[float]:
-        """Returns the positions of all joints of one axis."""
+        """Returns the positions of all joints with one axis, coupled joints included."""
         if self._by_driven is None:
             return q
         positions: list[float] = (self._by_driven.factors @ q + self._by_driven.offsets).tolist()

@@ -1,4 +1,4 @@
-"""Motions to a goal in a given time."""
+"""Motions of joints to goal positions in a given time."""
 
 from collections.abc import Mapping
 
@@ -8,28 +8,32 @@ from rpbi.urdf.joints import JointModel
 from .motion import JointMotion, Motion
 
 TOLERANCES = {"rad": 0.01, "m": 0.001}
-"""Largest error of a joint at the end by unit; beyond it, the motion fails."""
+"""Largest position error with which a joint has reached its goal [rad or m], keyed by the joint's unit."""
 REST = {"rad": 0.05, "m": 0.005}
-"""Speed below which a joint counts as at rest at its goal, by unit and second."""
+"""Speed up to which a joint counts as at rest [rad/s or m/s], keyed by the joint's unit."""
 SETTLING_S = 1.0
-"""Longest time after the last set point until joints rest at the goal [s] of the world's time; then it fails."""
+"""Time that joints have after the last set point to come to rest at the goal [s] of the world's time."""
 LONGEST_S = 1e6
-"""Longest motion [s]; longer ones are refused as errors."""
+"""Longest duration of a motion [s]; longer durations are refused."""
 SHORTEST_S = 0.04
-"""Shortest duration of a motion [s], as in the first release; shorter ones are extended to it."""
+"""Shortest duration of a motion [s]; shorter durations are extended to this value."""
 PEAK = 15.0 / 8.0
-"""Largest velocity of a minimum-jerk motion over its mean one: 30 s^2 (1 - s)^2 at s = 1/2 (Flash and Hogan, 1985)."""
+"""Ratio of the peak velocity to the mean velocity of a minimum-jerk motion (Flash and Hogan, 1985).
+
+The ratio is the value of 30 s^2 (1 - s)^2 at s = 1/2.
+"""
 
 
 class TimedMotion(Motion):
-    """Moves joints to a goal with minimum jerk; it takes longer than asked if the joints' velocities demand it.
+    """Moves joints to goal positions with minimum jerk.
 
-    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are asked to go beyond
-    their limits stop there, and the motion does not succeed. Joints that are not named are left alone.
+    The motion takes longer than `duration_s` if a joint would otherwise exceed its velocity limit. The motion succeeds
+    if the measured joints come to rest within `TOLERANCES` of the goal. A goal beyond a joint's limits is clipped to
+    the limit, and the motion then fails after the joint has reached the limit.
 
     Args:
-        goal: Positions [rad or m] by joint index.
-        duration_s: Duration [s].
+        goal: Goal positions [rad or m], keyed by joint index.
+        duration_s: Requested duration [s].
 
     Raises:
         ValueError: If the goal is empty, or the duration is negative or not finite.
@@ -48,7 +52,7 @@ class TimedMotion(Motion):
         self._trajectory: Trajectory
 
     def begin(self, time_s: float, measured: JointMotion) -> None:
-        """Plans the motion from the measured state."""
+        """Plans the motion from the measured positions, at rest."""
         start = [measured[index][0] for index in self._goal]
         shortest = max(
             PEAK * abs(goal - from_) / self._model.joints[index].max_velocity
@@ -59,7 +63,7 @@ class TimedMotion(Motion):
         self._time_s, self._set_point = time_s, tuple(start)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Follows the plan, then waits at the goal until the joints arrive or the time is over."""
+        """Follows the plan. After its end, holds the goal until the joints rest there or `SETTLING_S` is over."""
         if time_s > self._trajectory.end_s + 1e-9:
             missed = self._missed(measured)
             if not missed and self._rests(measured):
@@ -78,7 +82,7 @@ class TimedMotion(Motion):
         }
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends before the goal; the message includes the state reached."""
+        """Ends the motion before its goal. The message includes the positions reached."""
         self.end(False, f"{reason} before the goal: {self._residuals(measured)}; {self._reached(measured)}")
 
     def _missed(self, measured: JointMotion) -> list[int]:
@@ -89,7 +93,7 @@ class TimedMotion(Motion):
         return all(abs(measured[index][1]) <= REST[self._model.joints[index].unit] for index in self._goal)
 
     def _residuals(self, measured: JointMotion, indices: list[int] | None = None) -> str:
-        """Returns the errors of joints as text: the largest of each unit, or all of `indices`."""
+        """Returns position errors as text: of the joints in `indices`, or the largest error of each unit if None."""
         errors = {index: abs(measured[index][0] - goal) for index, goal in self._goal.items()}
         joints = self._model.joints
         if indices is None:
