@@ -1,4 +1,4 @@
-"""A simulated world: its contents, how they are loaded, and its step."""
+"""Simulated worlds: configuration, loading, simulation, saved states and predictions."""
 
 from .world import World
 

@@ -1,4 +1,4 @@
-"""Actions on bodies other than inputs; a replay repeats them from the record."""
+"""Actions on bodies, such as teleporting or moving joints; they are recorded, and repeated by a replay."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from rpbi.plain_values import as_tuple
 
 
 class TimedGoal(NamedTuple):
-    """Target positions of joints, and the time to reach them.
+    """Target positions of joints, and the duration of the motion.
 
     Attributes:
-        positions: Positions [rad or m], either all by joint index or all by name.
+        positions: Positions [rad or m], all indexed by joint name, or all by PyBullet's joint index.
         duration_s: Duration of the motion [s].
     """
 
@@ -32,11 +32,12 @@ class TimedGoal(NamedTuple):
 
 
 class RecordedTrajectory(NamedTuple):
-    """A trajectory that a robot was asked to follow.
+    """A requested trajectory, as it is recorded.
 
     Attributes:
-        request: The trajectory, its stamp counted from the stamp of the tick [ns]; 0 is at once.
-        tolerances: Its tolerances, None if nothing was checked.
+        request: The trajectory. Its stamp [ns] is relative to the stamp of the tick at which it was requested; 0 means
+            an immediate start.
+        tolerances: Goal tolerances of the request; None if the request has none.
     """
 
     request: TrajectoryRequest
@@ -44,7 +45,7 @@ class RecordedTrajectory(NamedTuple):
 
     @classmethod
     def of(cls, request: TrajectoryRequest, tolerances: GoalTolerances | None, clock: Clock) -> RecordedTrajectory:
-        """Returns the record of a request at the clock's present tick."""
+        """Returns the record of a trajectory that is requested at the clock's present tick."""
         offset_ns = request.stamp_ns - clock.stamp_ns if request.stamp_ns else 0
         return cls(request._replace(stamp_ns=offset_ns), tolerances)
 
@@ -73,12 +74,12 @@ def _follow(body: Any, clock: Clock, recorded: RecordedTrajectory) -> Motion:
 
 
 class Action(NamedTuple):
-    """An action on a body.
+    """A kind of action on bodies.
 
     Attributes:
-        do: Applies it to a body, with the world's clock and a value.
-        value: Returns that value from a given one, which may be a mapping in place of a named tuple. It raises
-            ValueError for anything else.
+        do: Applies the action; its arguments are the body, the world's clock and the value.
+        value: Converts a given value to the type that `do` requires, for instance a mapping to a named tuple. Raises
+            ValueError if this is not possible.
     """
 
     do: Callable[[Any, Clock, Any], Any]
@@ -106,6 +107,6 @@ ACTIONS: dict[str, Action] = {
     "push": Action(lambda body, _, wrench: body.push(wrench), _tuple_of(ExternalWrench)),
     "cancel": Action(lambda body, clock, reason: body.follower.cancel(reason, clock), str),
 }
-"""Actions on bodies by name."""
+"""Actions on bodies, indexed by name."""
 MOVES_AT_ONCE = ("teleport", "set_joint_state")
-"""Actions that place a body elsewhere at once; attachments would pull it back."""
+"""Names of the actions that move a body instantly; they are refused for attached bodies."""

@@ -1,4 +1,4 @@
-"""Attachments: bodies that hold each other, up to a force."""
+"""Attachments: constraints that hold bodies together, optionally up to a largest force."""
 
 from __future__ import annotations
 
@@ -20,12 +20,18 @@ from rpbi.geometry import LinkWrench, Pose, rotated
 log = logging.getLogger(__name__)
 
 _UNLIMITED_N = 1e9
-"""PyBullet's own limit is 500 N."""
+"""Largest force of a constraint [N], so large that it is never reached; PyBullet's default would be 500 N."""
 
 
 @dataclass(frozen=True)
 class _End:
-    """One end of an attachment: a body, PyBullet's index of a link, and the end's pose in the link's URDF frame."""
+    """One end of an attachment.
+
+    Attributes:
+        body: The body.
+        link: PyBullet's index of the link; -1 for the base.
+        pose: Pose of the attachment point in the link's URDF frame.
+    """
 
     body: Body
     link: int
@@ -48,7 +54,14 @@ class _End:
 
 @dataclass(frozen=True)
 class _Attachment:
-    """An attachment in force."""
+    """An active attachment.
+
+    Attributes:
+        config: Configuration of the attachment.
+        constraint: PyBullet's id of the constraint.
+        parent: End on the parent body.
+        child: End on the child body.
+    """
 
     config: AttachmentConfig
     constraint: int
@@ -59,10 +72,10 @@ class _Attachment:
         return self.parent, self.child
 
     def force_and_torque(self, pb: Client) -> tuple[Vector, Vector]:
-        """Returns the force and torque on the parent in the last step [N, N m], in the axes of the world."""
+        """Returns the force [N] and torque [N m] on the parent in the last step, in world axes."""
         state = pb.getConstraintState(self.constraint)
         force: Vector = state[:3]
-        if len(state) == 3:  # a ball; PyBullet returns the force on the child
+        if len(state) == 3:  # ball joint: PyBullet returns the force on the child
             return scaled(-1.0, force), (0.0, 0.0, 0.0)
         return force, rotated((self.parent.link_pose() @ self.parent.pose).quat_xyzw, state[3:])
 
@@ -71,9 +84,9 @@ class Attachments:
     """The attachments of a world.
 
     Attributes:
-        limited: Whether one of them breaks beyond a force, so that forces must be checked.
-        changes: Number of times one was added or removed.
-        last_change: The last of these changes, as a sentence.
+        limited: Whether at least one attachment has a largest force, so that forces must be checked.
+        changes: Number of changes so far; a change is an added or removed attachment, or a reset.
+        last_change: Sentence about the last change; empty before the first.
     """
 
     def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
@@ -89,12 +102,12 @@ class Attachments:
         return tuple(each.config for each in self._holding.values())
 
     def add(self, config: AttachmentConfig) -> None:
-        """Attaches a child to a parent.
+        """Attaches the child body to the parent body.
 
         Raises:
             UnknownNameError: If there is no such body or link.
-            ValueError: If the name is taken, the two are attached already, or cannot be.
-            PhysicsError: If PyBullet refuses.
+            ValueError: If the name is taken, or the bodies are attached already or cannot be attached.
+            PhysicsError: If PyBullet refuses the constraint.
         """
         if config.name in self._holding:
             raise ValueError(f"name: there is an attachment '{config.name}' already; detach it, or use another name")
@@ -120,7 +133,7 @@ class Attachments:
         """Removes an attachment.
 
         Raises:
-            UnknownNameError: If there is no attachment of that name.
+            UnknownNameError: If no attachment has this name.
         """
         if name not in self._holding:
             raise UnknownNameError("attachment", name, list(self._holding))
@@ -132,30 +145,30 @@ class Attachments:
             log.info("%s", self._release(each, f"ended, since '{name}' was removed"))
 
     def resume(self) -> None:
-        """Creates all attachments again in the client into which the bodies have moved."""
+        """Creates all constraints again, after the bodies have moved into another client."""
         for name, each in self._holding.items():
             constraint = self._constrain(each.config, each.parent, each.child)
             self._holding[name] = replace(each, constraint=constraint)
 
     def refuse_moving(self, name: str) -> None:
-        """Refuses to move a body that its attachments would pull back at once.
+        """Checks that a body is not attached, since attachments would pull a teleported body back at once.
 
         Raises:
-            ValueError: If it is attached to something.
+            ValueError: If the body is attached to another body.
         """
         names = ", ".join(f"'{each.config.name}'" for each in self._of(name))
         if names:
             raise ValueError(f"'{name}' is held by attachment {names}, which would pull it back; detach it first")
 
     def break_overloaded(self, tick: int) -> None:
-        """Breaks attachments whose force in the last step exceeded `max_force`."""
+        """Removes each attachment whose force in the last step exceeded its `max_force`, and logs a warning."""
         for each in list(self._holding.values()):
             limit = each.config.max_force
             if limit is not None and (force := math.hypot(*each.force_and_torque(self._pb)[0])) > limit:
                 log.warning("%s", self._release(each, f"broke at tick {tick}: {force:.4g} N, it holds {limit:g} N"))
 
     def loads_on(self, name: str) -> Iterator[LinkWrench]:
-        """Yields the wrenches of attachments on a body's links in the last step."""
+        """Yields the wrenches that attachments exerted on the links of a body in the last step."""
         for each in self._of(name):
             force, torque = each.force_and_torque(self._pb)
             for end, sign in zip(each.ends(), (1.0, -1.0)):
@@ -164,7 +177,7 @@ class Attachments:
                     yield LinkWrench(end.link, scaled(sign, force), scaled(sign, torque), point)
 
     def clear(self) -> None:
-        """Removes all attachments, since all bodies are about to be removed."""
+        """Removes all attachments, before all bodies are removed."""
         for each in self._holding.values():
             self._pb.removeConstraint(each.constraint)
         if self._holding:
@@ -177,11 +190,15 @@ class Attachments:
         return [each for each in self._holding.values() if name in (each.parent.body.name, each.child.body.name)]
 
     def _end(self, key: str, name: str) -> _End:
-        """Returns the end on the body NAME, or on the link NAME/LINK.
+        """Returns an end of an attachment, without its pose.
+
+        Args:
+            key: `parent` or `child`, for messages.
+            name: `NAME` for the root link of a body, or `NAME/LINK`.
 
         Raises:
             UnknownNameError: If there is no such body or link.
-            ValueError: If it has no physics, or is soft.
+            ValueError: If the body is soft or has no physics.
         """
         body_name, _, link = name.partition("/")
         if body_name not in self._bodies:
@@ -219,7 +236,7 @@ class Attachments:
         self._note(attachment, what)
 
     def _release(self, attachment: _Attachment, what: str) -> str:
-        """Removes an attachment, and returns the sentence about it."""
+        """Removes an attachment, and returns a sentence about the removal that ends with `what`."""
         self._pb.removeConstraint(attachment.constraint)
         del self._holding[attachment.config.name]
         return self._note(attachment, what)
@@ -233,7 +250,7 @@ class Attachments:
 
 
 def _placed(config: AttachmentConfig, parent: _End, child: _End) -> tuple[_End, _End]:
-    """Returns both ends with their poses, by default the present ones."""
+    """Returns both ends with their configured poses; a missing pose is chosen so that the bodies need not move."""
     on_parent = None if config.parent_pose is None else config.parent_pose.pose
     on_child = None if config.child_pose is None else config.child_pose.pose
     child_in_parent = parent.link_pose().inverse() @ child.link_pose()

@@ -1,4 +1,4 @@
-"""Content of a world, with the log of how it was built."""
+"""The bodies, cameras and attachments of a world, and the log from which the world can be rebuilt."""
 
 import hashlib
 import struct
@@ -32,11 +32,11 @@ DIGEST_BYTES = 16
 
 
 def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
-    """Returns the BLAKE2b hash of the positions and velocities of all bodies and joints at a tick.
+    """Returns a BLAKE2b hash of the tick, and of names, positions and velocities of all bodies and joints.
 
-    It is the same in any process, since it depends on nothing but names, in their order, and the bytes of the numbers.
-    Motor targets are left out, since they show in the motion. Soft bodies are left out, since their motion is not
-    reproducible.
+    Equal states have equal hashes in all processes: names are sorted, and numbers are hashed as bytes. Motor targets
+    are not hashed, since differences between them soon change the motion. The motion of soft bodies is not hashed,
+    since it is not reproducible.
     """
     digest = hashlib.blake2b(struct.pack("<Q", tick), digest_size=DIGEST_BYTES)
     for name in sorted(bodies):
@@ -46,7 +46,10 @@ def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
 
 
 def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
-    """Returns the sensors of a body, those of other packages last, and its inputs by name.
+    """Returns a body's sensors and its inputs.
+
+    Returns:
+        The sensors, with configured sensors after the built-in sensors of the body, and the inputs indexed by name.
 
     Raises:
         PluginError: If a class of another package fails.
@@ -66,14 +69,14 @@ class WorldContents:
     """The bodies and cameras of a world with their sensors and inputs, and the log from which it can be rebuilt.
 
     Attributes:
-        bodies: By name.
-        stepping: The bodies that act before each tick, and the followers of poses.
-        cameras: By name; a new dictionary with every change.
-        inputs: By slot, `NAME/INPUT`; a new dictionary with every change.
-        sensors: Schedule of the sensors.
-        contacts: Contacts between bodies.
+        bodies: Bodies, indexed by name.
+        stepping: Bodies and pose followers whose `before_step` is called before each tick.
+        cameras: Cameras, indexed by name; each change creates a new dictionary.
+        inputs: Inputs, indexed by slot (`NAME/INPUT`); each change creates a new dictionary.
+        sensors: Schedule of all sensors.
+        contacts: Reader of the contacts between bodies.
         attachments: Attachments between bodies.
-        log: Log of all changes of the world.
+        log: Log of all changes of bodies and physics.
     """
 
     def __init__(self, pb: Client, clock: Clock, world: SensedWorld) -> None:
@@ -95,10 +98,10 @@ class WorldContents:
         """Names of bodies that had been added or removed before `rebuild`."""
 
     def body(self, name: str) -> Body:
-        """Returns the body of a name.
+        """Returns the body with a given name.
 
         Raises:
-            UnknownNameError: If there is none.
+            UnknownNameError: If there is no such body.
         """
         if name not in self.bodies:
             raise UnknownNameError("object", name, list(self.bodies))
@@ -138,7 +141,7 @@ class WorldContents:
         """Removes a body or a camera.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If no body or camera has this name.
         """
         if name in self.cameras:
             self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
@@ -150,15 +153,21 @@ class WorldContents:
         self.inputs = {slot: each for slot, each in self.inputs.items() if slot.split("/")[0] != name}
 
     def change_dynamics(self, name: str, link: str, change: ChangeDynamics) -> None:
-        """Changes the dynamics of a link, the root link if the name is empty; see `World.change_dynamics`."""
+        """Changes the dynamics of a link, see `World.change_dynamics`.
+
+        Args:
+            name: Name of the body.
+            link: Name of the link; empty for the root link.
+            change: New values of dynamics.
+        """
         self._append(LogEntry(name, "dynamics", (link, change)))
 
     def change_physics(self, change: PhysicsChange) -> None:
-        """Changes gravity, or the solver of contacts and joints; see `World.change_physics`."""
+        """Changes gravity, or parameters of PyBullet's engine; see `World.change_physics`."""
         self._append(LogEntry("", "physics", change))
 
     def clear(self) -> None:
-        """Removes everything but cameras and inputs, which `fill` or `rebuild` replaces."""
+        """Removes attachments, bodies, scheduled sensors and the log. Later, `fill` or `rebuild` replaces the rest."""
         self.attachments.clear()
         for body in self.bodies.values():
             body.remove()
@@ -169,10 +178,10 @@ class WorldContents:
         self.contacts.invalidate()
 
     def fill(self, loaded: LoadedWorld) -> None:
-        """Adds everything that is configured; cameras that exist already stay, with their present poses.
+        """Adds all configured objects, attachments and cameras. Existing cameras keep their present poses.
 
         Raises:
-            ConfigError: If something cannot be loaded; everything else is added.
+            ConfigError: If objects, attachments or cameras cannot be added; all others are added.
         """
         inputs_before = self.inputs
         self._config = loaded.config
@@ -194,25 +203,26 @@ class WorldContents:
             raise ConfigError(problems)
 
     def moved_cameras(self) -> Iterator[tuple[str, Pose]]:
-        """Yields slot and pose of each camera whose pose is not the configured one."""
+        """Yields the input slot and the pose of each camera that has been moved from its configured pose."""
         for name, camera in self.cameras.items():
             if camera.pose is not None and camera.pose != self._configured_pose(camera):
                 yield f"{name}/pose", camera.pose
 
     def move_cameras_back(self) -> None:
-        """Sets all cameras to their configured poses, those without one to none."""
+        """Sets the pose of each camera to the configured pose, or to None if no pose is configured."""
         for camera in self.cameras.values():
             camera.pose = self._configured_pose(camera)
 
     def rebuild(self, recipe: Recipe, changed: Iterable[str]) -> None:
-        """Replaces all contents by those of a recipe; without a window, the bodies are built in a fresh client.
+        """Replaces bodies and cameras by the contents of a recipe, in a fresh PyBullet client if there is no window.
 
         Args:
-            changed: Names of bodies that were added or removed since `fill`.
+            recipe: Recipe of the new contents.
+            changed: Names of bodies that were added or removed between `fill` and the making of the recipe.
 
         Raises:
-            ConfigError: If something cannot be loaded; then everything after it is missing.
-            InterfaceError: If PyBullet refuses.
+            ConfigError: If an object cannot be loaded. Later objects of the recipe are then missing.
+            InterfaceError: If PyBullet refuses an object.
         """
         inputs_before, cameras_before = self.inputs, self.cameras
         self.clear()
@@ -273,7 +283,7 @@ class WorldContents:
         return self._config.pose_of(camera.config.object_tf.tf_id)
 
     def _take_in(self, body: Body, config: BodyConfig) -> None:
-        """Registers the sensors and inputs of a body that was added, and has it act before each tick."""
+        """Registers sensors and inputs of a new body; adds the body and its pose follower to `stepping` if needed."""
         self._register(body.name, *sensors_and_inputs(body, config))
         if body.pose_follower is not None:
             self.stepping.append(body.pose_follower)
@@ -286,7 +296,7 @@ class WorldContents:
             raise ConfigError([Problem(file or name, "name", message)])
 
     def _append(self, entry: LogEntry) -> None:
-        """Applies an entry and logs it; the only way into the world."""
+        """Applies an entry to the world and logs the entry. All changes of bodies and physics use this method."""
         self.contacts.invalidate()
         apply(self._pb, self.bodies, entry)
         self.log.append(entry)

@@ -1,4 +1,4 @@
-"""Recognises the kind of a file by its keys, to report a file that is named where another kind belongs."""
+"""Recognises the kind of a file from its content, to report files of a wrong kind, such as a robot as a world."""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -16,18 +16,18 @@ _SECTIONS = {
     "visual_objects": "a visual object",
     "rgbd_sensors": "a camera",
 }
-"""Lists of the main file that name objects and cameras, with the kind of file that each takes."""
+"""Kinds of files, indexed by the key of the main file's list that contains files of this kind."""
 _OF_WORLDS = ("timeStep", "setGravity", "setPhysicsEngineParameter", "connect", *_SECTIONS)
 _OF_ROBOTS = ("setJointMotorControlArray", "setJointMotorControlArrayParameters", "is_visual_robot")
 _XML = {"robot": "a URDF", "launch": "a launch file", "sdf": "an SDF file", "mujoco": "an MJCF file"}
-"""Kinds of XML files by the element at the top."""
+"""Kinds of XML files, indexed by the tag of the root element."""
 
 
 def load_main_file(path: str) -> dict[str, Any]:
     """Returns the content of the main file of a world.
 
     Raises:
-        ConfigError: If it is not a YAML mapping, or is an object's file.
+        ConfigError: If the file is not a YAML mapping. If it is a known kind of XML file, the message says so.
     """
     return _load(path, "a world")
 
@@ -36,7 +36,7 @@ def load_object_file(path: str) -> dict[str, Any]:
     """Returns the content of an object's file.
 
     Raises:
-        ConfigError: If it is not a YAML mapping; a URDF is reported as such.
+        ConfigError: If the file is not a YAML mapping. If it is a known kind of XML file, the message says so.
     """
     return _load(path, "an object file")
 
@@ -55,7 +55,7 @@ def _load(path: str, expected: str) -> dict[str, Any]:
 
 
 def _kind_of_xml(path: str) -> str:
-    """Returns the kind of an XML file, empty if it is none of those known."""
+    """Returns the kind of an XML file; empty if the file is not XML or its kind is not known."""
     with suppress(ConfigError, OSError, UnicodeDecodeError):
         text = read_file(replace_package(path), MAX_BYTES).decode().lstrip()
         if text.startswith("<"):
@@ -65,10 +65,10 @@ def _kind_of_xml(path: str) -> str:
 
 
 def check_is_world(data: Mapping[str, Any], file: str) -> None:
-    """Checks that the content of a main file is not that of an object.
+    """Checks that the content of a main file is not the content of an object's or camera's file.
 
     Raises:
-        ConfigError: If it is; it says where to list the file.
+        ConfigError: If it is; the message names the list of the main file to which the file belongs.
     """
     section = _section_of(data)
     if section and not any(key in data for key in _OF_WORLDS):
@@ -77,16 +77,16 @@ def check_is_world(data: Mapping[str, Any], file: str) -> None:
 
 
 def check_is_listed_right(data: Mapping[str, Any], file: str, section: str, known: Collection[str]) -> None:
-    """Checks that an object's file is in the list for its kind.
+    """Checks that an object's file is in the main file's list for files of its kind.
 
     Args:
-        data: Its content.
-        file: Its name.
-        section: The list that names it.
-        known: Keys that objects of this list may have.
+        data: Content of the object's file.
+        file: Name of the object's file, for messages.
+        section: Key of the list that contains the object's file.
+        known: Keys that files in this list may have.
 
     Raises:
-        ConfigError: If it is of another kind; it names the right list.
+        ConfigError: If the file is of another kind; the message names the right list, unless the file is a world.
     """
     if section not in _SECTIONS:
         return
@@ -101,7 +101,7 @@ def check_is_listed_right(data: Mapping[str, Any], file: str, section: str, know
 
 
 def _section_of(data: Mapping[str, Any]) -> str:
-    """Returns the list in which a file belongs by its keys; empty if they do not decide it."""
+    """Returns the key of the main file's list to which a file belongs; empty if the file's keys do not decide this."""
     if "loadURDF" in data:
         return "robots" if any(key in data for key in _OF_ROBOTS) else "urdfs"
     for key, section in (

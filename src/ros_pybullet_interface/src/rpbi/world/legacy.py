@@ -1,4 +1,4 @@
-"""Keys of older worlds that still load: other spellings, and keys without effect."""
+"""Keys of older worlds that are still accepted: old spellings, and keys without effect."""
 
 import copy
 import logging
@@ -10,7 +10,7 @@ from custom_ros_tools.errors import Problem
 log = logging.getLogger(__name__)
 
 MAIN = "main"
-"""The section of the main YAML file itself; object files go by the list that names them, such as `robots`."""
+"""Section name of the main YAML file. The section of an object's file is the list that contains it, like `robots`."""
 
 LEGACY_KEYS: dict[str, dict[str, str]] = {
     "robots": {
@@ -21,10 +21,10 @@ LEGACY_KEYS: dict[str, dict[str, str]] = {
         "setJointMotorControlArrayParameters": "setJointMotorControlArray",
     },
 }
-"""By section: present keys by their old spellings."""
+"""For each section, the present spellings of keys, indexed by the old spelling."""
 
 FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
-"""Lists of objects that may follow a TF frame; without `tf_id` they stay where they are, as in the release."""
+"""Lists of objects that may follow a TF frame; in their files, an `object_tf` without `tf_id` is ignored."""
 _FOLLOW = "write tf_id with the name of a TF frame"
 _OBJECT_TF = {
     "object_tf.base": _FOLLOW,
@@ -37,7 +37,7 @@ _OBJECT_TF = {
     "object_tf.broadcast_tf": "the frame that it follows is on TF already",
     "object_tf.tf_frame_id": "the frame that it follows is on TF already",
 }
-"""Keys from before `tf_id`; the last release no longer reads them."""
+"""Advice for keys that were used before `tf_id` existed; these keys have no effect."""
 
 NO_EFFECT: dict[str, dict[str, str]] = {
     MAIN: {
@@ -55,25 +55,25 @@ NO_EFFECT: dict[str, dict[str, str]] = {
     **dict.fromkeys(FOLLOWERS[1:], _OBJECT_TF),
     "dynamic_objects": {"object_tf": "physics moves it; write basePosition and baseOrientation"},
 }
-"""By section: keys of older worlds that have no effect here, and what to do instead."""
+"""For each section, advice for keys of older worlds that have no effect, indexed by key."""
 
 
 def old_keys(section: str) -> dict[str, str]:
-    """Returns advice on each key of older worlds, by key; `object_tf.offset` is a key of the mapping `object_tf`."""
+    """Returns advice on keys of older worlds, indexed by key; a nested key is written like `object_tf.offset`."""
     spellings = {old: f"Old spelling: write {new}." for old, new in LEGACY_KEYS.get(section, {}).items()}
     return {**spellings, **{key: f"No effect: {advice}." for key, advice in NO_EFFECT.get(section, {}).items()}}
 
 
 def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
-    """Updates a mapping of an older release, with a logged warning for each key that was changed or has no effect.
+    """Replaces old spellings of keys, removes keys without effect, and logs a warning for each such key.
 
     Args:
-        section: `"main"`, or the list of the main file that names the object's file.
+        section: `"main"`, or the key of the main file's list that contains the object's file.
         data: Content of the file; it is not changed.
-        file: Name of the file.
+        file: Name of the file, for messages.
 
     Returns:
-        The mapping with today's keys, the old spelling of each renamed key, and the problems found.
+        A copy of the mapping with present keys, the old spellings indexed by present key, and the problems found.
     """
     current = copy.deepcopy(dict(data))
     spellings: dict[str, str] = {}
@@ -99,7 +99,7 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
 
 
 def _pop(data: dict[str, Any], key: str) -> Any:
-    """Removes a key, or one of an inner mapping (`object_tf.offset`), and returns its value, None if absent."""
+    """Removes a key, or a nested key such as `object_tf.offset`, and returns its value; None if the key is absent."""
     if key in data:
         return data.pop(key)
     outer, _, inner = key.partition(".")

@@ -1,4 +1,4 @@
-"""The load log of a world: all changes of its contents, from which it can be rebuilt."""
+"""The load log of a world: all changes of bodies and physics, from which the world can be rebuilt."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,12 +19,13 @@ from rpbi.plugins import plugin_errors, raise_plugin_error
 
 
 def refuse_non_finite(body: Body) -> None:
-    """Refuses a rigid body with numbers that are not finite, which would spread to all bodies that it touches.
+    """Checks that all masses, poses, joint limits and sizes of a rigid body are finite.
 
-    They come from URDFs with `nan`, which PyBullet loads without a warning, and from sizes that are too large.
+    Other numbers come from `nan` in a URDF, which PyBullet loads without a warning, or from sizes that are too large.
+    They would spread to all bodies that touch the body.
 
     Raises:
-        PhysicsError: If there is one; it names the link.
+        PhysicsError: If a number is not finite; the message names the link or joint.
     """
     for fault in _problems(body):
         raise PhysicsError(f"{body.name}: {fault} not finite: is something nan, inf or too large?")
@@ -54,21 +55,21 @@ def _are_finite(numbers: Iterable[float]) -> bool:
 
 
 _SAME_EVERY_TIME: dict[str, Any] = {
-    "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
-    "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; one global of the process that outlives its client
-    "numSubSteps": 0,  # also the default; it outlives a reset
-    "enableFileCaching": 1,  # likewise
+    "deterministicOverlappingPairs": 1,  # otherwise the order of contacts depends on earlier contacts
+    "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; a global variable of the process that outlives a client
+    "numSubSteps": 0,  # PyBullet's default; a changed value would outlive a reset
+    "enableFileCaching": 1,  # PyBullet's default; a changed value would outlive a reset
 }
 
 
 class LogEntry(NamedTuple):
-    """A change of the contents of a world; picklable.
+    """A change of the bodies or the physics of a world; picklable.
 
     Attributes:
-        name: The body that is changed, empty for the world itself.
-        what: The kind of change: `world` (set-up), `physics`, `add`, `dynamics` or `remove`.
-        arguments: The WorldConfig of `world`; the PhysicsChange of `physics`; type and configuration of a body for
-            `add`; link (empty for the root) and ChangeDynamics for `dynamics`; None for `remove`.
+        name: Name of the changed body; empty for `world` and `physics`.
+        what: Kind of the change: `world` (set-up), `physics`, `add`, `dynamics` or `remove`.
+        arguments: For `world`, the WorldConfig. For `physics`, the PhysicsChange. For `add`, type and configuration of
+            the body. For `dynamics`, link name (empty for the root link) and ChangeDynamics. For `remove`, None.
     """
 
     name: str
@@ -77,10 +78,10 @@ class LogEntry(NamedTuple):
 
 
 class LoadLogReader:
-    """Reads a load log incrementally.
+    """Reads the new entries of a load log.
 
     Args:
-        log: The log, which may grow at any time, and starts again when its world is reset.
+        log: The log, which may grow at any time. When the world is reset, the log is cleared and starts again.
     """
 
     def __init__(self, log: Sequence[LogEntry]) -> None:
@@ -89,7 +90,7 @@ class LoadLogReader:
         self._count = 0
 
     def drain(self) -> tuple[LogEntry, ...]:
-        """Returns the entries since the last call; all entries of a restarted log."""
+        """Returns the entries that were added since the last call; if the log was restarted, returns all entries."""
         if self._log and self._log[0] is not self._first:
             self._first, self._count = self._log[0], 0
         new = tuple(self._log[self._count :])
@@ -98,19 +99,19 @@ class LoadLogReader:
 
 
 def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
-    """Applies an entry to a world; when it raises, the world is unchanged.
+    """Applies an entry of a load log to a world. If adding a body fails, the world is unchanged.
 
     Args:
-        pb: The client.
-        bodies: The world's bodies by name, which is changed.
-        entry: The entry.
+        pb: Client of the world.
+        bodies: Bodies of the world, indexed by name; this mapping is updated.
+        entry: Entry to apply.
 
     Raises:
-        ConfigError: If a configuration does not fit.
-        PhysicsError: If PyBullet refuses.
+        ConfigError: If a body cannot be built as configured.
+        PhysicsError: If PyBullet refuses the change.
         PluginError: If a class of another package fails.
-        UnknownNameError: If there is no body or link of that name.
-        ValueError: If a change of dynamics is invalid.
+        UnknownNameError: If there is no such body or link.
+        ValueError: If the change of dynamics is not valid for the link.
     """
     if entry.what in ("remove", "dynamics") and entry.name not in bodies:
         raise UnknownNameError("object", entry.name, list(bodies))
@@ -131,7 +132,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         check_files(config)
         before = _body_ids(pb)
         try:
-            make: Any = BODY_TYPES.find(kind)  # each with a constructor of its own
+            make: Any = BODY_TYPES.find(kind)  # Any, since the signatures of constructors differ
             body = make(pb, config)
             if not body.is_soft:
                 refuse_non_finite(body)
@@ -142,16 +143,16 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
                 pb.removeBody(body_id)
             if isinstance(error, Exception):
                 raise_plugin_error(BODY_TYPES.find(kind), f"making '{entry.name}'", error)
-            if isinstance(error, (pybullet.error, OverflowError, SystemError)):  # the last is a fault of PyBullet's
+            if isinstance(error, (pybullet.error, OverflowError, SystemError)):  # SystemError: a fault in PyBullet
                 raise PhysicsError(f"{entry.name}: {error}") from error
             raise
 
 
 def replay(pb: Client, entries: Iterable[LogEntry]) -> dict[str, Body]:
-    """Rebuilds a world on a client.
+    """Rebuilds a world in a client by applying the entries of a load log in order.
 
     Returns:
-        Its bodies by name.
+        The bodies of the world, indexed by name.
     """
     bodies: dict[str, Body] = {}
     for entry in entries:
@@ -160,7 +161,7 @@ def replay(pb: Client, entries: Iterable[LogEntry]) -> dict[str, Body]:
 
 
 def _set_up(pb: Client, config: WorldConfig) -> None:
-    """Clears the client and sets gravity, time step and the engine's parameters."""
+    """Clears the client, and sets search paths, time step, gravity and the engine's parameters."""
     pb.resetSimulation(**config.resetSimulation.kwargs())
     pb.is_deformable = bool((config.resetSimulation.flags or 0) & pybullet.RESET_USE_DEFORMABLE_WORLD)
     for path in config.setAdditionalSearchPath:
@@ -174,8 +175,8 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
 def change_physics(pb: Client, bodies: Iterable[Body], change: PhysicsChange) -> None:
     """Changes gravity, or parameters of the engine.
 
-    Sleeping bodies would not notice a change of gravity, so they are woken. Those in maximal coordinates are not:
-    PyBullet would let them sleep afterwards, even where sleep is disabled.
+    A change of gravity wakes sleeping bodies, which would otherwise not react to it. Bodies in maximal coordinates are
+    not woken, since PyBullet would then let these bodies sleep later even if their sleep is disabled.
     """
     arguments = change.kwargs()
     if isinstance(change, SetGravity):

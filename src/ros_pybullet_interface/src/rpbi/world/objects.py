@@ -1,4 +1,4 @@
-"""One object of a world: its type and its validated configuration."""
+"""Objects of a world: their types, and the validation of their configurations."""
 
 import re
 from collections.abc import Mapping
@@ -16,22 +16,22 @@ from .legacy import modernise
 _Model = TypeVar("_Model", bound=ConfigModel)
 
 RESERVED_NAME = "world"
-"""No object may have this name: `rpbi/world` is the frame of all poses."""
+"""Name that objects must not have, since `rpbi/world` is the world frame."""
 OWN_TYPES = Body.section
-"""List of the main file for objects whose files name their type."""
+"""Key of the main file's list of objects whose files contain their type."""
 TYPE = "type"
-"""Key of an object's file for that: a key of the table of body types, or `module:Class`."""
+"""Key in an object's file for the type of the object: a key of BODY_TYPES, or `module:Class`."""
 
 
 @dataclass(frozen=True)
 class ObjectConfig:
-    """One object of a world.
+    """An object that a world is to be built with.
 
     Attributes:
-        type: Key of its class in the table of body types, or `module:Class`.
-        config: Its validated configuration.
-        file: The file it came from, as the user wrote it.
-        path: Path of that file; empty if there is none.
+        type: Type of the object: a key of BODY_TYPES, or `module:Class`.
+        config: Validated configuration of the object.
+        file: File of the configuration, as the user wrote its name.
+        path: Resolved path of this file; empty if the configuration is not from a file on this machine.
     """
 
     type: str
@@ -41,7 +41,10 @@ class ObjectConfig:
 
 
 def object_sections() -> dict[str, type[BodyConfig]]:
-    """Returns the lists of the main file that name objects, in the order of loading, each with its model."""
+    """Returns the configuration models of objects, indexed by the main file's list of such objects.
+
+    The order is the order of loading: soft objects come last.
+    """
     rigid: dict[str, type[BodyConfig]] = {}
     soft: dict[str, type[BodyConfig]] = {}
     for body_type in BODY_TYPES.values():
@@ -50,12 +53,12 @@ def object_sections() -> dict[str, type[BodyConfig]]:
 
 
 def type_of(section: str, data: Any) -> str:
-    """Returns the type of an object: its own key, else that of the list in the main file that names it.
+    """Returns the type of an object: the value of `type` in its file, or else a type that belongs to its list.
 
     Args:
-        section: The list, such as `robots`.
-        data: Content of the object's file. If it is not a mapping, some type of the list is returned; its check then
-            fails.
+        section: Key of the main file's list that contains the object, such as `robots`.
+        data: Content of the object's file. If it is not a mapping, the list's first type is returned, and `load_object`
+            then fails.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:
@@ -67,16 +70,17 @@ def type_of(section: str, data: Any) -> str:
 
 
 def load_object(kind: str, data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> BodyConfig:
-    """Validates one object.
+    """Validates the configuration of one object, and returns it as a model.
 
     Args:
-        kind: Key of BODY_TYPES, or `module:Class`.
-        data: Content of its file; it is not changed.
-        file: Name of that file.
-        context: For files: `file` (the path, if `file` is not it), `search_paths`, `robot_description`.
+        kind: Type of the object: a key of BODY_TYPES, or `module:Class`.
+        data: Content of the object's file; it is not changed.
+        file: Name of the object's file, for messages.
+        context: Context in which file names are resolved, with the optional keys `file` (path of the object's file, if
+            `file` is not a path), `search_paths` and `robot_description`.
 
     Raises:
-        ConfigError: With all of its problems, an unknown type included.
+        ConfigError: If the type is unknown or the content is not valid; the error lists all problems.
     """
     problems = [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
     try:
@@ -108,7 +112,18 @@ def _section_and_model(kind: str, file: str) -> tuple[str, type[BodyConfig]]:
 def parse_section(
     section: str, data: Mapping[str, Any], file: str, model: type[_Model], context: Mapping[str, Any]
 ) -> _Model:
-    """Validates a mapping, old spellings included; problems name the key as the user spelt it."""
+    """Validates a mapping and returns it as a model; accepts old spellings of keys.
+
+    Args:
+        section: `"main"`, or the key of the main file's list that contains the object.
+        data: Content of the file; it is not changed.
+        file: Name of the file, for messages.
+        model: Model of the content.
+        context: Context in which file names are resolved, see `load_object`.
+
+    Raises:
+        ConfigError: If the content is not valid; problems name keys as the user spelt them.
+    """
     if not isinstance(data, Mapping):
         return model.parse(data, file)
     current, spellings, problems = modernise(section, data, file)
@@ -129,6 +144,6 @@ def _respelt(key: str, spellings: Mapping[str, str]) -> str:
 
 
 def name_in(data: Any) -> str | None:
-    """Returns the name of an object, if it has any."""
+    """Returns the value of `name` in the content of a file; None if there is no such key or no text."""
     name = data.get("name") if isinstance(data, Mapping) else None
     return name if isinstance(name, str) else None

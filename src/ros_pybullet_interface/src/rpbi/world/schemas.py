@@ -1,4 +1,4 @@
-"""JSON Schemas of all YAML files that a world is made of."""
+"""JSON Schemas of the YAML files of a world: main file, objects and cameras."""
 
 import copy
 
@@ -21,27 +21,27 @@ from .loading import CAMERAS
 from .objects import OWN_TYPES, TYPE, object_sections
 
 WORLD = "world"
-"""Name of the main file among the kinds of YAML files."""
+"""Name of the main file's kind, among the kinds of YAML files."""
 _FILE_NAME = {"type": "string", "minLength": 1}
 _ENTRY = "entry"
-"""Name of the definition of an entry of a list in the main file."""
+"""Name of the schema definition for an entry of a list in the main file."""
 
 
 def sections() -> dict[str, type[ConfigModel]]:
-    """Returns the model of the files in each list of the main file, by list."""
+    """Returns the models of object and camera files, indexed by the key of the main file's list."""
     return {**object_sections(), CAMERAS: RgbdSensorConfig}
 
 
 def kind_of(section: str) -> str:
-    """Returns the kind of the files in a list, such as `robot` for `robots`."""
+    """Returns the kind of the files in a list of the main file, such as `robot` for the list `robots`."""
     return section.removesuffix("s")
 
 
 def file_schemas() -> dict[str, Schema]:
-    """Returns the schemas by kind of file (`world`, `robot`, `dynamic_object` and so on), without keys of older worlds.
+    """Returns the schemas indexed by kind of file (`world`, `robot`, `dynamic_object` and so on), without old keys.
 
-    Rules beyond a schema, such as unique names or existing files, are left to the models: a schema accepts all that
-    they accept.
+    A schema accepts everything that the model accepts. Only the models check rules that a schema cannot express, such
+    as unique names or existing files.
     """
     files = json_schemas(
         {WORLD: main_file_model(sections())} | {kind_of(section): model for section, model in sections().items()}
@@ -58,10 +58,11 @@ def file_schemas() -> dict[str, Schema]:
 
 
 def schemas() -> dict[str, Schema]:
-    """Returns the schemas for editors, by kind of file: `file_schemas` with keys of older worlds and with overrides.
+    """Returns the schemas for editors, indexed by kind of file.
 
-    An entry of a list of the main file may override any key of its file and requires none: its schema is the definition
-    `entry` in the file beside it, such as `robot.schema.json#/$defs/entry`.
+    They extend `file_schemas` by keys of older worlds, and by entries of the main file's lists with overrides. Such an
+    entry names a file and may override every key of the file. The schema of an entry is the definition `entry` in the
+    schema of the file's kind, such as `robot.schema.json#/$defs/entry`.
     """
     files = file_schemas()
     world = _with_old_keys(files[WORLD], MAIN)
@@ -75,7 +76,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _of_any_type(schema: Schema) -> Schema:
-    """Returns the schema of files that name their own type, which may have further keys."""
+    """Returns the schema of object files with the key `type`, to which a type may add further keys."""
     known = {"type": "string", "enum": list(BODY_TYPES)}
     own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     kind = {"description": "Its class, as `module:Class`, or the name of a type.", "anyOf": [own, known]}
@@ -89,7 +90,7 @@ def _of_any_type(schema: Schema) -> Schema:
 
 
 def _with_entry(schema: Schema) -> Schema:
-    """Returns a schema extended by the definition of an entry with `file` and the keys that differ."""
+    """Returns a schema, extended by the definition of a list entry with `file` and overrides of the file's keys."""
     path = {"description": "File that has the keys which are not here.", **_FILE_NAME}
     entry = {
         "description": "A file, and what is different for this one.",
@@ -109,7 +110,7 @@ def _with_entry(schema: Schema) -> Schema:
 
 
 def _optional(schema: Schema, root: Schema) -> Schema:
-    """Returns a schema of the same keys, all optional, also in nested mappings, except in lists."""
+    """Returns a schema in which all keys are optional, also in nested mappings, but not in mappings within lists."""
     result = {key: value for key, value in schema.items() if key != "required"}
     if "properties" in schema:
         result["properties"] = {key: _optional(value, root) for key, value in schema["properties"].items()}
@@ -122,7 +123,7 @@ def _optional(schema: Schema, root: Schema) -> Schema:
 
 
 def _required(schema: Schema, root: Schema) -> Schema:
-    """Returns the part of a mapping's schema that makes keys required."""
+    """Returns only those parts of a mapping's schema that make keys required, also in nested mappings."""
     mapping = mapping_in(schema, root) if "items" not in schema else None
     if mapping is None:
         return {}
@@ -133,7 +134,7 @@ def _required(schema: Schema, root: Schema) -> Schema:
 
 
 def _with_old_keys(schema: Schema, section: str) -> Schema:
-    """Returns a schema with the keys of older worlds that still load."""
+    """Returns a schema, extended by the keys of older worlds that are still accepted, marked as deprecated."""
     result = copy.deepcopy(schema)
     properties = result["properties"]
     for key, advice in old_keys(section).items():

@@ -1,4 +1,4 @@
-"""All sensors of a world, and when each is due."""
+"""The schedule of all sensors of a world: at which ticks each sensor is read."""
 
 import heapq
 import logging
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class _Scheduled:
-    """A sensor and when it is due."""
+    """A sensor and the ticks at which it is due."""
 
     def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
         self.sensor = sensor
@@ -25,7 +25,7 @@ class _Scheduled:
         self.schedule_from(tick, dt_ns)
 
     def schedule_from(self, tick: int, dt_ns: int) -> None:
-        """Schedules the sensor by its rate after a tick; a sensor that is off keeps its schedule."""
+        """Computes the first tick after `tick` at which the sensor is due; does nothing if its rate is 0."""
         if self.sensor.hz:
             self.schedule = Schedule(self.sensor.hz, dt_ns)
             self.next_tick = self.schedule.next_due(tick)
@@ -61,15 +61,15 @@ class SensorSchedule:
         """Names and rates of sensors in warnings so far; a reset does not repeat them."""
 
     def __contains__(self, name: str) -> bool:
-        """Whether a body or camera of that name was added, with sensors or without."""
+        """Returns whether a body or camera with this name was added, even if it has no sensors."""
         return name in self._scheduled
 
     def __getitem__(self, name: str) -> list[Sensor]:
-        """Returns the sensors of a body, or the camera of that name."""
+        """Returns the sensors of a body; for the name of a camera, returns a list with the camera."""
         return [each.sensor for each in self._scheduled[name]]
 
     def add(self, name: str, sensors: Sequence[Sensor]) -> None:
-        """Adds the sensors of a body."""
+        """Adds the sensors of a body, or a camera."""
         dt_ns, tick = self._clock.dt_ns, self._clock.tick
         self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
@@ -78,7 +78,7 @@ class SensorSchedule:
         self._rebuild()
 
     def set_rate(self, name: str, number: int, hz: float) -> None:
-        """Changes how often a sensor is read from this tick on, see `World.set_sensor_rate`."""
+        """Changes the rate [Hz] of a sensor from the present tick on, see `World.set_sensor_rate`."""
         scheduled = self._scheduled[name]
         if not 0 <= number < len(scheduled):
             raise ValueError(f"'{name}' has {len(scheduled)} sensors, got number {number}")
@@ -91,26 +91,26 @@ class SensorSchedule:
         self._rebuild()
 
     def remove(self, name: str) -> None:
-        """Removes the sensors of a body."""
+        """Removes the sensors of a body, or a camera."""
         del self._scheduled[name]
         self._rebuild()
 
     @property
     def keep_state(self) -> bool:
-        """Whether one of the sensors keeps a state of its own."""
+        """Whether at least one sensor has internal state, see `Sensor.keeps_state`."""
         return any(each.sensor.keeps_state for each in self._all())
 
     def restart(self) -> None:
-        """Schedules all sensors as at tick 0."""
+        """Forgets the ticks of all samples, and schedules all sensors from the present tick on."""
         for each in self._all():
             each.read_tick = -1
         self.reschedule()
 
     def reschedule(self) -> None:
-        """Schedules all sensors by their rates from the present tick on, whatever a file has set.
+        """Schedules all sensors from the present tick on, according to their present rates.
 
         Raises:
-            ValueError: If a rate is not finite, or negative.
+            ValueError: If the rate of a sensor is negative or not finite, for instance because a file contained it.
         """
         for each in self._all():
             if not 0.0 <= each.sensor.hz < math.inf:
@@ -130,7 +130,7 @@ class SensorSchedule:
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
     def act(self, method: str) -> None:
-        """Calls `before_step` or `after_step` of the sensors that act at every tick."""
+        """Calls a method, `before_step` or `after_step`, of all sensors in `watching`."""
         for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)
@@ -140,13 +140,13 @@ class SensorSchedule:
 
     @property
     def idle_ticks(self) -> float:
-        """Number of coming ticks at which no sensor acts or is due; inf without sensors."""
+        """Number of ticks before the next tick at which a sensor acts or is due; inf without sensors."""
         if self.watching:
             return 0.0
         return self._queue[0][0] - self._clock.tick - 1 if self._queue else math.inf
 
     def read_due(self) -> list[Any]:
-        """Returns samples of the sensors that are due at this tick."""
+        """Reads the sensors that are due at the present tick, and returns their samples."""
         tick = self._clock.tick
         queue = self._queue
         if not queue or queue[0][0] > tick:
@@ -161,12 +161,12 @@ class SensorSchedule:
         return _present(samples)
 
     def read_rest(self) -> list[Any]:
-        """Returns samples of the sensors that were not read at this tick yet."""
+        """Reads all sensors that have not been read at the present tick, and returns their samples."""
         tick = self._clock.tick
         return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Returns the samples that would have been due between two ticks if the world had not been stopped."""
+        """Reads sensors of a stopped world as if it were running, see `World.read_idle`; returns their samples."""
         now = self._clock.tick
         return _present(each.read(now) for each in self._rated() if each.schedule.is_due(tick, since))
 
@@ -180,15 +180,15 @@ class SensorSchedule:
             yield from scheduled
 
     def _rated(self) -> Iterator[_Scheduled]:
-        """Yields the sensors that have a rate and are wanted."""
+        """Returns an iterator over the sensors that have a rate other than 0 and a receiver of their samples."""
         return (each for each in self._all() if each.sensor.hz and each.sensor.wanted)
 
 
 def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:
-    """Returns whether a type of sensors does anything before or after the physics of each tick."""
+    """Returns whether a sensor class overrides `before_step` or `after_step`."""
     return sensor_type.before_step is not Sensor.before_step or sensor_type.after_step is not Sensor.after_step
 
 
 def _present(samples: Any) -> list[Any]:
-    """Returns the samples without None."""
+    """Returns the samples that are not None."""
     return [sample for sample in samples if sample is not None]

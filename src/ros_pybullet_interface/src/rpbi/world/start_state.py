@@ -1,4 +1,4 @@
-"""The start of a world, to which it returns without loading its bodies again."""
+"""Fast resets: restores the start state of a world without loading its bodies again."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from .contents import WorldContents
 from .saved.command_log import MAX_KEPT, CommandLog, WorldCommand
 
 MAX_LOGGED = 1_000
-"""Number of entries of the load log beyond which the world is built again, so that the log stays short."""
+"""Largest number of new load log entries for a fast reset; beyond it, the world is built again to shorten the log."""
 MAX_FREE = 1
-"""Number of free bodies beyond which the world is built again."""
+"""Largest number of free bodies for a fast reset; worlds with more free bodies are always built again."""
 APART_M = 1_000.0
-"""Distance of two bodies without contacts, from base to base [m]."""
+"""Distance between the bases of bodies at which bodies certainly do not touch [m]."""
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 UNDONE = ("halt", "pause", "move", "stop_motion", "set_joint_state")
-"""Commands that restoring the state undoes, whatever their value."""
+"""Kinds of commands whose effects are undone by restoring the state, for all command values."""
 _SLEEPING = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 _FIELDS = {to_camel(field): field for field in LinkDynamics._fields}
 
 
 class DynamicsChange(NamedTuple):
-    """A change of the dynamics of a link; `link` is empty for the root."""
+    """A change of a link's dynamics: name of the body, name of the link (empty for the root link), and new values."""
 
     name: str
     link: str
@@ -39,19 +39,19 @@ class DynamicsChange(NamedTuple):
 
 
 class StartState:
-    """The state that a world starts in, before its first tick.
+    """The state of a world before its first tick, saved in PyBullet's memory.
 
-    PyBullet's `restoreState` restores it to the last bit, since there are no contacts yet whose history it would lose.
-    It restores neither set points of motors, which robots restart, nor dynamics, which are changed back. After any
-    other change the world has to be built again.
+    PyBullet's `restoreState` restores this state bit by bit. It would lose the history of contacts, but before the
+    first tick contacts have no history. Motor targets and dynamics are not part of PyBullet's saved state: `restore`
+    restarts the robots, and undoes changes of dynamics. After any other change, the world has to be built again.
 
-    Two states of PyBullet cannot be restored: sleep, and the order of pairs in its search for contacts, in which it
-    solves them. The order matters with several free bodies: one of 164 random heaps moved differently. Such worlds are
-    not suitable.
+    A world is not suitable if its bodies may sleep, since PyBullet does not restore sleep. Worlds with several free
+    bodies are not suitable either: PyBullet does not restore the order of body pairs in collision detection, in which
+    contacts are solved. In a test, one of 164 random heaps of bodies moved differently for this reason.
 
     Args:
-        pb: The client.
-        contents: Content of the world at tick 0.
+        pb: Client of the world.
+        contents: Contents of the world at tick 0.
     """
 
     def __init__(self, pb: Client, contents: WorldContents) -> None:
@@ -64,7 +64,7 @@ class StartState:
 
     @staticmethod
     def suits(contents: WorldContents) -> bool:
-        """Returns whether a world is suitable: nothing in it has a state that cannot be restored."""
+        """Returns whether the start state of a world can be restored exactly, see the class."""
         bodies = contents.bodies.values()
         others = (is_foreign(each) or each.is_soft or _is_rigid(each) or _may_sleep(each) for each in bodies)
         if any(others) or contents.attachments.configs or contents.sensors.keep_state:
@@ -72,13 +72,13 @@ class StartState:
         return sum(map(_is_free, bodies)) <= MAX_FREE
 
     def restore(self, commands: CommandLog) -> bool:
-        """Returns the world to its start.
+        """Restores the start state if the commands since the start can be undone.
 
         Args:
-            commands: All commands since then.
+            commands: All commands since the start.
 
         Returns:
-            Whether that succeeded; otherwise the world has to be built again.
+            Whether the state was restored; otherwise the world has to be built again.
         """
         if len(self._contents.log) - self._logged > MAX_LOGGED or commands.count > MAX_KEPT:
             return False
@@ -93,19 +93,19 @@ class StartState:
         return all([body.restart() for body in self._contents.bodies.values()])
 
     def close(self) -> None:
-        """Removes the state from PyBullet."""
+        """Deletes the saved state from PyBullet's memory."""
         self._pb.removeState(self._state_id)
 
     def _end_contacts(self) -> None:
-        """Moves all bodies apart, so that PyBullet drops their contacts, which `restoreState` would keep."""
+        """Moves all bodies far apart, so that PyBullet drops their contacts; `restoreState` alone would keep these."""
         for index, body in enumerate(self._contents.bodies.values()):
             self._pb.resetBasePositionAndOrientation(body.body_id, (0.0, 0.0, APART_M * (index + 1)), NO_TURN)
         self._pb.performCollisionDetection()
 
     def _undoing(self, commands: CommandLog) -> Iterator[DynamicsChange | None]:
-        """Yields the changes of dynamics that undo those of commands, None for a command that cannot be undone."""
+        """Yields the changes of dynamics that undo commands; None for each command that cannot be undone."""
         for command in commands.since(0)[1]:
-            if command.what == "dynamics" and not command.tick:  # a later change may have renewed contacts
+            if command.what == "dynamics" and not command.tick:  # after tick 0, a change may have renewed contacts
                 yield self._undo_dynamics(command.name, command.value)
             elif not self._is_undone(command):
                 yield None
@@ -113,7 +113,7 @@ class StartState:
     def _is_undone(self, command: WorldCommand) -> bool:
         if command.what == "input":
             name, _, key = command.name.partition("/")
-            return key == "target" or name in self._contents.cameras  # which keep their poses
+            return key == "target" or name in self._contents.cameras  # cameras keep their poses
         if command.what == "teleport":
             return self._contents.bodies[command.name].object_tf is None
         return command.what in UNDONE
@@ -127,18 +127,18 @@ class StartState:
         values: dict[str, Any] = {key: getattr(at_start, _FIELDS[key]) for key in keys}
         if "mass" in values:
             values["localInertiaDiagonal"] = at_start.local_inertia_diagonal
-        if any(value == -1.0 for value in values.values()):  # was never set, and PyBullet cannot unset it
+        if any(value == -1.0 for value in values.values()):  # -1 means that it was not set; PyBullet cannot unset it
             return None
         return DynamicsChange(name, link, ChangeDynamics(**values))
 
 
 def _is_rigid(body: Body) -> bool:
-    """Returns whether the solver of rigid bodies moves a body, which `restoreState` refuses."""
+    """Returns whether a body has maximal coordinates, which `restoreState` does not support."""
     return bool(body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES)
 
 
 def _may_sleep(body: Body) -> bool:
-    """Returns whether PyBullet may put a body to sleep, which `restoreState` leaves as it is."""
+    """Returns whether PyBullet may put a body to sleep; `restoreState` does not restore sleep."""
     config: Any = getattr(body, "config", None)
     state = getattr(getattr(config, "changeDynamics", None), "activationState", None) or 0
     flags = getattr(getattr(config, "loadURDF", None), "flags", None) or 0
@@ -146,5 +146,5 @@ def _may_sleep(body: Body) -> bool:
 
 
 def _is_free(body: Body) -> bool:
-    """Returns whether forces move the base of a body."""
+    """Returns whether the base of a body can be moved by forces."""
     return body.has_physics and not getattr(body, "has_fixed_base", False) and body.dynamics_info(-1)[0] > 0.0

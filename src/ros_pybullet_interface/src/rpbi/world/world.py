@@ -1,4 +1,4 @@
-"""A simulated world: it owns one PyBullet client, the bodies in it and the tick."""
+"""A simulated world: one PyBullet client with bodies and sensors, advanced tick by tick."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ from .start_state import StartState
 log = logging.getLogger(__name__)
 
 IDLE_ROW_S = 0.0004
-"""Wall time that idle ticks in a row are to take [s] before the world looks for inputs again."""
+"""Intended wall time [s] between two checks for new inputs in `World.run_idle`."""
 MAX_IDLE_ROW = 20
-"""Largest number of idle ticks in a row, since the next ones may take much longer than the last."""
+"""Largest number of ticks between two checks for new inputs, since later ticks may take much longer than expected."""
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -56,7 +56,7 @@ _Result = TypeVar("_Result")
 def _recorded(
     method: Callable[Concatenate[World, _Arguments], _Result],
 ) -> Callable[Concatenate[World, _Arguments], _Result]:
-    """Marks a method whose changes of PyBullet are repeated by recorded commands; see `ChangeWatch`."""
+    """Decorates a method that records its changes of PyBullet as commands; `ChangeWatch` then ignores the changes."""
 
     @wraps(method)
     def call(world: World, *arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
@@ -71,19 +71,18 @@ def _recorded(
 
 
 class World:
-    """A world of bodies and sensors that moves by ticks.
+    """A simulated world of bodies and sensors, which advances in ticks.
 
-    Only the thread that made the world calls its methods; the exceptions are `put` and the mailbox, through which
-    other threads reach it.
+    Only the thread that made the world may call its methods. Other threads use `put` and the mailbox.
 
     Args:
-        loaded: The validated configuration of the world and of its contents at the start.
-        simulated_time: Whether stamps are simulated time, else wall time.
-        connection_mode: PyBullet's connection mode; by default that of the configuration.
+        loaded: The validated configuration of the world, its objects and its cameras.
+        simulated_time: True: stamps are simulated time. False: stamps are wall time.
+        connection_mode: PyBullet's connection mode; by default the mode in the configuration.
 
     Raises:
-        ConfigError: If a configuration does not fit, for instance names a joint that the robot lacks.
-        PhysicsError: If PyBullet does not connect or cannot load something.
+        ConfigError: If something cannot be built as configured, for instance a robot lacks a configured joint.
+        PhysicsError: If PyBullet does not connect.
     """
 
     def __init__(self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: int | None = None) -> None:
@@ -135,10 +134,14 @@ class World:
 
     @classmethod
     def from_file(cls, path: str, **options: Any) -> World:
-        """Builds the world that a main YAML file describes; the options are further arguments of the constructor.
+        """Builds the world that a main YAML file describes.
+
+        Args:
+            path: The main YAML file.
+            options: Further arguments of the constructor.
 
         Raises:
-            ConfigError: If anything in the file, or in a file that it names, is wrong; it lists all problems.
+            ConfigError: If the main file, or a file named in it, is not valid; the error lists all problems.
         """
         return cls(load_world(path), **options)
 
@@ -147,12 +150,12 @@ class World:
         """Builds the world that a recording describes, without a window.
 
         Args:
-            description: The description.
-            trust: Packages that it may import, besides `rpbi` and those that this program's configurations have used,
-                for types of the user's own. None: any package, for a recording that this program made.
+            description: Description of the recorded world.
+            trust: Packages from which the recording may import classes, such as types of your own. `rpbi` and packages
+                used in this program's configurations are always allowed. None allows all packages.
 
         Raises:
-            ConfigError: If it cannot be built here, for instance because a file is missing.
+            ConfigError: If the world cannot be built on this machine, for instance because a file is missing.
         """
         with trusting(trust):
             return cls(description.load(trust), connection_mode=pybullet.DIRECT)
@@ -161,17 +164,17 @@ class World:
     def from_state(
         cls, state: WorldState | str | Path, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS
     ) -> World:
-        """Builds a world, without a window, and restores a saved state in it.
+        """Builds the world of a saved state without a window, and simulates it until it reaches the state.
 
         Args:
             state: The state, or a file that `WorldState.write` wrote.
-            trust: Packages that it may import, see `from_description`.
-            max_ticks: Age of a state beyond which it is refused.
+            trust: Packages from which the state may import classes, see `from_description`.
+            max_ticks: Largest number of ticks that may have to be simulated to reach the state.
 
         Raises:
-            ConfigError: If the file cannot be read, or the world cannot be built here.
-            InterfaceError: If the state is too old, or the world does not reach the same state here, for instance
-                with another PyBullet.
+            ConfigError: If the file cannot be read, or the world cannot be built on this machine.
+            InterfaceError: If more than `max_ticks` ticks have to be simulated, or the world does not reach the same
+                state, for instance because PyBullet has another version.
         """
         state = state if isinstance(state, WorldState) else WorldState.read(state)
         state.require_short(max_ticks)
@@ -194,16 +197,16 @@ class World:
 
     @_recorded
     def add(self, kind: str, config: BodyConfig | Mapping[str, Any], file: str | None = None) -> Body:
-        """Adds a body; when it raises, the world is as it was.
+        """Adds a body. After an error, the world is unchanged.
 
         Args:
-            kind: A key of BODY_TYPES, or `module:Class`.
-            config: Configuration of that type, or a mapping of its keys.
-            file: Where it came from, for messages; without it, they have the body's name.
+            kind: Type of the body: a key of BODY_TYPES, or `module:Class`.
+            config: Configuration of the body, or a mapping of configuration keys to values.
+            file: File of the configuration, for messages; the body's name by default.
 
         Raises:
-            ConfigError: If the name is taken or the configuration does not fit.
-            PhysicsError: If PyBullet refuses.
+            ConfigError: If the name is taken or the configuration is not valid.
+            PhysicsError: If PyBullet refuses the body.
             PluginError: If a class of another package fails.
         """
         if isinstance(config, Mapping):
@@ -213,16 +216,16 @@ class World:
         return body
 
     def add_camera(self, config: RgbdSensorConfig | Mapping[str, Any], file: str | None = None) -> RgbdSensor:
-        """Adds a camera; when it raises, the world is as it was.
+        """Adds a camera. After an error, the world is unchanged.
 
-        The first one, and the next to come once that has gone, has the topics `rpbi/camera/...`.
+        The first camera has the topics `rpbi/camera/...`. If it is removed, the next added camera gets these topics.
 
         Args:
-            config: Its configuration, or a mapping of its keys.
-            file: Its file, for messages; without it, they have the camera's name.
+            config: Configuration of the camera, or a mapping of configuration keys to values.
+            file: File of the configuration, for messages; the camera's name by default.
 
         Raises:
-            ConfigError: If the name exists already, or the mapping does not fit.
+            ConfigError: If the name is taken, or the mapping is not a valid configuration.
         """
         if isinstance(config, Mapping):
             config = RgbdSensorConfig.parse(config, file or str(config.get("name", "camera")))
@@ -235,7 +238,7 @@ class World:
         """Removes a body or a camera.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If no body or camera has this name.
         """
         self._contents.remove(name)
         self._pushed.pop(name, None)
@@ -244,30 +247,30 @@ class World:
         self.apply_inputs()  # waiting inputs must not reach a later body of the same name
 
     def dynamics(self, object_name: str) -> LinkDynamics:
-        """Returns the dynamics of an object or a link.
+        """Returns the dynamics of a link, such as mass and friction.
 
         Args:
-            object_name: `NAME`, or `NAME/LINK` for one of its links.
+            object_name: `NAME` for the root link of a body, or `NAME/LINK`.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If there is no such body or link.
         """
         name, _, link = object_name.partition("/")
         return read_dynamics(self._contents.body(name), link)
 
     @_recorded
     def change_dynamics(self, object_name: str, change: ChangeDynamics | Mapping[str, Any]) -> None:
-        """Changes the dynamics of an object or a link; when it raises, nothing has changed.
+        """Changes the dynamics of a link. After an error, the world is unchanged.
 
         Args:
-            object_name: `NAME`, or `NAME/LINK` for one of its links.
-            change: The change, or a mapping of its keys.
+            object_name: `NAME` for the root link of a body, or `NAME/LINK`.
+            change: New values of dynamics, or a mapping of `ChangeDynamics` keys to values.
 
         Raises:
-            ConfigError: If the mapping does not fit.
-            UnknownNameError: If there is none of that name.
-            ValueError: If it is invalid for that link.
-            PhysicsError: If PyBullet refuses.
+            ConfigError: If the mapping is not valid.
+            UnknownNameError: If there is no such body or link.
+            ValueError: If the link cannot have the new values.
+            PhysicsError: If PyBullet refuses the change.
         """
         if isinstance(change, Mapping):
             change = ChangeDynamics.parse(change, object_name)
@@ -277,16 +280,16 @@ class World:
 
     @_recorded
     def attach(self, config: AttachmentConfig | Mapping[str, Any]) -> None:
-        """Attaches a body to another; when it raises, nothing has changed.
+        """Attaches a body to another body. After an error, the world is unchanged.
 
         Args:
-            config: The attachment, or a mapping of its keys.
+            config: Configuration of the attachment, or a mapping of configuration keys to values.
 
         Raises:
-            ConfigError: If the mapping does not fit.
+            ConfigError: If the mapping is not a valid configuration.
             UnknownNameError: If there is no such body or link.
-            ValueError: If its name is taken, or the two cannot be attached.
-            PhysicsError: If PyBullet refuses.
+            ValueError: If the attachment's name is taken, or the bodies cannot be attached to each other.
+            PhysicsError: If PyBullet refuses the attachment.
         """
         if isinstance(config, Mapping):
             config = AttachmentConfig.parse(config, "attachment")
@@ -295,30 +298,30 @@ class World:
 
     @_recorded
     def detach(self, name: str) -> None:
-        """Ends an attachment.
+        """Removes an attachment.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If no attachment has this name.
         """
         self.attachments.remove(name)
         self._note(name, "detach", None)
 
     @_recorded
     def change_physics(self, change: PhysicsChange) -> None:
-        """Changes gravity, or the solver of contacts and joints; a reset undoes it."""
+        """Changes gravity, or parameters of PyBullet's engine, until the next reset."""
         self._contents.change_physics(change)
         self._note("", "physics", change)
 
     def set_sensor_rate(self, name: str, number: int, hz: float) -> None:
-        """Changes the rate of a sensor; a reset undoes it.
+        """Changes the rate of a sensor from the present tick until the next reset.
 
         Args:
-            name: The body that has it, or the camera.
-            number: Its index in `sensors_of(name)`.
-            hz: Its rate [Hz] of the world's time from this tick on; 0 is off.
+            name: Name of the sensor's body, or of the camera.
+            number: Index of the sensor in `sensors_of(name)`.
+            hz: New rate in simulated time [Hz]; 0 switches the sensor off.
 
         Raises:
-            UnknownNameError: If there is no body or camera of that name.
+            UnknownNameError: If no body or camera has this name.
             ValueError: If there is no such sensor, or the rate is negative or not finite.
         """
         if name not in self._sensors:
@@ -328,16 +331,17 @@ class World:
 
     @_recorded
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
-        """Applies an action to a body, and logs it as a command; when it raises, nothing is logged.
+        """Applies an action to a body, and records the action as a command. After an error, nothing is recorded.
 
         Args:
-            name: The body.
-            what: A key of ACTIONS.
-            value: Its value; for a named tuple also a mapping of its fields.
-            do: Does the same to the body in another way, for instance with something prepared by another thread.
+            name: Name of the body.
+            what: Name of the action, a key of ACTIONS.
+            value: Value for the action. Instead of a named tuple, a mapping of field names to values is accepted.
+            do: Function of the body that is called in place of the action. It must have the same effect, but may for
+                instance use data prepared in another thread.
 
         Returns:
-            What the action returns.
+            Result of the action.
 
         Raises:
             UnknownNameError: If there is no such body or action.
@@ -356,15 +360,17 @@ class World:
         return result
 
     def put(self, slot: str, value: Any) -> None:
-        """Passes a value to a body or sensor before the next tick; any thread may call it.
+        """Sends a value to an input of a body or sensor, which takes effect before the next tick.
+
+        Any thread may call this method.
 
         Args:
-            slot: `NAME/INPUT`, such as `kuka_lwr/target`.
-            value: Value of that input. For a target of joints also a mapping of them to numbers, for a named tuple one
-                of its fields.
+            slot: The input, as `NAME/INPUT`, such as `kuka_lwr/target`.
+            value: Value for the input. A joint target may be a mapping of joint names to numbers, and any other named
+                tuple a mapping of field names to values.
 
         Raises:
-            UnknownNameError: If there is no such input, or the value names something unknown.
+            UnknownNameError: If there is no such input, or the value contains an unknown name.
             ValueError: If the value is refused, for instance because it is not finite.
         """
         generation = self.mailbox.generation
@@ -376,33 +382,36 @@ class World:
 
     @property
     def inputs(self) -> dict[str, Input]:
-        """Inputs of the world by slot."""
+        """Inputs of all bodies and sensors, indexed by slot (`NAME/INPUT`)."""
         return self._contents.inputs
 
     @property
     def cameras(self) -> dict[str, RgbdSensor]:
-        """The cameras by name; a new dictionary with every change."""
+        """Cameras, indexed by name; when a camera is added or removed, a new dictionary replaces the former."""
         return self._contents.cameras
 
     def sensors_of(self, name: str) -> list[Sensor]:
-        """Returns the sensors of a body, or the camera of that name."""
+        """Returns the sensors of a body; for the name of a camera, returns a list with the camera."""
         return self._sensors[name]
 
     def frames(self) -> set[str]:
-        """Returns the TF frames that it publishes, without prefix: its own, of sensors, and under `poses`."""
+        """Returns the names, without prefix, of the TF frames that the world publishes.
+
+        These are the world frame, the frames configured under `poses`, and the frames of sensors.
+        """
         poses = (pose.tf_id for pose in self.config.poses)
         sensors = (sensor for name in self.bodies for sensor in self.sensors_of(name))
         return {WORLD_FRAME, *poses, *(frame for sensor in sensors for frame in sensor.tf_frames)}
 
     @property
     def is_connected(self) -> bool:
-        """Whether PyBullet is still connected: its window may have been closed, or its server may have ended."""
+        """Whether PyBullet is still connected; closing its window or ending its server disconnects it."""
         return bool(self.pb.isConnected())
 
     def apply_inputs(self) -> None:
-        """Applies the inputs that came since the last call, except those for bodies that were removed meanwhile.
+        """Applies the inputs that arrived since the last call; inputs of removed bodies and cameras are ignored.
 
-        Every step begins with it; a stopped world needs it for poses from TF.
+        Every step calls this method first. While the world is stopped, it applies poses from TF.
         """
         for slot, value in self.mailbox.drain().items():
             if slot in self.inputs:
@@ -410,7 +419,7 @@ class World:
 
     @_recorded
     def apply_input(self, slot: str, value: Any) -> None:
-        """Applies a checked value, and logs it as a command."""
+        """Applies a checked value to an input, and records the value as a command."""
         body = self.bodies.get(slot.split("/")[0])
         with plugin_errors(body or self, f"applying '{slot}' at tick {self.clock.tick}"):
             self.inputs[slot].apply(value)
@@ -419,13 +428,13 @@ class World:
         self._note(slot, "input", value)
 
     def step(self) -> list[Any]:
-        """Advances by a tick.
+        """Applies waiting inputs, and advances the world by a tick.
 
         Returns:
-            The samples that are due at the new tick.
+            Samples of the sensors that are due at the new tick.
 
         Raises:
-            PhysicsError: If something in the world is not finite any more.
+            PhysicsError: If a number in the state of the world is no longer finite.
             PluginError: If a class of another package fails.
         """
         changes = self.pb.changes
@@ -460,16 +469,17 @@ class World:
         return self._sensors.read_due()
 
     def run_idle(self, ticks: float, end_s: float) -> int:
-        """Advances by ticks at which physics alone acts: no input, body, wrench, attachment or sensor.
+        """Advances the world as long as only PyBullet's physics acts, faster than the same number of calls of `step`.
 
-        It does the same as that many calls of `step`, in less time. A new input acts after a few ticks.
+        Stops before a tick at which a body, an external wrench, an attachment with a limited force or a sensor has to
+        be updated. Stops within MAX_IDLE_ROW ticks after a new input has arrived.
 
         Args:
             ticks: Largest number of ticks.
-            end_s: Time by the monotonic clock at which it returns [s].
+            end_s: Time of `time.monotonic` at which to stop [s].
 
         Returns:
-            The number of ticks.
+            Number of ticks by which the world has advanced.
         """
         if self._pushed or self.attachments.limited:
             return 0
@@ -493,42 +503,56 @@ class World:
         return done
 
     def read_rest(self) -> list[Any]:
-        """Returns samples of the sensors that were not read at this tick yet."""
+        """Reads all sensors that have not been read at the present tick, and returns their samples."""
         return self._sensors.read_rest()
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Returns the samples that would have been due between two ticks if the world had not been stopped."""
+        """Reads the sensors of a stopped world that would be due if the world were running, and returns their samples.
+
+        Args:
+            tick: Tick that the running world would have reached.
+            since: Tick that it would have reached at the last call. Sensors due after it, up to `tick`, are read.
+        """
         return self._sensors.read_idle(tick, since)
 
     @_recorded
     def halt(self, reason: str) -> None:
-        """Aborts what bodies do over several ticks, such as timed motions."""
+        """Aborts all actions of bodies that last several ticks, such as timed motions.
+
+        Args:
+            reason: Reason that the aborted actions report.
+        """
         for body in self.bodies.values():
             body.halt(reason)
         self._note("", "halt", reason)
 
     @_recorded
     def pause(self, reason: str) -> None:
-        """Aborts what cannot wait until the stopped world runs again."""
+        """Aborts all actions of bodies that cannot be paused while the world is stopped.
+
+        Args:
+            reason: Reason that the aborted actions report.
+        """
         for body in self.bodies.values():
             body.pause(reason)
         self._note("", "pause", reason)
 
     def reset(self, rebuild: bool = True) -> None:
-        """Restores the world as it was built, to the last bit; stamps continue.
+        """Returns the world to the state in which it was built, bit by bit. Stamps continue to increase.
 
-        Objects that were added later are removed, those that were removed are added again. Motions end with a reason;
-        waiting inputs are dropped. Cameras keep their poses. Bodies and their sensors are new objects; gravity, the
-        engine's parameters and rates are those of the configuration.
+        Objects that were added are removed, and objects that were removed are added again. Running motions are aborted
+        and waiting inputs are dropped. Cameras keep their poses. Gravity, engine parameters and sensor rates are set
+        to their configured values.
 
         Args:
-            rebuild: Whether everything is loaded again in any case. Otherwise bodies stay the same objects where that
-                is exact: if nothing happened since the start, except that robots without controllers followed targets,
-                and that bodies were moved or changed in their dynamics. That takes less than a millisecond.
+            rebuild: True: all bodies are loaded again, as new Python objects. False: bodies are kept if their states
+                can be restored exactly, which takes less than a millisecond; otherwise they are loaded again. Exact
+                restoring is possible, for instance, if robots without controllers have only followed targets, and
+                bodies were only moved or changed in their dynamics; see `StartState`.
 
         Raises:
-            ConfigError: If something cannot be loaded any more, for instance because its file is missing; then the
-                world lacks it.
+            ConfigError: If an object cannot be loaded again, for instance because its file is missing. The world is
+                then reset without this object.
         """
         self._end_shadow()
         if not rebuild and self._rewind():
@@ -551,7 +575,7 @@ class World:
             self._start = StartState(self.pb, self._contents)
 
     def _rewind(self) -> bool:
-        """Returns to the start without loading anything; returns whether the start was reached exactly."""
+        """Tries to restore the start state without loading bodies; returns whether the state was restored exactly."""
         if self._start is None or self.pb.changes.unrecorded or not self._start.restore(self.commands):
             return False
         self.clock.restart()
@@ -562,7 +586,7 @@ class World:
         return self.state_hash() == self.start_hash
 
     def _forget_commands(self) -> None:
-        """Clears commands and waiting inputs; the poses that cameras keep become the first commands."""
+        """Clears commands and waiting inputs, and records the changed poses of cameras as first commands."""
         self.commands.clear()
         self.pb.changes.unrecorded = ""
         self.mailbox.drop()
@@ -570,24 +594,26 @@ class World:
             self._note(slot, "input", pose)
 
     def describe(self) -> str:
-        """Returns what it was built from, as JSON; see `WorldDescription`."""
+        """Returns a JSON text from which the same world can be built, see `WorldDescription`."""
         if not self._description:
             self._description = describe(self.loaded, self.start_hash)
         return self._description
 
     def keyframe(self, recorded: str = "") -> None:
-        """Moves the world into a fresh client of PyBullet, so that the future depends on the present state alone.
+        """Makes a keyframe: moves the world into a fresh PyBullet client, and drops the earlier commands.
 
-        Commands before it are dropped: `save`, `restore`, `fork` and `predict` start from here. Bodies and sensors stay
-        the same objects. When it raises, nothing has changed, except if it differs from the recorded one.
+        From then on, the simulation depends on the present state alone. `save`, `restore`, `fork` and `predict` start
+        from the keyframe. Bodies and sensors stay the same Python objects.
 
         Args:
-            recorded: A keyframe of the same world at the same tick, which this one is compared with.
+            recorded: Text of a recorded keyframe of this world at this tick, with which the new keyframe is compared.
 
         Raises:
             InterfaceError: If the world has a window, a soft body, a body of another package, an object with a state
-                that cannot be written, or a change that was not recorded; or if it differs from the recorded keyframe.
-            ConfigError: If a body cannot be loaded any more, for instance because its file is missing.
+                that cannot be written, or a change that was not recorded. The world is then unchanged. Also if the new
+                keyframe, which is then in effect, differs from the recorded keyframe.
+            ConfigError: If a body cannot be loaded again, for instance because its file is missing. The world is then
+                unchanged.
         """
         for _ in self.keyframe_in_parts():
             pass
@@ -595,10 +621,10 @@ class World:
             raise InterfaceError(f"the keyframe at tick {self.clock.tick} is not the recorded one: '{part}' differs")
 
     def keyframe_in_parts(self) -> Iterator[None]:
-        """Does the same as `keyframe` in parts, one for each item; the world may step between them.
+        """Makes a keyframe as `keyframe` does, but in parts: each item of the iterator is yielded after a part.
 
-        Each part builds one body in the fresh client. All are built again if bodies are added, removed or changed
-        meanwhile. The world moves in the last part.
+        Each part builds one body in the fresh client. The world may step between parts. If bodies are added, removed or
+        changed meanwhile, all bodies are built again. The world moves into the fresh client in the last part.
         """
         while True:
             refuse(self)
@@ -630,14 +656,14 @@ class World:
 
     @_recorded
     def enter_keyframe(self, keyframe: str, trust: Collection[str] | None = ()) -> None:
-        """Brings the world, which was just built or reset, to a keyframe.
+        """Sets the world, which was just built or reset, to the state in a keyframe.
 
         Args:
-            keyframe: Its text.
-            trust: Packages that it may import, see `from_description`.
+            keyframe: Text of the keyframe.
+            trust: Packages from which the keyframe may import classes, see `from_description`.
 
         Raises:
-            InterfaceError: If the text is no keyframe of such a world, or something in it cannot be loaded here.
+            InterfaceError: If the text is not a keyframe of this world, or an object cannot be loaded on this machine.
         """
         try:
             with trusting(trust):
@@ -653,19 +679,18 @@ class World:
         self._keyframe, self._keyframe_tick = keyframe, read.tick
 
     def save(self, file: str | Path | None = None, *, keyframe: bool = False) -> WorldState:
-        """Returns the present state, from which the same world continues to the last bit.
+        """Applies waiting inputs, and returns the present state, from which the simulation continues bit-identically.
 
-        Waiting inputs are applied first, as before the next step. The state holds all commands since the world was
-        built or reset, or since its last keyframe. To restore it therefore takes as long as simulating again from
-        there.
+        The state consists of all commands since the world was built or reset, or since its last keyframe. Restoring the
+        state simulates all ticks since then again.
 
         Args:
-            file: File to which it is written, too.
-            keyframe: Whether a keyframe is made first, see `keyframe`; then the state holds no commands.
+            file: File to which the state is also written; by default no file is written.
+            keyframe: Whether to make a keyframe first, see `keyframe`. The state then contains no commands.
 
         Raises:
             InterfaceError: If the world has soft bodies, whose motion is not reproducible, a command that cannot be
-                recorded, or a change that no command repeats.
+                recorded, or a change of PyBullet that was not recorded.
             OSError: If the file cannot be written.
         """
         if keyframe:
@@ -682,16 +707,16 @@ class World:
         return state
 
     def restore(self, state: WorldState, trust: Collection[str] | None = (), max_ticks: int = MAX_TICKS) -> None:
-        """Restores a saved state of the world; stamps continue.
+        """Restores a saved state of this world. Stamps continue to increase.
 
         Args:
-            state: The state.
-            trust: Packages that its commands may import, see `from_description`.
-            max_ticks: Age of a state beyond which it is refused.
+            state: State from `save`.
+            trust: Packages from which the commands may import classes, see `from_description`.
+            max_ticks: Largest number of ticks that may have to be simulated to reach the state.
 
         Raises:
-            InterfaceError: If the state is of another world or too old; or if the world does not reach the same state
-                again, then it is reset.
+            InterfaceError: If the state is from another world, or more than `max_ticks` ticks have to be simulated.
+                Also if the world does not reach the same state again; the world is then reset.
         """
         self.require_own(state)
         state.require_short(max_ticks)
@@ -699,7 +724,7 @@ class World:
             pass
 
     def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Generator[int, None, None]:
-        """Does the same as `restore` in steps, for a state that was checked; yields each tick on the way.
+        """Restores a state as `restore` does, but without its checks of the state; yields each simulated tick.
 
         If the generator is closed before its end, the world is reset.
         """
@@ -712,10 +737,10 @@ class World:
             raise
 
     def require_own(self, state: WorldState) -> None:
-        """Checks that a state is one of this world.
+        """Checks that a state was saved by this world, or by an equal world built from the same files.
 
         Raises:
-            InterfaceError: If it is of another world, or files have changed since.
+            InterfaceError: If the state is from another world, or a file of the world has changed since.
         """
         if state.description not in (self.describe(), self._built_from):
             raise InterfaceError(
@@ -723,10 +748,10 @@ class World:
             )
 
     def _require_recorded(self) -> None:
-        """Checks that all changes were recorded.
+        """Checks that all changes of PyBullet were recorded as commands.
 
         Raises:
-            InterfaceError: If a call has changed PyBullet that no command repeats.
+            InterfaceError: If a change was not recorded.
         """
         if name := self.pb.changes.unrecorded:
             raise InterfaceError(
@@ -735,7 +760,7 @@ class World:
             )
 
     def prepare_forks(self) -> None:
-        """Starts the process from which `fork` and `predict` fork, so that their first call need not wait for it.
+        """Starts the process that `fork` and `predict` use, so that their first call takes less time.
 
         Raises:
             InterfaceError: If the state cannot be saved.
@@ -750,13 +775,17 @@ class World:
             self._shadow = Shadow.of(self, self.save())
 
     def fork(self, count: int = 1) -> list[Fork]:
-        """Returns worlds in processes of their own that continue from the present state, to the last bit.
+        """Copies the world into new processes, and returns the copies, which continue bit-identically.
 
-        They are forked from a process that follows this world's commands. It is a copy of this one if this has only one
-        thread; otherwise the first call takes as long as simulating again from the last reset.
+        The copies are forks of a shadow: a process that repeats this world's commands. If this process has a single
+        thread, little memory and no window, the shadow is a fork of this process. Otherwise the shadow is a new
+        process, and the first call takes as long as simulating again from the last reset or keyframe.
+
+        Args:
+            count: Number of copies.
 
         Raises:
-            InterfaceError: If the state cannot be saved, or is not the same there.
+            InterfaceError: If the state cannot be saved, or the shadow does not reach the same state.
         """
         with self._followed() as shadow:
             return shadow.fork(count)
@@ -771,21 +800,24 @@ class World:
         cost: Cost | str | None = None,
         jobs: int | None = None,
     ) -> list[Prediction]:
-        """Predicts what would happen from the present state, for each of several sequences of inputs.
+        """Simulates each of several input sequences from the present state in other processes; returns the results.
 
         Args:
-            candidates: The sequences: inputs by tick from now on. Motions under way continue.
-            ticks: Number of ticks.
-            watch: Bodies whose motion is returned; all by default.
-            every: Number of ticks between two rows of it.
-            cost: Cost of a state, which is summed over all ticks: a function of a module that takes the `World`, a
-                class whose objects do, or `module:name` of either.
-            jobs: Number of processes at a time; the number of processors by default.
+            candidates: The input sequences. Running motions continue in all simulations.
+            ticks: Number of ticks to simulate.
+            watch: Names of the bodies whose motion is sampled; all bodies by default.
+            every: Number of ticks between two samples of the motion.
+            cost: Cost of the world's state, summed over all ticks. A module-level function from `World` to a number,
+                a class whose objects are such functions, or `module:name` of such a function or class.
+            jobs: Largest number of processes at a time; by default the number of processors.
+
+        Returns:
+            A prediction for each candidate, in the order of the candidates.
 
         Raises:
-            InterfaceError: If the state cannot be saved, or is not the same in another process.
+            InterfaceError: If the state cannot be saved, or the other process does not reach the same state.
             UnknownNameError: If a watched body is unknown.
-            ValueError: If a number is not positive.
+            ValueError: If `ticks`, `every` or `jobs` is not positive.
         """
         if min(ticks, every, 1 if jobs is None else jobs) < 1:
             raise ValueError(f"ticks, every and jobs: expected at least 1, got {ticks}, {every} and {jobs}")
@@ -798,7 +830,7 @@ class World:
 
     @contextmanager
     def _followed(self) -> Iterator[Shadow]:
-        """Yields the process that follows this world, at the present state; an error ends it."""
+        """Yields the shadow of this world after it has reached the present state; an error ends the shadow."""
         self._require_recorded()
         try:
             self.prepare_forks()
@@ -816,15 +848,15 @@ class World:
             self._shadow = None
 
     def changed_names(self) -> set[str]:
-        """Returns the names of all objects that were added or removed since the world was built or reset."""
+        """Returns the names of all bodies that were added or removed since the world was built or reset."""
         return self._contents.changed_names()
 
     def state_hash(self) -> str:
-        """Returns a text that is the same for worlds in the same state at the same tick, see `state_hash`."""
+        """Returns a hash of the present tick and state, see `contents.state_hash`; equal worlds have equal hashes."""
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Disconnects from PyBullet, closes all bodies and fails the waiting requests."""
+        """Fails waiting requests, ends the shadow, disconnects from PyBullet and closes all bodies."""
         self.mailbox.close()
         self._end_shadow()
         try:
