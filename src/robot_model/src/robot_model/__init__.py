@@ -1,1 +1,1 @@
-"""Robots as their URDFs describe them: geometry, joints, limits, frames and Jacobians, without ROS or a simulator."""
+"""Robot models read from URDFs: geometry, joints, limits, frames and Jacobians, without ROS or a simulator."""

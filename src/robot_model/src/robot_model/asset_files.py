@@ -1,4 +1,4 @@
-"""Files named in a configuration: search for them, and field types that require an existing file."""
+"""Finds the files that a configuration names, and defines field types that require an existing file."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ LONGEST_PATH = 1000
 KERNEL_FOLDERS = ("/proc/", "/sys/", "/dev/")
 """Folders with special files: reading one may never end."""
 ASSETS = "example-robot-data"
-"""Python package of the robots of the extra `assets`; paths name it like a ROS package,
+"""Python package with the robots of the extra `assets`. Paths refer to the package like to a ROS package, for example
 `{example-robot-data}/robots/...`."""
 
 
@@ -34,7 +34,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
 
     Args:
         name: Path in the YAML file; `{package}/path` and `package://package/path` are resolved.
-        file: The YAML file; without folder if it came from the parameter server (`~config`).
+        file: The YAML file, or `~config` for a configuration from the parameter server, which has no folder.
         search_paths: Further folders.
 
     Raises:
@@ -77,12 +77,15 @@ def _existing_or_description(name: str, info: ValidationInfo) -> str:
 
 
 def find_folder(name: str, file: str) -> str:
-    """Returns the absolute path of a folder that a YAML file names, as `find_file` does.
+    """Returns the absolute path of a folder that a YAML file names.
 
-    `pybullet_data_path` is the folder of PyBullet's data.
+    Args:
+        name: Path in the YAML file, as for `find_file`; relative paths start at the YAML file's folder. The name
+            `pybullet_data_path` selects the folder of PyBullet's data.
+        file: The YAML file, or `~config` for a configuration from the parameter server, which has no folder.
 
     Raises:
-        ValueError: If there is no such folder, or the package is unknown.
+        ValueError: If the folder does not exist, or the package is unknown.
     """
     _refuse_long(name)
     if name == PYBULLET_DATA_PATH:
@@ -99,7 +102,7 @@ def find_folder(name: str, file: str) -> str:
 
 @lru_cache(maxsize=1)
 def pybullet_data() -> tuple[str, ...]:
-    """Returns the folder of PyBullet's data, also where PyBullet is not installed."""
+    """Returns the folder of PyBullet's data without importing PyBullet; empty if the data are not installed."""
     spec = find_spec("pybullet_data")
     return tuple(spec.submodule_search_locations or ()) if spec else ()
 
@@ -110,10 +113,10 @@ def _refuse_long(path: str) -> None:
 
 
 def resolve_package(name: str) -> Path:
-    """Returns the path that `{package}/path` or `package://package/path` stands for; other paths stay as they are.
+    """Resolves `{package}/path` and `package://package/path` to a path; returns any other path unchanged.
 
     Raises:
-        ValueError: If there is no such package, or the extra `assets` is not installed.
+        ValueError: If the package is unknown, or the path needs the extra `assets`, which is not installed.
     """
     for prefix in (f"{{{ASSETS}}}/", f"package://{ASSETS}/"):
         if name.startswith(prefix):
@@ -141,6 +144,7 @@ def _assets_below(entries: tuple[str, ...]) -> Path:
 
 
 ExistingFile = Annotated[Text, AfterValidator(_existing), Expects("a file name")]
-"""A file that exists, as an absolute path; `file` and `search_paths` come from the validation's context."""
+"""Absolute path of an existing file. The validation's context has the `file` and `search_paths` for `find_file`."""
 RobotFile = Annotated[Text, AfterValidator(_existing_or_description), Expects("a file name")]
-"""The same, or the word `robot_description`, which becomes the file that the context has for it, if any."""
+"""Like `ExistingFile`, but also accepts the word `robot_description`. The word is replaced by the context's file for
+`robot_description`, or kept if the context has no such file."""

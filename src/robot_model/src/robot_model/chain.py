@@ -22,25 +22,25 @@ class Chain:
     """The joints between two links, read from a URDF.
 
     Args:
-        urdf_filename: The robot's URDF; the meshes it names need not be there.
-        base: The link where the chain begins.
-        tip: The link where it ends; the base is above it.
+        urdf_filename: Path of the robot's URDF; its meshes need not exist.
+        base: Link where the chain begins, an ancestor of `tip`.
+        tip: Link where the chain ends.
 
     Attributes:
-        joints: All joints in between, fixed ones too, from the base to the tip.
-        moving: The joints in between that are not fixed.
-        joint_names: The n joints that are solved for: the moving ones, with each mimic joint replaced by the joint that
-            it follows.
-        to_moving: The map from the n joints to the moving ones.
+        joints: All joints of the chain, fixed joints included, from the base to the tip.
+        moving: The joints of the chain that are not fixed.
+        joint_names: Names of the n joints that solvers solve for: the moving joints, where each mimic joint is replaced
+            by the joint that it follows.
+        to_moving: The map from positions of the n joints to positions of the moving joints.
         limits: Limits of the n joints, narrowed such that mimic joints stay within their own limits.
-        velocity_limits: Largest speeds of the n joints [rad/s or m/s], inf where there is none.
-        robot_joints: All joints of the robot.
-        mimics: Names of the chain's joints that mimic others.
+        velocity_limits: Largest speeds of the n joints [rad/s or m/s]; inf for joints without a speed limit.
+        robot_joints: Names of all joints of the robot.
+        mimics: Names of the chain's mimic joints.
 
     Raises:
-        ConfigError: If the file cannot be read, or a joint makes no sense.
-        UnknownNameError: If a link is not known.
-        ValueError: If the chain cannot be solved for; it names the joint or link.
+        ConfigError: If the file cannot be read, or a joint is invalid.
+        UnknownNameError: If the robot has no link `base` or `tip`.
+        ValueError: If inverse kinematics cannot solve for the chain; the message names the joint or link.
     """
 
     def __init__(self, urdf_filename: str, base: str, tip: str) -> None:
@@ -61,7 +61,7 @@ class Chain:
 
     @cached_property
     def reach(self) -> Reach:
-        """Bounding ball of the tip's positions, around the first moving joint, in the base frame."""
+        """Ball around the first moving joint that contains all positions of the tip, in the base frame."""
         first = self.joints.index(self.moving[0])
         x, y, z = reduce(np.matmul, map(origin_of, self.joints[: first + 1]))[:3, 3].tolist()
         return Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in self.joints[first + 1 :]], self.moving)
@@ -90,7 +90,7 @@ def _between(document: UrdfDocument, base: str, tip: str) -> tuple[UrdfJoint, ..
 
 
 def _leader(document: UrdfDocument, joint: UrdfJoint) -> str:
-    """Returns the joint that is solved for instead of a joint: the one it mimics, or itself."""
+    """Returns the name of the joint that a mimic joint follows; for other joints, their own name."""
     if joint.mimic is None:
         return joint.name
     leader = followed(joint.name, document.mimics).joint

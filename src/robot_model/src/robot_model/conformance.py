@@ -1,4 +1,4 @@
-"""Tests for pytest that every kinematics library passes; derive from `BackendConformance` to test one."""
+"""Pytest tests that every kinematics library must pass; derive from `BackendConformance` to test a library."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ SKEW = """<robot name="skew">
 </robot>"""
 """A robot with skew axes, a prismatic joint, a joint without limits, and fixed links."""
 MIMIC = SKEW.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="hip" multiplier="-0.5" offset="0.2"/>')
-"""The same; its last joint follows its first one."""
+"""The robot `SKEW`, whose last joint mimics its first moving joint."""
 
 
 class Backend(ABC):
-    """A robot in a library.
+    """A robot, loaded by the kinematics library that is tested.
 
     Attributes:
-        joint_names: Its n joints, in any order.
-        limits: Their limits.
+        joint_names: Names of the n joints, in any order.
+        limits: Limits of the n joints, in the order of `joint_names`.
     """
 
     joint_names: Sequence[str]
@@ -50,21 +50,21 @@ class Backend(ABC):
 
     @abstractmethod
     def pose(self, q: Sequence[float], link: str) -> Pose:
-        """Returns the pose of a link in the root at n positions [rad or m]."""
+        """Returns the pose of a link in the root link, for n joint positions [rad or m]."""
 
     @abstractmethod
     def jacobian(self, q: Sequence[float], link: str) -> Array:
-        """Returns the Jacobian of the origin of a link in the axes of the root, 6 x n, linear above angular."""
+        """Returns the Jacobian of a link's origin in the axes of the root, 6 x n: linear rows, then angular rows."""
 
 
 class BackendConformance(ABC):
-    """Tests that any library passes; the reference is `robot_model`.
+    """Tests that compare a kinematics library with `RobotModel`.
 
     Attributes:
-        robots: URDFs of robots, in addition to those of this module.
-        follows_mimics: Whether it moves joints that mimic others.
+        robots: Paths of URDFs to test, in addition to the robots of this module.
+        follows_mimics: Whether the library moves mimic joints.
         tolerance: Largest difference between poses [m and rad].
-        step: Step of finite differences [rad or m]; their error grows with its square and with `tolerance / step`.
+        step: Step of the finite differences [rad or m]. Jacobians may differ by `step**2 + tolerance / step`.
     """
 
     robots: ClassVar[Sequence[str]] = ()
@@ -74,12 +74,12 @@ class BackendConformance(ABC):
 
     @abstractmethod
     def make(self, urdf_path: str) -> Backend:
-        """Returns a robot in the library."""
+        """Loads a URDF with the library."""
 
     @pytest.fixture
     def pairs(self, tmp_path: Path) -> list[tuple[RobotModel, Backend, list[int]]]:
-        """Returns for each robot: the model, the robot in the library, and the indices of the library's joints in the
-        model."""
+        """Returns for each robot the `RobotModel`, the library's robot, and the model's index of each joint of the
+        library."""
         paths = list(self.robots)
         for name, text in (("skew", SKEW), *((("mimic", MIMIC),) if self.follows_mimics else ())):
             path = tmp_path / f"{name}.urdf"
@@ -92,14 +92,14 @@ class BackendConformance(ABC):
         ]
 
     def configurations(self, robot: RobotModel) -> list[list[float]]:
-        """Returns random configurations within limits."""
+        """Returns random configurations within the joint limits, in the order of `RobotModel.joint_names`."""
         generator = np.random.default_rng(1)
         return [robot.limits.random(generator, robot.limits.middle) for _ in range(CONFIGURATIONS)]
 
     def test_joints_and_their_limits_are_those_of_the_urdf(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """Mimic joints are left out; continuous joints have no limits."""
+        """The library leaves out mimic joints, and continuous joints have infinite limits."""
         for robot, backend, order in pairs:
             assert sorted(backend.joint_names) == sorted(robot.joint_names)
             expected = robot.limits.of(order)
@@ -108,7 +108,7 @@ class BackendConformance(ABC):
             assert backend.limits.is_revolute == expected.is_revolute
 
     def test_links_are_where_the_urdf_says(self, pairs: list[tuple[RobotModel, Backend, list[int]]]) -> None:
-        """All links that a joint moves have the same poses."""
+        """Each link that a joint moves has the same pose in the library and in `RobotModel`."""
         for robot, backend, order in pairs:
             for q in self.configurations(robot):
                 for link in _moved_links(robot):
@@ -120,7 +120,7 @@ class BackendConformance(ABC):
     def test_jacobians_are_the_finite_differences_of_poses(
         self, pairs: list[tuple[RobotModel, Backend, list[int]]]
     ) -> None:
-        """Motion of mimic joints is part of the derivative by the joint that they follow."""
+        """The column of a joint includes the motion of the mimic joints that follow the joint."""
         for robot, backend, order in pairs:
             q = np.array(self.configurations(robot)[0])[order]
             for link in _moved_links(robot):

@@ -1,4 +1,4 @@
-"""Forward kinematics and Jacobians of all links of a tree, for one or many configurations."""
+"""Forward kinematics and Jacobians for all links of a kinematic tree, in one or many configurations."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from .joint_map import AffineMap, Array
 from .urdf.elements import UrdfJoint
 
 MAX_MATRIX_PRODUCTS = 24
-"""Number of configurations up to which products of 4 x 4 matrices are faster than arrays with one row for each
-entry."""
+"""Largest number of configurations that are computed with 4 x 4 matrix products (`_of_few`). For more configurations,
+arrays with one row for each matrix entry are faster (`_of_many`)."""
 _ROOT = np.eye(4)
 _QUARTER = np.pi / 2.0
 _YZX, _ZXY = np.array((1, 2, 0)), np.array((2, 0, 1))
 
 
 class LinkFrames:
-    """Frames of the links of a tree of joints with at most one axis.
+    """Computes the frames of all links of a kinematic tree, whose joints have at most one axis.
 
-    Links that are fixed to each other share one frame. Frame 0 is the root. Each other frame moves with a joint; its
-    origin is that of the joint, and its z axis is the joint's axis. Configurations are those of n driven joints, k x n
-    [rad or m]. Thread-safe.
+    Links that are fixed to each other share one frame. Frame 0 is the root link's frame. Each other frame moves with a
+    joint: the frame's origin is the joint's origin, and its z axis is the joint's axis. The k configurations `q` are
+    positions of n driven joints, k x n [rad or m]. Thread-safe.
 
     Args:
-        joints: All joints.
-        to_moving: Returns the map from the n driven joints to joints that move, by their names.
+        joints: All joints of the tree.
+        to_moving: Function that takes the names of moving joints, and returns the map from the n driven joints to them.
 
     Attributes:
         links: Names of all links, the root first.
@@ -68,7 +68,7 @@ class LinkFrames:
         self._last = b"", np.empty((0, len(places), 4, 4))
 
     def place(self, link: str) -> tuple[int, Array]:
-        """Returns the number of the frame that a link moves with, and the pose of the link in it, 4 x 4."""
+        """Returns the number of the frame that a link moves with, and the link's pose in that frame, 4 x 4."""
         pose = np.eye(4)
         while link in self._above and link not in self._frame:
             pose = origin_of(self._above[link]) @ pose
@@ -77,7 +77,7 @@ class LinkFrames:
         return frame, self._aligned[frame].T @ pose
 
     def at(self, q: Array) -> Array:
-        """Returns the frames in the root, k x frames x 4 x 4; callers must not change them."""
+        """Returns the poses of all frames in the root, k x frames x 4 x 4; callers must not change the array."""
         key = q.tobytes()
         last, frames = self._last
         if key != last:
@@ -98,27 +98,27 @@ class LinkFrames:
         return links.transpose(3, 0, 2, 1)
 
     def positions(self, q: Array, link: str) -> Array:
-        """Returns the positions of the origin of a link in the root, k x 3 [m]."""
+        """Returns the positions of a link's origin in the root, k x 3 [m]."""
         frame, pose = self.place(link)
         positions: Array = self.at(q)[:, frame, :3] @ pose[:, 3]
         return positions
 
     def jacobian(self, q: Array, link: str, point: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-        """Returns the Jacobians of a point of a link, k x 6 x n.
+        """Returns the Jacobians of a point that is attached to a link, k x 6 x n, in the axes of the root.
 
-        Times the velocities of the n joints, the first three rows are the velocity of the point [m/s], the last three
-        the angular velocity of the link [rad/s], in the axes of the root.
+        The first three rows map the n joint velocities to the point's velocity [m/s]. The last three rows map them to
+        the link's angular velocity [rad/s].
 
         Args:
-            q: The configurations, k x n.
-            link: The link.
-            point: The point in the link [m].
+            q: The configurations, k x n [rad or m].
+            link: Name of the link.
+            point: Position of the point in the link's frame [m]; by default the link's origin.
         """
         frame, pose = self.place(link)
         return self._jacobian(q, frame, self.at(q)[:, frame, :3] @ (pose @ (*point, 1.0)))
 
     def jacobian_at(self, q: Array, link: str, point: Sequence[float]) -> Array:
-        """Returns the Jacobians of the point of a link that is at a given position in the root [m], see `jacobian`."""
+        """Does the same as `jacobian`, but takes the position of the point in the root [m], for all configurations."""
         return self._jacobian(q, self.place(link)[0], np.broadcast_to(point, (len(q), 3)))
 
     def _jacobian(self, q: Array, frame: int, tip: Array) -> Array:
@@ -136,8 +136,14 @@ class LinkFrames:
         return jacobian
 
     def _of_parts(self) -> tuple[Array, Array]:
-        """Returns the affine map from n positions to the angles whose sines multiply the parts of f frames, n x 3 f and
-        3 f."""
+        """Returns the affine map from n joint positions to 3 angles for each of f frames.
+
+        The frame's pose in its parent is the sum of its three `_parts`, each times the sine of its angle. The angles
+        are pi/2 (sine 1), the joint position, and the joint position plus pi/2 (sine equals cosine).
+
+        Returns:
+            Factors, n x 3 f, and offsets, 3 f.
+        """
         m, n = self._to_moving.factors.shape
         factors, offsets = np.zeros((m + 1, 3, n)), np.tile((_QUARTER, 0.0, _QUARTER), (m + 1, 1))
         factors[1:, 1:] = self._to_moving.factors[:, None]
@@ -145,7 +151,10 @@ class LinkFrames:
         return factors.reshape(-1, n).T.copy(), offsets.ravel()
 
     def _of_few(self, q: Array) -> Array:
-        """Multiplies each frame by its parent's, the product by that of the frame above both, and so on."""
+        """Computes the frames in few configurations: poses in the parents, then products along the tree.
+
+        Each product doubles the number of joints that a pose covers, so the products take log2(depth) steps.
+        """
         angles = q.dot(self._factors)
         angles += self._offsets
         factors = np.sin(angles)
@@ -157,7 +166,10 @@ class LinkFrames:
         return frames
 
     def _of_many(self, q: Array) -> Array:
-        """Does the same with a row of k numbers for each entry of a matrix, in column-major order."""
+        """Computes the frames in many configurations, with one row of k numbers for each matrix entry, columns first.
+
+        Frames are computed one after the other, each from its parent's frame.
+        """
         positions = self._to_moving.factors @ q.T + self._to_moving.offsets[:, None]
         sines, cosines = np.sin(positions), np.cos(positions)
         frames, upper = _rows(len(self._moving) + 1, len(q))
@@ -182,12 +194,12 @@ class LinkFrames:
 
 
 def origin_of(joint: UrdfJoint) -> Array:
-    """Returns the pose of a joint at position 0 in its parent link, 4 x 4."""
+    """Returns the pose of a joint's frame in its parent link at joint position 0, 4 x 4."""
     return matrix_of(joint.xyz, quat_of(joint.rpy))
 
 
 def _aligned_with(axis: Vector) -> Array:
-    """Returns the rotation of a frame whose z is a unit vector, 4 x 4."""
+    """Returns the pose of a frame whose z axis is the unit vector `axis`, 4 x 4; its origin is 0."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(other, axis)
     x /= np.linalg.norm(x)
@@ -197,7 +209,15 @@ def _aligned_with(axis: Vector) -> Array:
 
 
 def _parts(joint: UrdfJoint, fixed: Array) -> Array:
-    """Returns the parts of the pose of a joint: constant, times sine or position, and times cosine, 3 x 16."""
+    """Splits a joint's pose in its parent frame into three matrices, each flattened to a row, 3 x 16.
+
+    Revolute joint: pose = constant part + sin(position) * second part + cos(position) * third part. Prismatic joint:
+    pose = constant part + position * second part, and the third part is 0.
+
+    Args:
+        joint: The joint.
+        fixed: The joint's pose at position 0, 4 x 4.
+    """
     x, y, z, origin = fixed.T
     nothing = np.zeros(4)
     if joint.is_revolute:
@@ -208,7 +228,11 @@ def _parts(joint: UrdfJoint, fixed: Array) -> Array:
 
 
 def _rows(count: int, k: int) -> tuple[Array, Array]:
-    """Returns matrices of k configurations, columns first, count x 4 x 4 x k, and their upper rows, count x 4 x 3k."""
+    """Allocates `count` matrices for k configurations, columns first, with the last row set to 0, 0, 0, 1.
+
+    Returns:
+        The matrices, count x 4 x 4 x k, and a view of their upper three rows, count x 4 x 3 k.
+    """
     matrices = np.empty((count, 4, 4, k))
     matrices[:, :, 3] = _ROOT[3][:, None]
     return matrices, matrices[:, :, :3].reshape(count, 4, -1)

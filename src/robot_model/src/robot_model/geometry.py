@@ -1,6 +1,7 @@
-"""Poses, twists, rotations and vectors as tuples of floats, ten times as fast as arrays of three.
+"""Poses, twists, rotations and vectors as tuples of floats, which are ten times as fast as small NumPy arrays.
 
-Quaternions are x, y, z, w. Conversions to and from matrices and roll, pitch, yaw are in `custom_ros_tools.transforms`.
+Quaternions are in the order x, y, z, w. `custom_ros_tools.transforms` converts to and from matrices, and roll, pitch,
+yaw.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Pose(NamedTuple):
-    """Pose of a frame in another.
+    """Pose of a frame in another frame.
 
     Attributes:
-        position: x, y, z [m].
+        position: Position x, y, z [m].
         quat_xyzw: Unit quaternion x, y, z, w.
     """
 
@@ -32,36 +33,36 @@ class Pose(NamedTuple):
         return Pose(position, quaternion_product(self.quat_xyzw, other.quat_xyzw))
 
     def inverse(self) -> Pose:
-        """Returns the pose of the other frame in this one."""
+        """Returns the inverse: for the pose of b in a, the pose of a in b."""
         x, y, z, w = self.quat_xyzw
         return Pose(rotated((-x, -y, -z, w), scaled(-1.0, self.position)), (-x, -y, -z, w))
 
 
 class Twist(NamedTuple):
-    """Velocity of a frame's origin and rotation of the frame.
+    """Linear and angular velocity of a frame.
 
     Attributes:
-        linear: x, y, z [m/s].
-        angular: About x, y, z [rad/s].
+        linear: Velocity of the origin along x, y, z [m/s].
+        angular: Angular velocity about x, y, z [rad/s].
     """
 
     linear: Vector = ZERO
     angular: Vector = ZERO
 
     def seen_from(self, quat_xyzw: Quaternion) -> Twist:
-        """Returns the same twist in the axes of a frame of that orientation."""
+        """Expresses the twist in the axes of a frame with the orientation `quat_xyzw`."""
         return Twist(rotated_back(quat_xyzw, self.linear), rotated_back(quat_xyzw, self.angular))
 
 
 def normalized(quat_xyzw: Sequence[float]) -> Quaternion:
-    """Returns the unit quaternion of the same rotation."""
+    """Scales a quaternion x, y, z, w to length 1."""
     norm = math.hypot(*quat_xyzw)
     x, y, z, w = (component / norm for component in quat_xyzw)
     return x, y, z, w
 
 
 def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Returns the rotation by `b`, then by `a`, both about fixed axes."""
+    """Returns the product `a b`: the rotation by `b`, followed by the rotation by `a`, both about fixed axes."""
     x, y, z, w = a
     bx, by, bz, bw = b
     return (
@@ -103,19 +104,19 @@ def norm(a: Vector) -> float:
 
 
 def shortened_to(a: Vector, length: float) -> Vector:
-    """Returns a vector, shortened if it is longer than `length`."""
+    """Scales a vector down to the length `length` if it is longer; otherwise returns the vector unchanged."""
     now = norm(a)
     return a if now <= length else scaled(length / now, a)
 
 
 def turned_about_z(a: Vector, yaw: float) -> Vector:
-    """Returns a vector, turned about z by an angle [rad]."""
+    """Rotates a vector about z by the angle `yaw` [rad]."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return cos * a[0] - sin * a[1], sin * a[0] + cos * a[1], a[2]
 
 
 def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Returns a vector of a frame of that orientation in the axes of the frame around it."""
+    """Rotates a vector: converts it from the axes of a frame with this orientation to the axes of the parent frame."""
     x, y, z, w = quat_xyzw
     tx, ty, tz = cross((2.0 * x, 2.0 * y, 2.0 * z), a)
     cx, cy, cz = cross((x, y, z), (tx, ty, tz))
@@ -123,25 +124,25 @@ def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
 
 
 def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Returns a vector in the axes of a frame of that orientation."""
+    """Rotates a vector back: converts it from the parent's axes to the axes of a frame with this orientation."""
     x, y, z, w = quat_xyzw
     return rotated((-x, -y, -z, w), a)
 
 
 def quaternion_of(rotation: Vector) -> Quaternion:
-    """Returns the quaternion of a rotation vector [rad]."""
+    """Converts a rotation vector [rad] to a quaternion x, y, z, w."""
     angle = math.hypot(*rotation)
     x, y, z = scaled(0.5 if angle < 1e-9 else math.sin(angle / 2.0) / angle, rotation)
     return x, y, z, math.cos(angle / 2.0)
 
 
 def angle_between(start: Quaternion, end: Quaternion) -> float:
-    """Returns the angle [rad] between two orientations; q and -q are the same one."""
+    """Returns the angle between two orientations, from 0 to pi [rad]; q and -q are the same orientation."""
     return norm(rotation_between(start, end))
 
 
 def rotation_between(start: Quaternion, end: Quaternion) -> Vector:
-    """Returns the rotation vector [rad] of the shorter rotation from one orientation to another."""
+    """Returns the rotation vector [rad] of the shorter rotation from `start` to `end`, about fixed axes."""
     w0, w1 = start[3], end[3]
     v0, v1 = start[:3], end[:3]
     x, y, z = minus(minus(scaled(w0, v1), scaled(w1, v0)), cross(v1, v0))

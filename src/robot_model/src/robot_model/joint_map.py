@@ -1,4 +1,4 @@
-"""The affine map from the driven joints to all joints, mimic joints included."""
+"""The affine map from positions of driven joints to positions of other joints, such as mimic joints."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ Array = NDArray[np.float64]
 
 
 class AffineMap(NamedTuple):
-    """Positions of m joints as a function of n driven ones: `factors @ q + offsets`.
+    """Positions of m joints as a function of the positions q of n driven joints: `factors @ q + offsets`.
 
     Attributes:
-        factors: m x n; velocities of the m joints are this times those of the n.
-        offsets: m [rad or m].
+        factors: Matrix m x n, which also maps velocities of the n joints to velocities of the m joints.
+        offsets: Positions of the m joints for q = 0, shape (m,) [rad or m].
     """
 
     factors: Array
     offsets: Array
 
     def __call__(self, q: Array) -> Array:
-        """Returns m positions for n, or k x m for k x n [rad or m]."""
+        """Maps n driven positions to m positions, or k x n driven positions to k x m positions [rad or m]."""
         positions: Array = q @ self.factors.T + self.offsets
         return positions
 
@@ -37,13 +37,13 @@ class AffineMap(NamedTuple):
         mimics: Mapping[str, Mimic],
         still: Mapping[str, float] | None = None,
     ) -> AffineMap:
-        """Returns the map to the joints of some names.
+        """Returns the map from driven joints to selected joints.
 
         Args:
-            names: The m joints.
-            driven: The n joints.
-            mimics: For each mimic joint by name, the joint that it follows, which may itself mimic another.
-            still: Positions of the joints that are neither driven nor follow a driven one [rad or m], 0 by default.
+            names: Names of the m selected joints.
+            driven: Names of the n driven joints.
+            mimics: Mimic relations by the name of the mimic joint; a followed joint may itself be a mimic joint.
+            still: Positions of joints that are not driven, by name [rad or m]; 0 for joints without an entry.
         """
         columns = {name: column for column, name in enumerate(driven)}
         factors, offsets = np.zeros((len(names), len(driven))), np.zeros(len(names))
@@ -58,10 +58,10 @@ class AffineMap(NamedTuple):
 
 
 def followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
-    """Returns the joint that a mimic joint finally follows, which follows no other.
+    """Resolves a chain of mimic joints: returns the relation of a mimic joint to the last joint of the chain.
 
     Raises:
-        ValueError: If it follows itself; the message names the joint.
+        ValueError: If the chain is a loop; the message names the joint.
     """
     leader, multiplier, offset = mimics[name]
     passed: Collection[str] = {name}

@@ -1,4 +1,4 @@
-"""Limits of joints, and positions within them where a search starts."""
+"""Joint limits, and start positions of a search within the limits."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 MAX_MAGNITUDE = 1e9
-"""Largest accepted position, velocity or effort, in any unit; squares of larger ones may overflow."""
+"""Largest accepted position, velocity or effort, in any unit. Squares of larger numbers may overflow."""
 LIMIT_ROUNDING = 1e-6
-"""Distance beyond a limit [rad or m] up to which a position counts as within."""
+"""Distance beyond a limit up to which a position still counts as within the limits [rad or m]."""
 TURN = 2.0 * math.pi
 Generator = random.Random | np.random.Generator
 
@@ -31,15 +31,16 @@ class Axis(Protocol):
 
 
 class Limits:
-    """Limits of n joints, as plain numbers, which are faster than small arrays.
+    """Limits of n joints, stored as plain numbers, which are faster than small arrays.
 
     Args:
-        lower: n lower limits [rad or m], -inf where there is none.
-        upper: n upper limits [rad or m], inf where there is none.
-        is_revolute: Which joints turn.
+        lower: n lower limits [rad or m]; -inf for joints without a lower limit.
+        upper: n upper limits [rad or m]; inf for joints without an upper limit.
+        is_revolute: For each of the n joints, whether it is revolute or continuous.
 
     Attributes:
-        middle: n positions half-way between the limits; if one limit is missing, the allowed position nearest to 0.
+        middle: n positions half-way between the limits. For a joint without both limits, the allowed position that is
+            nearest to 0.
     """
 
     def __init__(self, lower: Sequence[float], upper: Sequence[float], is_revolute: Sequence[bool]) -> None:
@@ -52,25 +53,27 @@ class Limits:
 
     @classmethod
     def of_joints(cls, joints: Sequence[Axis]) -> Limits:
-        """Returns the limits of some joints."""
+        """Collects the limits of several joints, in their order."""
         lower, upper = [joint.lower for joint in joints], [joint.upper for joint in joints]
         return cls(lower, upper, [joint.is_revolute for joint in joints])
 
     def of(self, members: Sequence[int]) -> Limits:
-        """Returns the limits of some of the joints, by their places among the n."""
+        """Returns the limits of a subset of the joints, selected by their indices."""
         lower, upper = [self.lower[i] for i in members], [self.upper[i] for i in members]
         return Limits(lower, upper, [self.is_revolute[i] for i in members])
 
     def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], list[bool]]:
-        """Returns positions within the limits, and which of them stopped at one.
+        """Moves positions into the limits: revolute joints by whole turns if possible, otherwise by clipping.
 
-        Revolute joints are moved by whole turns to get there. A position that exceeds a limit only by rounding is set
-        to the limit, and does not count as stopped.
+        A position that exceeds a limit by at most `LIMIT_ROUNDING` is set to the limit, and does not count as clipped.
 
         Args:
             q: n positions [rad or m].
-            near: n positions; of several equivalent angles within limits, revolute joints take the one nearest to
-                these.
+            near: n reference positions [rad or m]. If several equivalent angles of a revolute joint are within the
+                limits, the angle nearest to its reference position is preferred.
+
+        Returns:
+            The n positions within the limits, and for each position whether it was clipped.
         """
         inside, stopped = [], []
         for position, close, (lower, upper, is_revolute) in zip(q, near, self._joints):
@@ -90,7 +93,10 @@ class Limits:
         return [min(max(position, lower), upper) for position, lower, upper in zip(q, self.lower, self.upper)]
 
     def random(self, generator: Generator, near: Sequence[float]) -> list[float]:
-        """Returns random positions within the limits; joints without limits get half a turn or 1 m around `near`."""
+        """Draws random positions within the limits, uniformly.
+
+        Where a limit is missing, the range ends half a turn or 1 m from the joint's position in `near`.
+        """
         positions = []
         for close, (lower, upper, is_revolute) in zip(near, self._joints):
             half = math.pi if is_revolute else 1.0
@@ -100,12 +106,12 @@ class Limits:
         return positions
 
     def starts(self, first: list[float], restarts: int, seed: Callable[[], Generator]) -> Iterator[list[float]]:
-        """Yields n positions to start a search at [rad or m].
+        """Yields configurations at which a search starts, each with n positions [rad or m].
 
         Args:
-            first: The first n positions.
-            restarts: Number of random ones after it.
-            seed: Returns the random generator; only called when random positions are needed, since making it is slow.
+            first: The first configuration.
+            restarts: Number of random configurations that follow.
+            seed: Makes the random generator, which is slow, so `seed` is called only when the second one is requested.
         """
         yield first
         generator = seed()
@@ -114,7 +120,7 @@ class Limits:
 
 
 def _turned(position: float, lower: float, upper: float) -> float:
-    """Returns an angle outside limits, moved by whole turns until it no longer exceeds the limit that it exceeded."""
+    """Moves an angle by whole turns until it no longer exceeds the limit that it exceeded, and returns it."""
     if position > upper:
         return position - TURN * math.ceil((position - upper - LIMIT_ROUNDING) / TURN)
     return position + TURN * math.ceil((lower - position - LIMIT_ROUNDING) / TURN)

@@ -1,10 +1,10 @@
-"""Equations with symmetric positive definite matrices, such as mass matrices.
+"""Linear equations with symmetric positive definite matrices, such as mass matrices.
 
-For matrices of up to about 60 rows, the results are the same to the last bit with any number of LAPACK's threads,
-unlike those of `numpy.linalg.solve` and `inv`. With several right-hand sides, LAPACK's threads would also wait for each
-other, on a busy machine much longer than the computation takes.
+For matrices of up to about 60 rows, the results are the same to the last bit with any number of LAPACK threads. This
+does not hold for `numpy.linalg.solve` and `inv`. On a busy machine, LAPACK's threads may also wait for each other much
+longer than the computation takes; so `solve` takes only one right-hand side.
 
-The functions do not check that a matrix is symmetric and positive definite; for others, the results are undefined.
+The functions do not check that a matrix is symmetric and positive definite. For other matrices, results are undefined.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 def solve(matrix: Array, right: Array) -> Array:
-    """Returns x of matrix x = right, for a matrix of shape (n, n); `right` and x have shape (n,)."""
+    """Solves `matrix @ x = right` for x; the matrix has shape (n, n), `right` and x have shape (n,)."""
     from scipy.linalg import lapack  # slow to import, and most worlds do not need it
 
     solution: Array = lapack.dposv(matrix, right)[1]
@@ -22,7 +22,7 @@ def solve(matrix: Array, right: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """Returns the inverse of a matrix, both of shape (n, n)."""
+    """Returns the inverse of a matrix of shape (n, n)."""
     from scipy.linalg import lapack
 
     root = lapack.dtrtri(lapack.dpotrf(matrix, lower=1)[0], lower=1)[0]

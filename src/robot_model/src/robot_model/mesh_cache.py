@@ -1,4 +1,4 @@
-"""Cache of files that are made from meshes, by a hash of the meshes, in the user's cache folder."""
+"""Cache of files computed from meshes, in the user's cache folder; folder names contain a hash of the mesh files."""
 
 import errno
 import hashlib
@@ -13,9 +13,9 @@ from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import shortened
 
 MAX_FILE_BYTES = 1_000_000_000
-"""Largest length of a file."""
+"""Largest length of a file [bytes]."""
 MAX_FILES = 100
-"""Largest number of files of a mesh, with its materials and textures."""
+"""Largest number of files of one mesh, including its materials and textures."""
 
 
 def cache_folder() -> Path:
@@ -24,10 +24,14 @@ def cache_folder() -> Path:
 
 
 def content_hash(file: str, *parameters: object) -> str:
-    """Returns a hash of all files that PyBullet reads for a mesh, of its version if it is installed, and of parameters.
+    """Returns a hash of everything that a result computed from a mesh depends on.
+
+    The hash covers the mesh file and the materials and textures that it names, PyBullet's version, and `parameters`.
+    Missing files are ignored.
 
     Raises:
-        OSError: If one of its files exists, but is no ordinary file, or if it names too many.
+        OSError: If a material or texture exists but cannot be read as an ordinary file, or if there are more than
+            `MAX_FILES` files.
     """
     digest = hashlib.blake2b(f"{parameters} {_pybullet_version()}".encode(), digest_size=16)
     waiting, seen = [Path(file)], set()
@@ -58,7 +62,7 @@ def _pybullet_version() -> str:
 
 
 def files_named_in(data: bytes) -> Iterator[tuple[bytes, str]]:
-    """Yields each line of an OBJ file, or of its materials, that names a file, with that name."""
+    """Yields the lines of an OBJ or MTL file that name a file (`mtllib`, `map_...`), each with the file name."""
     for line in io.BytesIO(data):
         words = line.split(None, 1)
         if len(words) == 2 and (words[0] == b"mtllib" or words[0].startswith(b"map_")) and b"\0" not in line:
@@ -66,13 +70,13 @@ def files_named_in(data: bytes) -> Iterator[tuple[bytes, str]]:
 
 
 def cached(name: str, make: Callable[[Path], None]) -> Path:
-    """Returns a folder of the cache, which is made if it is missing.
+    """Makes a folder in the cache if it does not exist, and returns its path.
 
-    If several processes make it at the same time, the first result is kept.
+    If several processes make the same folder at the same time, the first result is kept.
 
     Args:
-        name: Its name, with a hash of everything that its content depends on.
-        make: Fills an empty folder.
+        name: Name of the folder, which should contain a hash of everything that the content depends on.
+        make: Function that writes the content into an empty folder.
 
     Raises:
         OSError: If the cache cannot be written.

@@ -1,4 +1,4 @@
-"""A robot as its URDF describes it: joints, limits and kinematics."""
+"""Robot model read from a URDF: joints, limits and kinematics."""
 
 from __future__ import annotations
 
@@ -20,17 +20,21 @@ from .urdf.elements import UrdfJoint
 from .urdf.structure import check_structure
 
 MAX_JOINTS = 500
-"""Largest number of joints that are not fixed; memory and time of kinematics grow with its square."""
+"""Largest number of joints that are not fixed. Memory and time for kinematics grow with the square of this number."""
 MAX_OUTSIDE = 0.1
-"""Distance outside its limits up to which `RobotModel.reach` holds for a prismatic joint [rad or m]."""
+"""Distance beyond the joint limits up to which the bounds of `RobotModel.reach` are valid [rad or m]."""
 
 
 def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
-    """Returns a URDF whose structure is sound.
+    """Reads a URDF and checks its structure.
+
+    Args:
+        urdf_path: Path of the URDF.
+        not_xml: Start of the error message for a file that is not well-formed XML.
 
     Raises:
-        ConfigError: If the file cannot be read, is not well-formed, describes no robot, or one with more than
-            `MAX_JOINTS` joints that are not fixed, or a joint makes no sense.
+        ConfigError: If the file cannot be read or is not well-formed, if its structure or a joint is invalid, or if
+            more than `MAX_JOINTS` joints are not fixed.
     """
     document = UrdfDocument(urdf_path, not_xml=not_xml)
     check_structure(document)
@@ -45,28 +49,28 @@ def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
 
 
 class RobotModel:
-    """Joints, limits and kinematics of a robot, a tree of links.
+    """Joints, limits and kinematics of a robot, whose links form a tree.
 
-    Configurations have one number for each of n driven joints, in a fixed order. Mimic joints follow theirs; all other
-    joints are at 0, or at the limit nearest to 0.
+    A configuration has one position for each of n driven joints, in the order of `joint_names`. Mimic joints follow
+    their joints. All other joints are at 0, or at the limit nearest to 0.
 
     Args:
-        urdf_path: The URDF; the meshes that it names need not be there.
-        joint_names: The n driven joints; by default all joints with one axis that do not mimic another.
+        urdf_path: Path of the URDF; its meshes need not exist.
+        joint_names: Names of the n driven joints. By default all joints with one axis, except mimic joints.
 
     Attributes:
-        urdf_path: The URDF.
-        document: The URDF, read.
-        all_joints: All joints by name.
-        joint_names: The n driven joints.
-        joints: Their descriptions.
-        limits: Their limits.
+        urdf_path: Path of the URDF.
+        document: The parsed URDF.
+        all_joints: All joints of the URDF by name.
+        joint_names: Names of the n driven joints.
+        joints: Descriptions of the n driven joints.
+        limits: Limits of the n driven joints.
         links: Names of all links.
-        root: Name of the link that is no joint's child.
+        root: Name of the root link.
 
     Raises:
-        ConfigError: If the description cannot be read, or a joint makes no sense.
-        UnknownNameError: If a joint is not known, or does not move by itself.
+        ConfigError: If the URDF cannot be read, or a joint is invalid.
+        UnknownNameError: If a driven joint does not exist, is a mimic joint, or does not have one axis.
     """
 
     def __init__(self, urdf_path: str, joint_names: Sequence[str] = ()) -> None:
@@ -92,12 +96,12 @@ class RobotModel:
 
     @cached_property
     def still(self) -> frozenset[str]:
-        """Names of the fixed joints; joint states may include them."""
+        """Names of the fixed joints, which joint states may include."""
         return frozenset(name for name, joint in self.all_joints.items() if joint.type == "fixed")
 
     @cached_property
     def telescopic(self) -> tuple[str, ...]:
-        """Names of the driven prismatic joints that move links which other driven joints turn."""
+        """Names of the driven joints that move a prismatic joint which is below a driven revolute joint in the tree."""
         return tuple(dict.fromkeys(name for link in self.links for name in self._telescopic_to(link)))
 
     @cached_property
@@ -106,22 +110,22 @@ class RobotModel:
         return LinkFrames(self.all_joints.values(), self.map_to)
 
     def map_to(self, names: Sequence[str]) -> AffineMap:
-        """Returns the map from the n driven joints to some joints, by their names."""
+        """Returns the map from positions of the n driven joints to positions of the joints called `names`."""
         driven = frozenset(self.joint_names)
         still = {name: joint.rest for name, joint in self.all_joints.items() if name not in driven}
         return AffineMap.of(names, self.joint_names, self.document.mimics, still)
 
     def pose(self, positions: Sequence[float], link: str, base: str | None = None) -> Pose:
-        """Returns the pose of a link in another one, by default the root.
+        """Returns the pose of a link in another link.
 
         Args:
-            positions: n positions [rad or m].
-            link: The link.
-            base: The other link.
+            positions: Positions of the n driven joints [rad or m].
+            link: Name of the link.
+            base: Name of the link in whose frame the pose is expressed; by default the root link.
 
         Raises:
-            UnknownNameError: If there is no such link.
-            ValueError: If there are not n finite positions.
+            UnknownNameError: If `link` or `base` does not exist.
+            ValueError: If `positions` are not n finite numbers.
         """
         q = finite_vector(positions, len(self.joint_names), "positions")[None]
         poses = []
@@ -132,17 +136,17 @@ class RobotModel:
         return poses[0].inverse() @ poses[1]
 
     def check_link(self, name: str) -> str:
-        """Returns the name of a link.
+        """Checks that a link exists, and returns its name.
 
         Raises:
-            UnknownNameError: If there is no such link.
+            UnknownNameError: If the link does not exist.
         """
         if name not in self.links:
             raise UnknownNameError("link", name, self.links)
         return name
 
     def chain(self, link: str) -> list[UrdfJoint]:
-        """Returns the joints from the root to a link."""
+        """Returns all joints between the root and a link, fixed joints included, in the order from the root."""
         joints = []
         while link != self.root:
             joints.append(self._above[link])
@@ -150,17 +154,18 @@ class RobotModel:
         return joints[::-1]
 
     def reach(self, link: str, radius_m: float, other: str | None = None) -> Array:
-        """Returns upper bounds of the distances that n joints move any point of a link in another link.
+        """Returns, for each of the n joints, an upper bound on the motion of a link's points in another link.
 
-        Each bound is for a motion of its joint by 1 rad or 1 m.
+        A bound is the largest distance that a point may move per 1 rad or 1 m of joint motion, shape (n,) [m/rad or 1].
 
         Args:
-            link: The link.
-            radius_m: Distance of the farthest point of its shape from its origin [m].
-            other: The other link, by default the root; joints above both have no effect.
+            link: Name of the link.
+            radius_m: Distance from the link's origin to the farthest point of its shape [m].
+            other: Name of the link in which the motion is observed; by default the root. Joints above both links do
+                not contribute.
 
         Raises:
-            ConfigError: If a distance has no bound.
+            ConfigError: If a bound is infinite because a prismatic joint has no limits.
         """
         factors, _ = self._joint_motions
         common = {joint.name for joint in self.chain(self.root if other is None else other)}
@@ -182,20 +187,20 @@ class RobotModel:
 
     @cached_property
     def _joint_motions(self) -> tuple[dict[str, Array], dict[str, float]]:
-        """Absolute values of the map to joints that move: by name, its n factors and its offset [rad or m]."""
+        """The n factors, and the offset [rad or m], of each moving joint in `map_to`, by name; absolute values."""
         moving = [joint.name for joint in self.all_joints.values() if joint.is_moving]
         factors, offsets = self.map_to(moving)
         return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))
 
     def _travel(self, name: str) -> float:
-        """Returns the largest distance of a joint from its position 0 [rad or m]."""
+        """Returns the largest absolute position of a joint up to `MAX_OUTSIDE` beyond its limits [rad or m]."""
         factors, offsets = self._joint_motions
         farthest = (max(abs(joint.lower), abs(joint.upper)) + MAX_OUTSIDE for joint in self.joints)
         travels = (factor * most for factor, most in zip(factors[name].tolist(), farthest) if factor)
         return offsets[name] + sum(travels)
 
     def _telescopic_to(self, link: str) -> list[str]:
-        """Returns the names of the driven joints that slide a link which other driven joints turn."""
+        """Returns the names in `telescopic` for the chain from the root to one link; names may repeat."""
         factors, _ = self._joint_motions
         turned, telescopic = False, []
         for joint in self.chain(link):

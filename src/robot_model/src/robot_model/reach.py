@@ -1,4 +1,4 @@
-"""Targets of a link: whether a chain of joints can reach one, and how far the link is from it."""
+"""Checks whether a chain of joints can reach a target pose, and measures the error between a link and its target."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Reach(NamedTuple):
     """Ball that contains all positions of the tip of a chain of joints.
 
     Attributes:
-        anchor: Its centre, the position of the first moving joint in the base frame [m].
-        radius_m: Its radius [m]; inf if a prismatic joint has no limits.
+        anchor: Centre of the ball: the position of the first moving joint in the base frame [m].
+        radius_m: Radius of the ball [m]; inf if a prismatic joint has no limits.
     """
 
     anchor: Vector
@@ -28,30 +28,30 @@ class Reach(NamedTuple):
 
     @classmethod
     def of(cls, anchor: Vector, lengths: Iterable[float], joints: Iterable[Axis]) -> Reach:
-        """Returns the reach of a chain of moving joints.
+        """Computes the ball for a chain of joints.
 
         Args:
             anchor: Position of the first moving joint in the base frame [m].
-            lengths: Distances from each joint to the next one, and to the tip [m].
-            joints: The moving joints.
+            lengths: Distance from each joint to the next joint, and from the last joint to the tip [m].
+            joints: The moving joints of the chain.
         """
         travel = [max(abs(joint.lower), abs(joint.upper)) for joint in joints if not joint.is_revolute]
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Returns whether the tip may reach a position in the base frame [m].
+        """Returns whether a position in the base frame [m] is within the ball, so that the tip may reach it.
 
-        The ball counts as larger by `POSITION_TOLERANCE_M`, and by a further tolerance [m].
+        `POSITION_TOLERANCE_M` and `tolerance_m` are added to the radius.
         """
         return math.dist(position, self.anchor) <= self.radius_m + tolerance_m + POSITION_TOLERANCE_M
 
 
 class Residual(NamedTuple):
-    """Distance between a link and its target.
+    """Position and orientation error between a link and its target pose.
 
     Attributes:
-        position_m: Distance [m].
-        orientation_rad: Angle [rad]; 0 if the target has no orientation.
+        position_m: Distance between the positions [m].
+        orientation_rad: Angle between the orientations [rad]; 0 if the target has no orientation.
     """
 
     position_m: float
@@ -59,7 +59,7 @@ class Residual(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The larger of both errors in multiples of its tolerance; the target counts as reached up to 1."""
+        """The larger of the two errors, each divided by its tolerance. Up to 1, the target counts as reached."""
         return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
 
     def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
@@ -67,8 +67,8 @@ class Residual(NamedTuple):
 
         Args:
             link: Name of the link.
-            has_orientation: Whether the target has an orientation, whose error is included.
-            target: The target, for the sentence.
+            has_orientation: Whether the sentence includes the orientation error.
+            target: Words for the target in the sentence.
         """
         angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
         if self.size <= 1.0:

@@ -16,22 +16,22 @@ from .shapes import Obstacle, collision_shapes
 from .solids import ClosestPoints, Solid
 
 Geometry = Literal["hulls", "exact"]
-"""Meshes as their convex hulls; or, where hulls are near each other, as their triangles."""
+"""How meshes are measured: always as convex hulls, or as triangles where two hulls are near each other."""
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
 SIGN_STEP = 1e-4
-"""Step of the joints by which the sign of a gradient is tried [rad or m]."""
+"""Largest joint motion of the small step that determines the sign of a gradient [rad or m]."""
 MIN_GRADIENT = 1e-6
-"""Largest gradient of a distance that counts as none [m/rad]."""
+"""A gradient of a distance below this threshold counts as zero [m/rad]."""
 
 
 class Shapes(Protocol):
-    """Convex collision shapes of a robot and of obstacles, in a library that measures distances.
+    """Convex collision shapes of a robot and of obstacles, held by a library that measures distances.
 
-    `FclShapes` implements it with hpp-fcl. Obstacles have numbers.
+    `FclShapes` implements this protocol with hpp-fcl. Each obstacle is identified by a number.
 
     Attributes:
-        links: Links that have a collision shape.
+        links: Names of the links that have a collision shape.
     """
 
     links: tuple[str, ...]
@@ -40,44 +40,57 @@ class Shapes(Protocol):
         """Moves the robot to a configuration of n positions [rad or m]."""
 
     def put(self, number: int, obstacle: Obstacle) -> None:
-        """Adds an obstacle, and removes the previous one of its number.
+        """Adds an obstacle, and removes the previous obstacle with the same number.
 
         Raises:
-            ValueError: If the library cannot represent it.
+            ValueError: If the library cannot represent the obstacle.
         """
 
     def move(self, number: int, pose: Pose) -> None:
-        """Moves an obstacle to a pose in the robot's root link."""
+        """Moves an obstacle to a pose, given in the frame of the robot's root link."""
 
     def remove(self, number: int) -> None:
-        """Removes the obstacle of a number, if there is one."""
+        """Removes the obstacle with this number, if it exists."""
 
     def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
-        """Returns the closest points of each pair of shapes of a link and of another link or an obstacle.
+        """Measures each shape of a link against each shape of another link or of an obstacle.
 
-        Pairs that are further apart than `most_m` [m] are left out.
+        Args:
+            link: Name of the link.
+            other: Name of the other link, or number of the obstacle.
+            most_m: Largest distance [m]; pairs of shapes that are further apart are left out.
+
+        Returns:
+            The closest points of each pair of shapes.
         """
 
     def solids_of(self, link: str) -> list[Solid]:
-        """Returns the shapes of a link in its frame, at least as large as the library measures them."""
+        """Returns balls around the shapes of a link, in the link's frame; they contain the shapes of the library."""
 
     def solids_of_obstacle(self, number: int) -> list[Solid]:
-        """Returns the shapes of an obstacle in its own frame, as `solids_of`."""
+        """Returns balls around the shapes of an obstacle, in the obstacle's own frame; see `solids_of`."""
 
     def radius_m(self, link: str, origin: np.ndarray) -> float:
-        """Returns the largest distance of the shapes of a link from a point in the root link [m]."""
+        """Returns the distance from a point to the farthest point of a link's shapes [m].
+
+        Args:
+            link: Name of the link, which is measured in the present configuration.
+            origin: The point x, y, z in the robot's root link [m].
+        """
 
 
 class Contact(NamedTuple):
-    """Distance between a link and another link or an obstacle.
+    """Distance between a link (the first body) and another link or an obstacle (the second body).
+
+    All vectors are in the frame of the robot's root link.
 
     Attributes:
-        distance: Distance between their surfaces; negative if they penetrate [m].
-        direction: Unit vector from one to the other, in either sense, in the robot's root link.
-        first: The closest point of the first, in the root link [m].
-        second: The closest point of the second, in the root link [m].
-        directions: `direction` for each pair of their shapes.
-        is_exact: Whether exact shapes were measured: then `direction` points from the second to the first.
+        distance: Distance between the surfaces; negative if the bodies penetrate each other [m].
+        direction: Unit vector along the line between the closest points. Its sign is arbitrary unless `is_exact`.
+        first: The closest point on the first body [m].
+        second: The closest point on the second body [m].
+        directions: Such a unit vector for each pair of shapes of the two bodies.
+        is_exact: Whether exact shapes were measured; then `direction` points from the second body to the first.
     """
 
     distance: float
@@ -91,21 +104,21 @@ class Contact(NamedTuple):
 class LinkDistances:
     """Distances between the links of a robot, and between links and obstacles.
 
-    Meshes are measured as their convex hulls. With exact geometry, meshes whose hulls are near each other are measured
-    by their triangles.
+    Meshes are measured as convex hulls. With `geometry="exact"`, meshes are measured as triangles where their hulls are
+    near each other.
 
     Args:
         robot: The robot; the files of its collision meshes must exist.
-        shapes: Its shapes in a library that measures distances.
-        geometry: Whether meshes near each other are measured exactly.
+        shapes: The robot's shapes in a library that measures distances.
+        geometry: `hulls`, or `exact` to measure triangles where hulls are near each other.
 
     Attributes:
-        links: Links that have a collision shape.
-        radius_m: Largest distance of the shapes of each link from its origin [m].
+        links: Names of the links that have a collision shape.
+        radius_m: For each link, the largest distance of its shapes from the link's origin [m].
 
     Raises:
         ConfigError: If exact shapes cannot be read.
-        MissingDependency: If exact shapes need a library that is not installed.
+        MissingDependency: If `geometry` is `exact` and hpp-fcl is not installed.
     """
 
     def __init__(self, robot: RobotModel, shapes: Shapes, geometry: Geometry = "hulls") -> None:
@@ -125,10 +138,10 @@ class LinkDistances:
         self._shapes.place(q)
 
     def place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[int]:
-        """Replaces all obstacles; returns the numbers of those that are new or have moved.
+        """Replaces all obstacles, and returns the numbers of the obstacles that are new or have moved.
 
         Raises:
-            ValueError: If the library cannot represent one.
+            ValueError: If the library cannot represent an obstacle.
         """
         before, changed = self._obstacles, list[int]()
         self._obstacles = ()
@@ -149,13 +162,20 @@ class LinkDistances:
         return changed
 
     def solids(self, member: str | int) -> list[Solid]:
-        """Returns the shapes of a link in its frame, see `LinkFrames`, or those of an obstacle in the root link."""
+        """Returns balls around the shapes of a link, in its frame of `LinkFrames`, or of an obstacle, in the root link.
+
+        Args:
+            member: Name of the link, or number of the obstacle.
+        """
         if isinstance(member, str):
             return self._solids[member]
         return [solid.moved(0, self._pose(member)) for solid in self._solids[member]]
 
     def pieces(self, member: str | int) -> list[Any]:
-        """Returns the exact shapes of a link or an obstacle as `solids` does; none where hulls are used."""
+        """Returns the exact shapes of a link or an obstacle, in the same frames as `solids`.
+
+        The list is empty for planes and point sets, which are always measured as hulls. Requires exact geometry.
+        """
         if isinstance(member, str):
             return self._pieces[member]
         return [piece.moved(0, self._pose(member)) for piece in self._pieces[member]]
@@ -164,22 +184,28 @@ class LinkDistances:
         return matrix_of(*self._obstacles[obstacle].pose)
 
     def frames(self, q: np.ndarray) -> np.ndarray:
-        """Returns the frames of links in k configurations of n positions, see `LinkFrames.at`."""
+        """Returns the frames of the links in k configurations, given as k x n positions; see `LinkFrames.at`."""
         return self._robot.frames.at(q)
 
     def distance(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> float:
-        """Returns the distance of a pair in the present configuration [m]; inf beyond `most_m`, see `contact`."""
+        """Returns the distance of a pair in the present configuration [m]; inf beyond `most_m`.
+
+        See `contact` for the arguments.
+        """
         contact = self.contact(pair, most_m, within_m)
         return math.inf if contact is None else contact.distance
 
     def contact(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> Contact | None:
-        """Returns the contact of a pair in the present configuration; None if it is too far apart.
+        """Measures a pair in the present configuration.
 
         Args:
-            pair: The pair.
+            pair: Two links, or a link and the number of an obstacle.
             most_m: Largest distance that is measured [m].
-            within_m: Required distance [m]. If hulls are nearer, exact shapes are measured, if there are any; if these
-                are at least that far apart, the distance returned is `within_m`.
+            within_m: Required distance [m], for exact geometry. If the hulls are nearer than this, the exact shapes are
+                measured. If the exact shapes are at least this far apart, the returned distance is `within_m`.
+
+        Returns:
+            The contact; None if the distance exceeds `most_m`.
         """
         points = self._shapes.closest(*pair, most_m)
         if not points:
@@ -191,10 +217,7 @@ class LinkDistances:
         return self._exactly(pair, contact, within_m)
 
     def _exactly(self, pair: Pair, contact: Contact, within_m: float) -> Contact:
-        """Returns the contact of the exact shapes of a pair.
-
-        It is that of the hulls if there are no exact shapes, or they penetrate.
-        """
+        """Measures the exact shapes of a pair; returns the hulls' contact if exact shapes are missing or penetrate."""
         assert self._exact is not None
         pieces = [self.pieces(member) for member in pair]
         if not all(pieces):
@@ -207,14 +230,15 @@ class LinkDistances:
         return Contact(*found, directions=contact.directions, is_exact=True)
 
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
-        """Returns the derivative of the distance of a pair by each of n joints [m/rad or 1].
+        """Returns the derivatives of a pair's distance with respect to the n joint positions, shape (n,) [m/rad or 1].
 
-        Libraries do not say in which sense `direction` points. So the robot moves by a small step, and back.
+        The sign of `contact.direction` is arbitrary unless exact shapes were measured. To find the sign, the modelled
+        robot moves by a small step, and back.
 
         Args:
-            pair: The pair.
-            contact: Its contact in the present configuration.
-            q: The present configuration, n positions.
+            pair: Two links, or a link and the number of an obstacle.
+            contact: The pair's contact in the present configuration.
+            q: The present configuration, n positions [rad or m].
         """
         gradient = np.zeros(len(q))
         for link, point, sign in ((pair[0], contact.first, 1.0), (pair[1], contact.second, -1.0)):
@@ -229,7 +253,10 @@ class LinkDistances:
         return gradient if is_further else -gradient
 
     def reach(self, pair: Pair) -> np.ndarray:
-        """Returns upper bounds of the change of a pair's distance by each of n joints, see `RobotModel.reach`."""
+        """Returns n upper bounds on the change of a pair's distance per rad or m of each joint.
+
+        See `RobotModel.reach`.
+        """
         a, b = pair
         if isinstance(b, int):
             return self._robot.reach(a, self.radius_m[a])

@@ -1,4 +1,4 @@
-"""Distances between exact shapes by hpp-fcl: meshes are their triangles instead of convex hulls."""
+"""Distances between exact shapes, measured by hpp-fcl: meshes are triangles instead of convex hulls."""
 
 import math
 from collections.abc import Sequence
@@ -22,19 +22,19 @@ from .shapes import CollisionShape, Obstacle, ObstacleKind
 from .solids import ClosestPoints, Solid, extent_of
 
 TOUCHING_M = 1e-5
-"""Distance up to which shapes count as penetrating [m], since nearer points have no direction."""
+"""Distance up to which shapes count as penetrating [m]. Between nearer points, the direction is undefined."""
 OUT_OF_PLACE_M = 0.015
 """Largest difference between the boxes around a link's exact shapes and around its hulls [m]."""
 SAME_M = 1e-7
-"""Corners of a mesh that are nearer to each other count as one [m]."""
+"""Grid size [m]: corners of a mesh that round to the same grid point count as one corner."""
 
 
 class Surface(NamedTuple):
     """Triangles of a mesh.
 
     Attributes:
-        triangles: t x 3 x 3 [m].
-        points: A corner of each connected part, p x 3 [m].
+        triangles: Corners of the t triangles, t x 3 x 3 [m].
+        points: One corner of each connected part of the mesh, p x 3 [m].
         lower: Least x, y and z [m].
         upper: Greatest x, y and z [m].
     """
@@ -45,10 +45,10 @@ class Surface(NamedTuple):
     upper: np.ndarray
 
     def holds(self, points: np.ndarray) -> bool:
-        """Returns whether one of k points, k x 3, is inside the mesh.
+        """Returns whether at least one of k points, k x 3 [m], is inside the mesh.
 
-        A point is inside if the solid angles of the triangles, by Van Oosterom and Strackee (1983), sum up to that of
-        the whole sphere.
+        A point is inside if the solid angles of all triangles, seen from the point, add up to the full sphere (Van
+        Oosterom and Strackee 1983).
         """
         for point in points[((points >= self.lower) & (points <= self.upper)).all(axis=1)]:
             a, b, c = (self.triangles - point).transpose(1, 0, 2)
@@ -65,9 +65,9 @@ class Piece(NamedTuple):
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        pose: Its pose in that frame, 4 x 4.
-        shape: The shape in hpp-fcl.
-        surface: Its triangles, None if it is no mesh.
+        pose: Pose of the shape in that frame, 4 x 4.
+        shape: The hpp-fcl object.
+        surface: Triangles of a mesh; None for other shapes.
     """
 
     frame: int
@@ -76,25 +76,33 @@ class Piece(NamedTuple):
     surface: Surface | None = None
 
     def moved(self, frame: int, pose: np.ndarray) -> "Piece":
-        """Returns it in another frame, in which its present frame has a pose, 4 x 4."""
+        """Returns the shape expressed in another frame.
+
+        Args:
+            frame: Number of the other frame.
+            pose: Pose of the present frame in the other frame, 4 x 4.
+        """
         return self._replace(frame=frame, pose=pose @ self.pose)
 
 
 def pieces_of_link(shapes: Sequence[CollisionShape], solids: Sequence[Solid]) -> list[Piece]:
-    """Returns the collision shapes of a link in its frame.
+    """Returns the exact collision shapes of a link, in the link's frame.
 
     Args:
-        shapes: The shapes.
-        solids: Its hulls, in the same frame.
+        shapes: The link's shapes as the URDF describes them.
+        solids: Balls around the link's hulls, in the link's frame.
 
     Raises:
-        ValueError: If a mesh cannot be read, or its extent is not that of its hull.
+        ValueError: If a mesh cannot be read, or the extents of the exact shapes and of the hulls differ.
     """
     return _placed([_piece(each.kind, each.size, each.mesh_file, each.pose) for each in shapes], solids)
 
 
 def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
-    """Returns an obstacle in its own frame, see `pieces_of_link`; none if it equals its hull anyway."""
+    """Returns the exact shape of an obstacle in its own frame; see `pieces_of_link`.
+
+    The list is empty for planes and point sets, which are measured as hulls.
+    """
     if obstacle.kind in ("plane", "points"):
         return []
     return _placed([_piece(obstacle.kind, obstacle.link_size, obstacle.mesh_file, np.eye(4))], solids)
@@ -114,13 +122,13 @@ def _placed(pieces: list[Piece], solids: Sequence[Solid]) -> list[Piece]:
 def nearest(
     firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float
 ) -> ClosestPoints | None:
-    """Returns the closest points of two groups of shapes; None if they penetrate.
+    """Returns the closest points between two groups of shapes; None if the groups penetrate each other.
 
     Args:
-        firsts: Shapes of one group.
-        seconds: Shapes of the other.
-        frames: m frames, m x 4 x 4.
-        within_m: Largest distance that is measured [m]; it is inf beyond it.
+        firsts: Shapes of the first group.
+        seconds: Shapes of the second group.
+        frames: m frames in the root link, m x 4 x 4.
+        within_m: Largest distance that is measured [m]. If the groups are further apart, the distance is inf.
     """
     found = ClosestPoints(math.inf, ZERO, ZERO, ZERO)
     request = hppfcl.CollisionRequest()
@@ -146,11 +154,14 @@ def nearest(
 
 
 def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
-    """Returns whether a connected part of a piece is inside another piece, in which it has a pose.
+    """Returns whether a connected part of `piece` lies inside `other`, if their surfaces do not touch.
 
-    The surfaces of both do not touch.
+    Args:
+        piece: The piece that may be inside.
+        other: The piece that may enclose it.
+        pose: Pose of `piece` in the frame of `other`, 4 x 4.
     """
-    if other.surface is None:  # solid in hpp-fcl, which finds pieces inside of it
+    if other.surface is None:  # a solid for hpp-fcl, whose collision check also detects pieces inside the solid
         return False
     points = np.zeros((1, 3)) if piece.surface is None else piece.surface.points
     return other.surface.holds(points @ pose[:3, :3].T + pose[:3, 3])
@@ -158,10 +169,10 @@ def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
 
 @lru_cache(maxsize=64)
 def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
-    """Returns a mesh in hpp-fcl, and its triangles.
+    """Reads a mesh, and returns the hpp-fcl object and the triangles.
 
     Raises:
-        ValueError: If it cannot be read.
+        ValueError: If the mesh cannot be read.
     """
     try:
         mesh = load_mesh(file, scale)
@@ -182,7 +193,7 @@ def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
 
 
 def _corners(piece: Piece) -> Solid:
-    """Returns the corners of a mesh, or of the box around any other shape."""
+    """Returns the corners of a mesh, or of the bounding box of any other shape, as balls of radius 0."""
     if piece.surface is None:
         piece.shape.computeLocalAABB()
         low, high = piece.shape.aabb_local.min_, piece.shape.aabb_local.max_

@@ -1,4 +1,4 @@
-"""Distances between collision shapes by hpp-fcl, without a simulator; meshes are replaced by their convex hulls."""
+"""Distances between collision shapes, measured by hpp-fcl without a simulator; meshes become convex hulls."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from .shapes import Obstacle, ObstacleKind, collision_shapes
 from .solids import ClosestPoints, Solid, balls_of, few_balls
 
 TOUCHING_M = 1e-9
-"""Distance between two points below which hpp-fcl's normal is the direction [m]; elsewhere the normal may be NaN."""
+"""Distance between closest points [m] up to which hpp-fcl's normal serves as the direction. At larger distances, the
+normal may be NaN, and the direction is computed from the points."""
 
 
 class Hull(NamedTuple):
@@ -31,9 +32,9 @@ class Hull(NamedTuple):
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        pose: Its pose in that frame, 4 x 4.
-        shape: The shape in hpp-fcl.
-        solid: The same as balls, in its own frame.
+        pose: Pose of the shape in that frame, 4 x 4.
+        shape: The hpp-fcl object.
+        solid: Balls whose convex hull contains the shape, in the shape's own frame.
     """
 
     frame: int
@@ -49,7 +50,7 @@ class FclShapes:
         robot: The robot; the files of its collision meshes must exist.
 
     Attributes:
-        links: Links that have a collision shape.
+        links: Names of the links that have a collision shape.
 
     Raises:
         ConfigError: If a mesh cannot be read.
@@ -132,7 +133,7 @@ def _hull(
 
 
 def primitive(kind: ObstacleKind, size: tuple[float, ...]) -> Any:
-    """Returns a box, sphere, cylinder or capsule in hpp-fcl, with the size of a `CollisionShape`."""
+    """Makes an hpp-fcl box, sphere, cylinder or capsule; `size` is that of a `CollisionShape` of the same kind."""
     if kind == "box":
         return hppfcl.Box(*size)
     if kind == "sphere":
@@ -141,15 +142,19 @@ def primitive(kind: ObstacleKind, size: tuple[float, ...]) -> Any:
 
 
 def transform(pose: np.ndarray) -> Any:
-    """Returns a pose, 4 x 4, for hpp-fcl."""
+    """Converts a pose, 4 x 4, to hpp-fcl's type."""
     return hppfcl.Transform3f(pose[:3, :3], pose[:3, 3])
 
 
 def load_mesh(file: str, scale: tuple[float, ...]) -> Any:
-    """Returns a mesh in hpp-fcl.
+    """Reads a mesh with hpp-fcl.
+
+    Args:
+        file: Path of the mesh.
+        scale: Factors along x, y and z.
 
     Raises:
-        ValueError: If it cannot be read.
+        ValueError: If the mesh cannot be read.
     """
     try:
         return hppfcl.MeshLoader(hppfcl.NODE_TYPE.BV_OBBRSS).load(file, np.array(scale))
@@ -159,10 +164,10 @@ def load_mesh(file: str, scale: tuple[float, ...]) -> Any:
 
 @lru_cache(maxsize=64)
 def mesh_corners(file: str, scale: tuple[float, ...]) -> tuple[Vector, ...]:
-    """Returns the corners of a mesh [m].
+    """Reads a mesh, and returns its scaled corners [m].
 
     Raises:
-        ValueError: If it cannot be read.
+        ValueError: If the mesh cannot be read, or a corner is not finite.
     """
     corners = np.array(load_mesh(file, scale).vertices())
     if not len(corners) or not np.isfinite(corners).all():
@@ -172,7 +177,7 @@ def mesh_corners(file: str, scale: tuple[float, ...]) -> tuple[Vector, ...]:
 
 @lru_cache(maxsize=64)
 def _convex(corners: tuple[Vector, ...]) -> tuple[Any, list[Vector]]:
-    """Returns the convex hull of some points in hpp-fcl, and its corners.
+    """Returns the convex hull of points as an hpp-fcl object, and the hull's corners.
 
     Raises:
         ValueError: If the points are in one plane.

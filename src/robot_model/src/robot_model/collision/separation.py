@@ -1,4 +1,4 @@
-"""Lower bounds of distances: the gaps between parallel planes that separate shapes."""
+"""Lower bounds on distances, computed as gaps between parallel planes that separate shapes."""
 
 from collections.abc import Sequence
 
@@ -7,18 +7,19 @@ import numpy as np
 from .solids import Solid
 
 ROUNDING_M = 1e-4
-"""PyBullet's distances may be that much too small [m]."""
+"""Largest amount by which a distance measured by PyBullet may be too small [m]."""
 
 
 class Separation:
-    """Lower bounds of the distances of p pairs, without measuring them.
+    """Computes lower bounds on the distances of p pairs without measuring the distances.
 
-    A pair is two links, or a link and an obstacle. The distance of two convex shapes is at least their gap along any
-    direction, and equal to it along the line between their closest points. So one direction is stored for each two
-    shapes of a pair, in the frame of the second. Without a direction, the bound is -inf.
+    A pair is two links, or a link and an obstacle. The distance between two convex shapes is at least their gap along
+    any direction. Along the line between their closest points, the gap equals the distance. So each combination of a
+    shape of the first member and a shape of the second member has one stored direction, in the frame of the second
+    shape. Before a direction is stored, the bound is -inf.
 
     Args:
-        pairs: The shapes of both members of each pair.
+        pairs: For each pair, the shapes of the first member and the shapes of the second member.
     """
 
     def __init__(self, pairs: Sequence[tuple[Sequence[Solid], Sequence[Solid]]]) -> None:
@@ -37,7 +38,7 @@ class Separation:
             self.replace(i, seconds)
 
     def replace(self, i: int, seconds: Sequence[Solid]) -> None:
-        """Replaces the shapes of the second member of a pair by as many others."""
+        """Replaces the shapes of the second member of pair `i`; the number of shapes must not change."""
         rows = self._rows[i]
         for row, solid in zip(rows.tolist(), list(seconds) * (len(rows) // len(seconds))):
             more = len(solid.balls) - self._second.shape[1]
@@ -50,12 +51,12 @@ class Separation:
                 self._edge[row] = (self._second[row] @ (*self._direction[row], 1.0)).max()
 
     def learn(self, i: int, directions: Sequence[Sequence[float]], frames: np.ndarray) -> None:
-        """Stores directions for a pair: for each two shapes, the one with the largest gap.
+        """Chooses and stores, for each combination of shapes of a pair, the direction with the largest gap.
 
         Args:
-            i: Number of the pair.
-            directions: Unit vectors on lines between closest points, in either sense, in the root link.
-            frames: m frames, m x 4 x 4.
+            i: Index of the pair.
+            directions: Candidate directions in the root link, along lines between closest points; signs are arbitrary.
+            frames: m frames in the root link, m x 4 x 4.
         """
         rows = self._rows[i]
         first, second = frames[self._first_frame[rows[0]]], frames[self._second_frame[rows[0]]]
@@ -71,11 +72,11 @@ class Separation:
         self._edge[rows] = np.concatenate((high_other, -low_other), axis=1)[np.arange(len(rows)), best]
 
     def lower_bounds(self, frames: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Returns lower bounds of the distances of some pairs, in k configurations with m frames: k x len(which) [m].
+        """Returns lower bounds on the distances of selected pairs in k configurations, k x len(which) [m].
 
         Args:
-            frames: k x m x 4 x 4.
-            which: Numbers of the pairs, one at least, in ascending order.
+            frames: m frames in each configuration, in the root link, k x m x 4 x 4.
+            which: Indices of at least one pair, in ascending order.
         """
         is_asked = np.zeros(len(self._counts), bool)
         is_asked[which] = True
@@ -84,7 +85,7 @@ class Separation:
         direction = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[rows])
         local = np.full((len(rows), len(frames), 4), -1.0)
         local[..., :3] = np.einsum("kpij,kpi->pkj", first[..., :3, :3], direction)
-        nearest = (local @ self._first[rows].transpose(0, 2, 1)).min(axis=2).T  # of the first shape along the direction
+        nearest = (local @ self._first[rows].transpose(0, 2, 1)).min(axis=2).T  # least coordinate of the first shape
         shift = np.einsum("kpi,kpi->kp", direction, first[..., :3, 3] - second[..., :3, 3])
         gaps = nearest + shift - (self._edge[rows] + ROUNDING_M)
         starts = np.cumsum(self._counts[which]) - self._counts[which]
@@ -93,13 +94,13 @@ class Separation:
 
 
 def _balls(solids: Sequence[Solid], size: int = 1) -> np.ndarray:
-    """Returns the balls of p solids as one array, p x v x 4; the last ball of smaller solids is repeated."""
+    """Stacks the balls of p solids, p x v x 4; solids with fewer than v balls repeat their last ball."""
     size = max([size, *(len(solid.balls) for solid in solids)])
     balls = [np.pad(solid.balls, ((0, size - len(solid.balls)), (0, 0)), "edge") for solid in solids]
     return np.array(balls).reshape(-1, size, 4)
 
 
 def _extent(balls: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns least and greatest coordinates of p x v balls along d unit vectors, each p x d."""
+    """Returns the least and the greatest coordinate of p groups of v balls along d unit vectors, both p x d."""
     along, radius = balls[:, :, :3] @ directions.T, balls[:, :, 3:]
     return (along - radius).min(axis=1), (along + radius).max(axis=1)

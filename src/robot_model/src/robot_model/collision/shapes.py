@@ -1,4 +1,4 @@
-"""Shapes for collisions: those of a robot's links, and obstacles around the robot."""
+"""Collision shapes of a robot's links, and obstacles around the robot."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class CollisionShape(NamedTuple):
     """A collision shape of a link.
 
     Attributes:
-        kind: Its kind; the axis of cylinders and capsules is z.
-        size: Lengths x, y, z of a box; radius of a sphere; length and radius of a cylinder, or of a capsule without its
-            round ends [m]; factors x, y, z of a mesh.
-        pose: Its pose in the link, 4 x 4.
-        mesh_file: File of a mesh.
+        kind: Kind of the shape. The axis of cylinders and capsules is z.
+        size: Box: lengths along x, y and z [m]. Sphere: radius [m]. Cylinder: length and radius [m]. Capsule: length
+            without the round ends, and radius [m]. Mesh: scale factors along x, y and z.
+        pose: Pose of the shape in the link, 4 x 4.
+        mesh_file: Path of the mesh; empty for other kinds.
     """
 
     kind: LinkShapeKind
@@ -38,14 +38,14 @@ class Obstacle(NamedTuple):
     """A convex shape of the environment that a robot must not touch.
 
     Attributes:
-        name: Its name, for messages; shapes of one body may share it.
-        kind: Its kind. The axis of a cylinder or capsule is z. A plane is the half-space below z = 0. A mesh and points
-            are replaced by their convex hulls.
-        size: Extents along x, y and z, as in the scale of a marker [m]; that of a capsule along z is without its round
-            ends. Factors x, y, z of a mesh.
-        pose: Its pose in the robot's root link.
-        mesh_file: File of a mesh.
-        corners: The points [m].
+        name: Name of the obstacle in messages. Several shapes of one body may have the same name.
+        kind: Kind of the obstacle. The axis of a cylinder or capsule is z. A plane is the half-space below z = 0. A
+            mesh, or a set of points, is replaced by its convex hull.
+        size: Extents along x, y and z, as in the scale of a marker [m]. The z extent of a capsule excludes the round
+            ends. Mesh: scale factors along x, y and z.
+        pose: Pose of the obstacle in the robot's root link.
+        mesh_file: Path of the mesh; empty for other kinds.
+        corners: The points of kind `points`, in the obstacle's frame [m].
     """
 
     name: str
@@ -57,12 +57,12 @@ class Obstacle(NamedTuple):
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """Its attributes without name and pose."""
+        """The attributes without name and pose: two obstacles with equal values have the same shape."""
         return self.kind, self.size, self.mesh_file, self.corners
 
     @property
     def link_size(self) -> tuple[float, ...]:
-        """Its size as a `CollisionShape` of the same kind has it."""
+        """The size in the convention of `CollisionShape`, for the same kind."""
         x, y, z = self.size
         if self.kind == "sphere":
             return (max(x, y, z) / 2.0,)
@@ -70,12 +70,12 @@ class Obstacle(NamedTuple):
 
 
 def collision_shapes(document: UrdfDocument, link: str) -> list[CollisionShape]:
-    """Returns the collision shapes of a link in the order of the file, without kinds that PyBullet does not support.
+    """Returns a link's collision shapes in the file's order; leaves out kinds other than `LinkShapeKind`.
 
     Raises:
-        ConfigError: If a mesh belongs to an unknown package or does not exist.
-        OSError: If a mesh does not exist.
-        ValueError: If a size is no number.
+        ConfigError: If a mesh with a `package://` path belongs to an unknown package or does not exist.
+        OSError: If a mesh with another path does not exist.
+        ValueError: If a size is not a number.
     """
     return [
         shape

@@ -1,4 +1,4 @@
-"""Convex hulls of a few balls that contain collision shapes."""
+"""Solids: convex hulls of a few balls, each of which contains a collision shape."""
 
 import math
 from collections.abc import Sequence
@@ -12,23 +12,24 @@ from robot_model.geometry import Vector
 MESH_MARGIN_M = 1e-3
 """Thickness that PyBullet adds to convex meshes [m]."""
 COARSE_M = 2e-3
-"""Largest distance of a dropped corner from the hull of the kept ones [m]; the balls are larger by the actual one."""
+"""Corners of a mesh are added until each dropped corner is at most this far from a line between two kept corners [m].
+The balls' radius includes the distance that remains."""
 MAX_CORNERS = 48
-"""Largest number of corners of a mesh that are kept, even if others are further outside."""
+"""Largest number of kept corners of a mesh, even if dropped corners are then further away than `COARSE_M`."""
 SIDES = 32
 """Number of sides of the prism around a cylinder."""
 CUBE = 2.0 * ((np.arange(8)[:, None] >> np.arange(3)) & 1) - 1.0
-"""The corners of a cube from -1 to 1."""
+"""The 8 corners of a cube from -1 to 1, 8 x 3."""
 
 
 class ClosestPoints(NamedTuple):
-    """Points at which two shapes are nearest to each other.
+    """The points at which two shapes are nearest to each other, in the robot's root link.
 
     Attributes:
-        distance: Distance between the surfaces; negative if they penetrate [m].
-        direction: Unit vector from one to the other, in either sense, in the robot's root link.
-        first: The point of one of them, in the root link [m].
-        second: The point of the other, in the root link [m].
+        distance: Distance between the surfaces; negative if the shapes penetrate each other [m].
+        direction: Unit vector along the line between the two points; its sign is arbitrary.
+        first: The point on the first shape [m].
+        second: The point on the second shape [m].
     """
 
     distance: float
@@ -42,8 +43,8 @@ class Solid(NamedTuple):
 
     Attributes:
         frame: Number of the frame, see `LinkFrames`.
-        balls: v x 4: x, y and z in that frame, and a radius [m]. The convex hull of the balls contains the shape.
-        normal: Outward normal of a half-space, whose boundary passes through the first ball; None for other shapes.
+        balls: v balls, v x 4: centre x, y and z in that frame, and radius [m]. Their convex hull contains the shape.
+        normal: Outward normal of a half-space, whose boundary contains the first ball's centre. None for other shapes.
     """
 
     frame: int
@@ -52,28 +53,33 @@ class Solid(NamedTuple):
 
     @property
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest x, y and z [m]; inf and -inf without balls."""
+        """Least and greatest x, y and z [m]; inf and -inf for a solid without balls."""
         places, radius = self.balls[:, :3], self.balls[:, 3:]
         return (places - radius).min(axis=0, initial=np.inf), (places + radius).max(axis=0, initial=-np.inf)
 
     def moved(self, frame: int, pose: np.ndarray) -> "Solid":
-        """Returns it in another frame, in which its present frame has a pose, 4 x 4."""
+        """Returns the solid expressed in another frame.
+
+        Args:
+            frame: Number of the other frame.
+            pose: Pose of the present frame in the other frame, 4 x 4.
+        """
         turn, shift = pose[:3, :3], pose[:3, 3]
         balls = np.column_stack((self.balls[:, :3] @ turn.T + shift, self.balls[:, 3]))
         return Solid(frame, balls, None if self.normal is None else turn @ self.normal)
 
     def grown(self, by_m: float) -> "Solid":
-        """Returns it with larger balls."""
+        """Returns the solid with the radius of each ball increased by `by_m` [m]."""
         return self._replace(balls=self.balls + (0.0, 0.0, 0.0, by_m))
 
 
 def extent_of(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns least and greatest x, y and z of some shapes in one frame [m]."""
+    """Returns the least and greatest x, y and z of shapes that are all expressed in the same frame [m]."""
     return Solid(0, np.concatenate([solid.balls for solid in solids] or [np.empty((0, 4))])).extent
 
 
 def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
-    """Returns the box between least and greatest x, y and z [m]; a ball of NaN if least ones exceed greatest ones."""
+    """Returns the box from the corner `lower` to the corner `upper` [m]; a ball of NaN if `lower` exceeds `upper`."""
     if (lower > upper).any():
         return Solid(0, np.full((1, 4), np.nan))
     corners = (lower + upper) / 2.0 + CUBE * (upper - lower) / 2.0
@@ -81,7 +87,10 @@ def box_of(lower: np.ndarray, upper: np.ndarray) -> Solid:
 
 
 def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
-    """Returns balls of a box, sphere, capsule or cylinder, v x 4; no balls of any other kind."""
+    """Returns balls whose convex hull contains a box, sphere, capsule or cylinder, v x 4; 0 x 4 for other kinds.
+
+    `size` is that of a `CollisionShape`. Boxes, spheres and capsules are exact; a cylinder becomes a prism around it.
+    """
     if kind == "box":
         half = np.array(size) / 2.0
         return box_of(-half, half).balls
@@ -98,9 +107,10 @@ def balls_of(kind: str, size: tuple[float, ...]) -> np.ndarray:
 
 
 def few_balls(points: Sequence[Vector]) -> np.ndarray:
-    """Returns balls around some of the corners of a mesh, v x 4, whose hull contains the mesh.
+    """Selects some corners of a mesh, and returns balls around them whose convex hull contains the mesh, v x 4.
 
-    Corners are added one after the other: always the one that is furthest from all lines between those so far.
+    Corners are selected one after the other. The next corner is the one that is furthest from all line segments between
+    the corners selected so far.
     """
     if not points:
         return np.empty((0, 4))
@@ -120,7 +130,7 @@ def few_balls(points: Sequence[Vector]) -> np.ndarray:
 
 
 def _from_line(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Returns the distances of v points from the line segment between two others."""
+    """Returns the distances of v points from the line segment between `start` and `end`."""
     way = end - start
     share = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
     distance: np.ndarray = np.linalg.norm(points - start - share[:, None] * way, axis=1)

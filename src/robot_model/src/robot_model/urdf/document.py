@@ -1,4 +1,4 @@
-"""URDF files, read into plain data."""
+"""Reads URDF files into plain data, and disabled collisions from SRDF files."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -14,11 +14,11 @@ from .elements import READ, Element, Mimic, UrdfJoint, end_of, parse, read_joint
 from .files import mesh_file
 
 MAX_BYTES = 2_000_000
-"""Largest length of a file [bytes]; a longer one is refused."""
+"""Largest length of a file [bytes]; longer files are refused."""
 
 
 class Edge(NamedTuple):
-    """The links that a joint connects."""
+    """Names of a joint and of the two links that it connects."""
 
     joint: str
     parent: str
@@ -26,14 +26,14 @@ class Edge(NamedTuple):
 
 
 class Attribute(NamedTuple):
-    """A text in a URDF.
+    """An XML attribute in a URDF.
 
     Attributes:
-        owner: The link or joint that it belongs to, for messages.
-        tag: The element that has it.
-        key: Its name.
-        text: The text.
-        is_read: Whether PyBullet reads that element.
+        owner: Tag and name of the link or joint that contains the attribute, for messages.
+        tag: Tag of the element that has the attribute.
+        key: Name of the attribute.
+        text: Value of the attribute.
+        is_read: Whether PyBullet reads the element.
     """
 
     owner: str
@@ -44,28 +44,28 @@ class Attribute(NamedTuple):
 
 
 class UrdfDocument:
-    """The links and joints of a URDF file.
+    """The links and joints of a URDF file. Callers must not change its attributes, which are shared.
 
-    As PyBullet does, it ignores text around the robot and characters that XML does not allow. Documents of the same
-    content share their elements and are equal.
+    Like PyBullet, the parser ignores text outside the robot element, and characters that XML does not allow. Documents
+    with the same content share their elements, and compare equal.
 
     Args:
-        path: The file, for messages; the meshes it names need not be there.
-        source: The file to read in its place.
-        not_xml: Message for a file that is not well-formed.
+        path: Path of the URDF; its meshes need not exist.
+        source: File to read instead of `path`; messages still name `path`.
+        not_xml: Start of the error message for a file that is not well-formed.
 
     Attributes:
-        tag: The element at the top, `robot` in a URDF.
-        links: Names of all links. Callers must not change this or any other attribute.
+        tag: Tag of the top element, `robot` in a URDF.
+        links: Names of all links.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
-        edges: All joints with the links that they connect, in the file's order.
-        meshes: The meshes of links, as the file names them.
-        source: The file that was read.
-        root: The element at the top, not to be changed.
-        joint_elements: The elements of the joints, not to be changed.
+        edges: Each joint with the two links that it connects, in the file's order.
+        meshes: File names of all meshes, as written in the file.
+        source: Path of the file that was read.
+        root: The top element.
+        joint_elements: The elements of the joints.
 
     Raises:
-        ConfigError: If it cannot be read or is not well-formed.
+        ConfigError: If the file cannot be read or is not well-formed.
     """
 
     def __init__(self, path: str, source: str | None = None, not_xml: str = "is not XML") -> None:
@@ -90,27 +90,31 @@ class UrdfDocument:
         """All joints by name.
 
         Raises:
-            ValueError: If a value makes no sense; it names the joint.
+            ValueError: If a value of a joint is invalid; the message names the joint.
         """
         return {joint.name: joint for joint in map(read_joint, self.joint_elements)}
 
     @cached_property
     def mimics(self) -> dict[str, Mimic]:
-        """Joints that follow others, by name.
+        """Relation of each mimic joint to the joint that it follows, by the mimic joint's name.
 
         Raises:
-            ValueError: If a value makes no sense; it names the joint.
+            ValueError: If a value of a relation is invalid; the message names the joint.
         """
         found = {joint.get("name", ""): read_mimic(joint) for joint in self.joint_elements}
         return {name: mimic for name, mimic in found.items() if mimic is not None}
 
     def meshes_of(self, part: str) -> list[str]:
-        """Returns the meshes of a part of the links, `visual` or `collision`, as the file names them."""
+        """Returns the file names of all `visual` or `collision` meshes, as written in the file.
+
+        Args:
+            part: `visual` or `collision`.
+        """
         found = self.root.iterfind(f"link/{part}//mesh")
         return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
 
     def attributes(self) -> Iterator[Attribute]:
-        """Yields all attributes of its links and joints."""
+        """Yields all XML attributes of the top element and of the elements in it."""
         for key, text in self.root.attrib.items():
             yield Attribute(self.tag, "robot", key, text, True)
         for owner in self.root:
@@ -122,7 +126,7 @@ class UrdfDocument:
 
     @cached_property
     def frames(self) -> set[str]:
-        """Names of the links that have neither inertia nor shape."""
+        """Names of the links that have neither an inertia nor a shape."""
         parts = ("inertial", "visual", "collision")
         links = (link for link in self.root.findall("link") if all(link.find(part) is None for part in parts))
         return {link.get("name", "") for link in links}
@@ -139,16 +143,16 @@ class UrdfDocument:
         return self.root.find("deformable") is not None
 
     def deformable_meshes(self) -> list[str]:
-        """Returns the mesh files of its soft body; none if the file describes no soft body.
+        """Returns the paths of the soft body's mesh files; an empty list for a file without a soft body.
 
         Raises:
-            ConfigError: If a mesh does not exist.
+            ConfigError: If a mesh does not exist, or its package is unknown.
         """
         names = [part.get("filename") for deformable in self.root.findall("deformable") for part in deformable]
         return [str(mesh_file(name, self.source)) for name in dict.fromkeys(names) if name]
 
     def joints_above(self, link: str) -> Iterator[tuple[str, str, str]]:
-        """Yields name, type and parent link of each joint between a link and the root, from the link upwards."""
+        """Yields name, type and parent link of each joint between a link and the root, starting at the link."""
         above = {end_of(joint, "child"): joint for joint in self.joint_elements}
         while (joint := above.pop(link, None)) is not None:
             link = end_of(joint, "parent")
@@ -158,7 +162,7 @@ class UrdfDocument:
         """Returns the name of the root link.
 
         Raises:
-            ConfigError: If there is not one link that is no joint's child.
+            ConfigError: If the number of links that are not a joint's child differs from one.
         """
         children = {end_of(joint, "child") for joint in self.joint_elements}
         roots = [link for link in self.links if link not in children]
@@ -170,7 +174,7 @@ class UrdfDocument:
 
 @lru_cache(maxsize=32)
 def _robot_in(data: bytes) -> Element:
-    """Parses the robot in a file's content; results are cached."""
+    """Parses the robot element from a file's content; results are cached."""
     return parse(data.decode(errors="replace"))
 
 
@@ -195,10 +199,10 @@ def _parts_of(root: Element) -> _Parts:
 
 
 def mimics_of(path: str) -> dict[str, Mimic]:
-    """Returns the mimic joints of a URDF file by name; none if the file cannot be read.
+    """Returns the mimic relations of a URDF file, see `UrdfDocument.mimics`; empty if the file cannot be read.
 
     Raises:
-        ValueError: If a value makes no sense; it names the joint.
+        ValueError: If a value of a relation is invalid; the message names the joint.
     """
     with suppress(ConfigError):
         return UrdfDocument(path).mimics
@@ -206,10 +210,10 @@ def mimics_of(path: str) -> dict[str, Mimic]:
 
 
 def disabled_collisions(path: str) -> set[frozenset[str]]:
-    """Returns the pairs of links whose collisions an SRDF file disables.
+    """Reads an SRDF file, and returns the pairs of links whose collisions it disables.
 
     Raises:
-        ConfigError: If it cannot be read or is not well-formed.
+        ConfigError: If the file cannot be read or is not well-formed.
     """
     try:
         root = _robot_in(read_file(path, MAX_BYTES))

@@ -1,4 +1,4 @@
-"""The XML of a URDF: elements as plain data, and plain data as elements."""
+"""Parses the XML of a URDF, reads joints from XML elements, and writes elements."""
 
 import math
 import re
@@ -10,7 +10,7 @@ from xml.parsers import expat
 from robot_model.geometry import Vector
 
 MOVING = ("revolute", "continuous", "prismatic")
-"""Types of joints with one axis, which kinematics are solved for."""
+"""Joint types with one axis. Kinematics treat all other types as not moving."""
 READ = frozenset(
     "robot material color texture specular link inertial mass inertia origin visual collision geometry box sphere "
     "cylinder capsule mesh plane contact inertia_scaling lateral_friction rolling_friction restitution "
@@ -18,24 +18,26 @@ READ = frozenset(
     "reduced_deformable collision_margin friction repulsion_stiffness gravity_factor neohookean corotated spring "
     "num_modes stiffness_scale damping_coefficient cache_barycenter".split()
 )
-"""Elements that PyBullet reads; only these are passed on."""
+"""Tags of the elements that PyBullet reads. Other elements are not passed to PyBullet."""
 MAX_TAGS = 50_000
-"""Largest number of tags in a file; a file with more is rejected as not well-formed."""
+"""Largest number of tags in a file; files with more tags are rejected as not well-formed."""
 MAX_NESTED = 100
-"""Largest depth of elements; a deeper file is rejected as not well-formed."""
+"""Largest nesting depth of elements; files with deeper nesting are rejected as not well-formed."""
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet accepts them."""
 _ROBOT, _END_OF_ROBOT = re.compile(r"<robot\b"), re.compile(r"</robot\s*>")
 _DEFAULT = re.compile(r"\$\(optenv \w+ ([^()]*)\)")
-"""Reference to an environment variable in xacro, with its default."""
+"""Xacro expression for an environment variable with a default value."""
 _CHUNK = 1 << 16
-"""Number of characters that are parsed at once; other threads run in between."""
+"""Number of characters per call of the parser. Between two calls, other threads can run."""
 _ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Mimic(NamedTuple):
-    """Relation of a mimic joint to the joint that it follows: its position is `multiplier` times that of the other,
-    plus `offset`."""
+    """Relation of a mimic joint to the followed joint `joint`.
+
+    Position of the mimic joint = `multiplier` * position of the followed joint + `offset`.
+    """
 
     joint: str
     multiplier: float
@@ -46,17 +48,18 @@ class UrdfJoint(NamedTuple):
     """A joint as a URDF describes it.
 
     Attributes:
-        name: Its name.
-        type: Its type, such as `revolute`.
-        parent: The link that it is attached to.
-        child: The link that it moves.
-        xyz: Its position in the parent link [m].
-        rpy: Its rotation there, about the parent's x, y and z one after the other [rad].
-        axis: Unit vector, in the joint's frame.
-        lower: Lower limit [rad or m], -inf if there is none.
-        upper: Upper limit [rad or m], inf if there is none.
-        max_velocity: Largest speed [rad/s or m/s], inf if there is none.
-        mimic: The joint that it follows, if any.
+        name: Name of the joint.
+        type: Type of the joint, such as `revolute`.
+        parent: Name of the parent link.
+        child: Name of the child link, which the joint moves.
+        xyz: Position of the joint's frame in the parent link [m].
+        rpy: Orientation of the joint's frame in the parent link: rotations about the parent's fixed axes x, y and z, in
+            this order [rad].
+        axis: Joint axis as a unit vector in the joint's frame.
+        lower: Lower limit [rad or m]; -inf for a joint without limits.
+        upper: Upper limit [rad or m]; inf for a joint without limits.
+        max_velocity: Largest speed [rad/s or m/s]; inf for a joint without a speed limit.
+        mimic: Relation to the followed joint, for a mimic joint; otherwise None.
     """
 
     name: str
@@ -73,12 +76,12 @@ class UrdfJoint(NamedTuple):
 
     @property
     def is_moving(self) -> bool:
-        """Whether it moves about or along one axis."""
+        """Whether the joint is revolute, continuous or prismatic."""
         return self.type in MOVING
 
     @property
     def is_revolute(self) -> bool:
-        """Whether it turns about its axis."""
+        """Whether a moving joint turns about its axis; false for prismatic joints only."""
         return self.type != "prismatic"
 
     @property
@@ -88,11 +91,13 @@ class UrdfJoint(NamedTuple):
 
 
 def parse(text: str) -> Element:
-    """Returns the robot element in a text, found as PyBullet does, in time linear in its length.
+    """Finds the robot element in a text in the same way as PyBullet, and parses it.
+
+    The time is linear in the length of the text.
 
     Raises:
-        ExpatError: If it is not well-formed.
-        RecursionError: If it is nested too deeply, or has too many elements.
+        ExpatError: If the text is not well-formed.
+        RecursionError: If elements are nested too deeply, or the text has too many tags.
     """
     text = _without_comments(text)
     if (tags := text.count("<")) > MAX_TAGS:
@@ -100,7 +105,7 @@ def parse(text: str) -> Element:
     start, end = _ROBOT.search(text), _end_of_robot(text)
     if start and start.start() < end:
         text = _blank(text[: start.start()]) + text[start.start() : end]
-    # Without namespaces: PyBullet knows none, and many files have prefixes that they do not declare.
+    # Namespaces are not processed: PyBullet does not support them, and many files use prefixes without declaring them.
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     for index in range(0, len(text), _CHUNK):
@@ -108,14 +113,14 @@ def parse(text: str) -> Element:
     parser.Parse("", True)
     robot = builder.close()
     _check_depth(robot)
-    if "$(optenv" in text:  # xacro left unexpanded in a robot of PyBullet's data
+    if "$(optenv" in text:  # a robot in PyBullet's data contains unexpanded xacro
         for element in robot.iter():
             element.attrib.update({key: _DEFAULT.sub(r"\1", value) for key, value in element.attrib.items()})
     return robot
 
 
 def _without_comments(text: str) -> str:
-    """Returns a text with comments replaced by spaces; unlike XML, PyBullet allows `--` in comments."""
+    """Replaces comments by spaces; unlike XML, PyBullet allows `--` in comments."""
     parts, end = [], 0
     while (start := text.find("<!--", end)) >= 0 and (stop := text.find("-->", start + 4)) >= 0:
         parts += [text[end:start], _blank(text[start : stop + 3])]
@@ -124,7 +129,7 @@ def _without_comments(text: str) -> str:
 
 
 def _end_of_robot(text: str) -> int:
-    """Returns the index of the end of the last robot element, 0 if there is none."""
+    """Returns the index after the last `</robot>` tag, or 0 without such a tag."""
     start = len(text)
     while (start := text.rfind("</robot", 0, start)) >= 0:
         if match := _END_OF_ROBOT.match(text, start):
@@ -133,7 +138,7 @@ def _end_of_robot(text: str) -> int:
 
 
 def _blank(text: str) -> str:
-    """Replaces a match by spaces, so that lines and columns in the parser's messages are those of the file."""
+    """Replaces all characters but newlines by spaces, so that the parser's messages have the file's line and column."""
     return "\n".join(" " * len(line) for line in text.split("\n"))
 
 
@@ -146,17 +151,19 @@ def _check_depth(root: Element) -> None:
 
 
 def as_read(element: Element) -> Element:
-    """Returns a copy of an element with only the parts that PyBullet reads: known elements and attributes, no text."""
+    """Copies an element with its attributes; leaves out text, and nested elements that PyBullet does not read."""
     result = Element(element.tag, element.attrib)
     result.extend([as_read(child) for child in element if child.tag in READ])
     return result
 
 
 def read_joint(element: Element) -> UrdfJoint:
-    """Reads a joint; as in PyBullet, a lower limit that is not below the upper one means no limits.
+    """Reads a joint element.
+
+    As in PyBullet, a joint whose lower limit is not below its upper limit has no limits.
 
     Raises:
-        ValueError: If a value makes no sense; it names the joint.
+        ValueError: If a value is invalid; the message names the joint.
     """
     name, kind = element.get("name", ""), element.get("type", "")
     lower, upper, speed = (_number(element, "limit", key, "0") for key in ("lower", "upper", "velocity"))
@@ -182,10 +189,10 @@ def read_joint(element: Element) -> UrdfJoint:
 
 
 def read_mimic(element: Element) -> Mimic | None:
-    """Returns the mimic relation of a joint, None if it has none.
+    """Reads the mimic relation of a joint element; returns None for a joint that is not a mimic joint.
 
     Raises:
-        ValueError: If a value makes no sense; it names the joint.
+        ValueError: If a value is invalid; the message names the joint.
     """
     if element.find("mimic") is None:
         return None
@@ -196,15 +203,21 @@ def read_mimic(element: Element) -> Mimic | None:
 
 
 def end_of(joint: Element, end: str) -> str:
-    """Returns the link at an end of a joint, `parent` or `child`."""
+    """Returns the name of a joint element's parent link (`end="parent"`) or child link (`end="child"`)."""
     return _attribute(joint, end, "link")
 
 
 def read_vector(joint: Element, part: str, key: str, default: str) -> Vector:
-    """Returns the three numbers of an attribute of a joint's part, the default if there is none.
+    """Reads three numbers from an XML attribute of an element inside a joint, link or shape element.
+
+    Args:
+        joint: The outer element.
+        part: Tag of the inner element, such as `origin`.
+        key: Name of the attribute, such as `xyz`.
+        default: Text to read if the inner element or the attribute is missing.
 
     Raises:
-        ValueError: If they are not three finite numbers; it names the joint.
+        ValueError: If the text is not three finite numbers; the message names the outer element.
     """
     x, y, z = _numbers(joint, part, key, default)
     return x, y, z
@@ -215,7 +228,7 @@ def _number(joint: Element, part: str, key: str, default: str) -> float:
 
 
 def _numbers(joint: Element, part: str, key: str, default: str) -> list[float]:
-    """Returns the finite numbers of an attribute, as many as the default has."""
+    """Reads as many finite numbers from an attribute as the default text has; see `read_vector`."""
     text, count = _attribute(joint, part, key, default), len(default.split())
     try:
         values = [float(word) for word in text.split()]
@@ -233,7 +246,7 @@ def _attribute(element: Element, part: str, key: str, default: str = "") -> str:
 
 
 def joint_element(joint: UrdfJoint) -> Element:
-    """Returns the element of a joint with only the parts that kinematics need."""
+    """Writes a joint as an XML element that has only the parts needed for kinematics."""
     unlimited = joint.lower == -math.inf
     parts = [new_element("parent", link=joint.parent), new_element("child", link=joint.child)]
     parts.append(new_element("origin", xyz=words(joint.xyz), rpy=words(joint.rpy)))
@@ -246,24 +259,27 @@ def joint_element(joint: UrdfJoint) -> Element:
 
 
 def inertial(mass: str) -> Element:
-    """Returns an inertial element at the link's frame, with a mass [kg] and the same number as inertia about each axis
-    [kg m^2]."""
+    """Makes an inertial element whose centre of mass is the link's origin.
+
+    Args:
+        mass: The mass [kg]. The same number is the moment of inertia about each axis [kg m^2].
+    """
     inertia = {"ixx": mass, "iyy": mass, "izz": mass, "ixy": "0", "ixz": "0", "iyz": "0"}
     return new_element("inertial", new_element("mass", value=mass), new_element("inertia", **inertia))
 
 
 def new_element(tag: str, /, *parts: Element, **attributes: str) -> Element:
-    """Returns an element with children and attributes."""
+    """Makes an element with the child elements `parts`, and attributes."""
     element = Element(tag, attributes)
     element.extend(parts)
     return element
 
 
 def words(vector: Vector) -> str:
-    """Returns numbers as the text of an attribute, exact to the last bit."""
+    """Formats three numbers as the text of an attribute, exact to the last bit."""
     return " ".join(map(repr, vector))
 
 
 def text_of(element: Element) -> str:
-    """Returns the text of an element, with a line for each tag: PyBullet cannot read very long lines."""
+    """Formats an element as text with one tag per line, since PyBullet cannot read very long lines."""
     return ElementTree.tostring(element, encoding="unicode").replace("><", ">\n<")

@@ -1,4 +1,4 @@
-"""Files of URDFs: search for the files that a URDF names, and temporary files for descriptions without a file."""
+"""Finds the files that a URDF names, and writes robot descriptions without a file to temporary files."""
 
 import hashlib
 from functools import lru_cache
@@ -14,15 +14,15 @@ PACKAGE = "package://"
 
 @lru_cache(maxsize=1)
 def _folder() -> Path:
-    """Returns a folder for this process's rewritten files, which is removed when the process ends."""
+    """Makes the temporary folder of this process, which is removed when the process ends."""
     return Path(temporary_folder("urdf").name)
 
 
 def write_description(text: str) -> str:
-    """Writes a robot description without a file, such as that of the parameter server, into a temporary file.
+    """Writes a robot description, such as the text on the parameter server, to a temporary file.
 
     Returns:
-        The file, which lasts as long as the process.
+        Path of the file, which exists until the process ends.
     """
     path = _folder() / f"robot_description-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
     path.write_text(text, encoding="utf-8")
@@ -30,18 +30,23 @@ def write_description(text: str) -> str:
 
 
 def is_temporary(path: str) -> bool:
-    """Returns whether a file is one of this module's temporary files."""
+    """Returns whether `write_description` wrote a file in this process."""
     return Path(path).parent == _folder()
 
 
 def found_by_ros(mesh: str, source: Path) -> str | Path:
-    """Returns an address by which ROS finds the mesh or texture `mesh` of the URDF file `source`.
+    """Finds a mesh or texture such that ROS can load it, too.
+
+    Args:
+        mesh: File name of the mesh or texture, as written in the URDF.
+        source: Path of the URDF.
 
     Returns:
-        A file for a relative path, or for a package that is unknown or lacks it; otherwise the address in the URDF.
+        The address as text if ROS can resolve it. A path if `mesh` is a relative path, or if its ROS package is unknown
+        or does not have the file; then the file is searched in the URDF's folder and all folders above.
 
     Raises:
-        ConfigError: If it belongs to an unknown package and is not near the URDF.
+        ConfigError: If the package is unknown, and the file is not in the URDF's folder or a folder above.
     """
     mesh = _with_two_slashes(mesh)
     if "://" not in mesh:
@@ -54,10 +59,15 @@ def found_by_ros(mesh: str, source: Path) -> str | Path:
 
 
 def found_mesh(name: str, source: Path) -> Path:
-    """Returns the path of the mesh `name` in the URDF file `source`: in its package, or where PyBullet searches.
+    """Finds a mesh in its ROS package, or in the folders that PyBullet searches: the URDF's folder and those above.
+
+    Args:
+        name: File name of the mesh, as written in the URDF.
+        source: Path of the URDF.
 
     Raises:
-        ConfigError: If its package is unknown. OSError: If the mesh does not exist.
+        ConfigError: If a mesh with a `package://` path is not found.
+        OSError: If a mesh with another path is not found.
     """
     if name.startswith(PACKAGE):
         return mesh_file(name, source)
@@ -69,10 +79,14 @@ def found_mesh(name: str, source: Path) -> Path:
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
-    """Returns the file of the mesh `mesh` in the URDF file `source`.
+    """Finds a mesh in its ROS package or relative to the URDF; a `package://` mesh also in the folders above the URDF.
+
+    Args:
+        mesh: File name of the mesh, as written in the URDF.
+        source: Path of the URDF.
 
     Raises:
-        ConfigError: If it belongs to an unknown package or does not exist.
+        ConfigError: If the mesh is not found.
     """
     mesh = _with_two_slashes(mesh)
     try:
@@ -89,21 +103,25 @@ def mesh_file(mesh: str, source: Path) -> Path:
 
 
 def beside_or_above(name: str, source: Path) -> Path | None:
-    """Returns the path at which PyBullet finds a file that a URDF names: in its folder or a folder above."""
+    """Searches a file as PyBullet does: in the folder of the URDF `source`, then in all folders above.
+
+    Returns:
+        Path of the file; None if the file is not found.
+    """
     files = (folder / name for folder in source.absolute().parents)
     return next((file for file in files if file.is_file()), None)
 
 
 def _with_two_slashes(mesh: str) -> str:
-    """Returns a mesh path of a URDF with `package://PACKAGE` for `package:///PACKAGE`, which some URDFs have."""
+    """Replaces `package:///PACKAGE`, which some URDFs have, by `package://PACKAGE`."""
     return f"{PACKAGE}{mesh.removeprefix(PACKAGE).lstrip('/')}" if mesh.startswith(PACKAGE) else mesh
 
 
 def _near(mesh: str, source: Path) -> Path | None:
-    """Returns the file of a `package://` mesh that no package has, but the URDF's folder or one above it has.
+    """Searches a `package://` mesh in the folder of the URDF and in all folders above, without using ROS packages.
 
-    PyBullet searches these folders, and its own robots rely on that. It also finds the meshes of a package that is
-    hidden by another of the same name.
+    PyBullet searches these folders, too, and the robots in PyBullet's data rely on the search. The search also finds
+    meshes of a package that is hidden by another package with the same name.
     """
     return beside_or_above(mesh.removeprefix(PACKAGE), source.resolve()) if mesh.startswith(PACKAGE) else None
 

@@ -1,4 +1,4 @@
-"""Changed copies of a URDF that PyBullet can load, without PyBullet itself."""
+"""Modifies copies of a URDF so that PyBullet can load them; does not import PyBullet."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -13,15 +13,15 @@ from .files import beside_or_above, found_mesh
 log = logging.getLogger(__name__)
 
 WORLD_LINK = "world"
-"""Name of the link that PyBullet treats as the world: without inertia it has no mass, and as a root it is fixed."""
+"""Link name that PyBullet treats specially: a link `world` without inertia has mass 0, and a root `world` is fixed."""
 LEAST_KG = "1e-06"
-"""Mass of a floating root without inertia and shape [kg]: PyBullet would fix a massless root to the world."""
+"""Mass assigned to a floating root without inertia and shape [kg]. PyBullet would fix a massless root to the world."""
 Files = tuple[tuple[tuple[str, str], str], ...]
-"""Absolute path of each file, with the tag and the `filename` of the elements that name it."""
+"""Pairs that map an element, given by tag and `filename` attribute, to the absolute path of its file."""
 
 
 def files_of(document: UrdfDocument) -> Files:
-    """Returns the meshes and textures that PyBullet reads with a URDF; textures that do not exist are left out.
+    """Finds the meshes and textures that PyBullet reads with a URDF, and leaves out missing textures.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
@@ -53,9 +53,13 @@ def _named_files(document: UrdfDocument) -> tuple[tuple[str, str], ...]:
 
 
 def for_pybullet(document: UrdfDocument, files: Files) -> Element:
-    """Returns the elements of a URDF that PyBullet reads, with the paths of `files_of`.
+    """Copies the elements of a URDF that PyBullet reads, and replaces file names by absolute paths.
 
-    PyBullet itself does not resolve names of ROS packages. The result depends on the arguments alone.
+    PyBullet itself does not resolve names of ROS packages. The result depends only on the arguments.
+
+    Args:
+        document: The URDF.
+        files: Result of `files_of`; elements whose file is not in this list are left out.
     """
     robot, known = as_read(document.root), dict(files)
     for parent in list(robot.iter()):
@@ -69,37 +73,41 @@ def for_pybullet(document: UrdfDocument, files: Files) -> Element:
 
 
 def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
-    """Puts a chain of massless links above the root of a robot.
+    """Adds a chain of massless links and joints above the root of a robot.
 
     Args:
-        robot: The robot, which is changed.
-        root_link: The name of its root.
-        joints: The joints of the chain, from its fixed end to the root.
+        robot: Top element of the URDF, which is changed in place.
+        root_link: Name of the robot's root link.
+        joints: Joints of the chain, from the fixed end of the chain to the robot's root.
     """
     root = next(link for link in robot.findall("link") if link.get("name") == root_link)
     if root.find("inertial") is None:
-        root.append(inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
+        root.append(inertial("0"))  # PyBullet would assign 1 kg to a link without inertial element
     robot.remove(root)
     links = [new_element("link", inertial("0"), name=joint.parent) for joint in joints]
-    robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
+    robot[:0] = [*links, root]  # parents first, as URDF_MAINTAIN_LINK_ORDER requires
     robot.extend(map(joint_element, joints))
 
 
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
-    """Returns the masses [kg] of links without inertia and shape, to which PyBullet would assign 1 kg each.
+    """Returns the masses to assign to frames: links without inertia and shape, which PyBullet would give 1 kg each.
 
-    Such links, called frames, get no mass. A root that is not fixed gets `LEAST_KG` if another link with mass is fixed
-    to it, since PyBullet needs some mass on free bodies. Two kinds of frames keep the 1 kg: those on a moving joint
-    that moves no other mass, and a root that is neither fixed nor has mass fixed to it.
+    Most frames get mass 0. A root that is not fixed to the world gets `LEAST_KG` if a link with mass is fixed to the
+    root, since PyBullet needs some mass on free bodies. Two kinds of frames keep 1 kg, and are left out: a frame on a
+    moving joint that carries no other mass, and a free root without mass fixed to it.
 
     Args:
+        document: The URDF.
         is_fixed: Whether the base is fixed to the world.
+
+    Returns:
+        Mass of each frame by link name, as text [kg].
     """
     frames = document.frames - {WORLD_LINK}
     if not frames:
         return {}
     above = {edge.child: edge for edge in document.edges}
-    # Links with which mass moves, and links to which mass is fixed
+    # carries: links at or below which there is mass. holds: links with mass, or with mass fixed to them.
     carries, holds = (set(document.links) - document.frames - document.massless for _ in range(2))
     for link in reversed(_from_the_root(document)):
         edge = above.get(link)
@@ -117,7 +125,7 @@ def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
 
 
 def _from_the_root(document: UrdfDocument) -> list[str]:
-    """Returns all links, each after its parent."""
+    """Returns the names of all links; each parent comes before its children."""
     below: dict[str, list[str]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge.child)
@@ -128,14 +136,14 @@ def _from_the_root(document: UrdfDocument) -> list[str]:
 
 
 def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
-    """Sets masses [kg] of links of a robot, by name, such as `frame_masses` returns."""
+    """Adds inertial elements to links of a robot, with masses by link name as text [kg]; see `frame_masses`."""
     for link in robot.findall("link"):
         if (mass := masses.get(link.get("name", ""))) is not None:
             link.append(inertial(mass))
 
 
 def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
-    """Returns the links that can move and weigh 1 kg because the URDF has no mass for them."""
+    """Returns the names of the movable links to which PyBullet assigns 1 kg because the URDF has no mass for them."""
     above = {edge.child: edge for edge in document.edges}
     moving: set[str] = set()
     for link in _from_the_root(document):
@@ -149,7 +157,7 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
 
 
 def put_root_first(robot: Element) -> None:
-    """Puts the root link of a robot before all others: else PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
+    """Moves the root link before all other links; otherwise PyBullet crashes with URDF_MAINTAIN_LINK_ORDER."""
     children = {end_of(joint, "child") for joint in robot.findall("joint")}
     for root in [link for link in robot.findall("link") if link.get("name") not in children]:
         robot.remove(root)
@@ -157,9 +165,9 @@ def put_root_first(robot: Element) -> None:
 
 
 def put_first_visuals_last(robot: Element) -> None:
-    """Moves the first visual of each link of a robot to the link's end.
+    """Moves the first visual of each link behind the link's other visuals.
 
-    PyBullet's window draws a whole link in the colour of its last visual; the first one is usually the main one.
+    PyBullet's window draws a whole link in the colour of the last visual. The first visual is usually the main one.
     """
     for link in robot.findall("link"):
         if len(visuals := link.findall("visual")) > 1:

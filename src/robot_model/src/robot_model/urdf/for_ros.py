@@ -1,4 +1,4 @@
-"""Descriptions of robots for ROS: texts of URDFs whose meshes ROS can find."""
+"""Writes robot descriptions for ROS: texts of URDFs with mesh addresses that ROS can resolve."""
 
 import copy
 import shutil
@@ -15,26 +15,30 @@ from .elements import Element, UrdfJoint, joint_element, new_element, text_of
 from .files import found_by_ros
 
 ROOT_LINK = "world"
-"""Name of the root link of several robots in one description."""
+"""Name of the common root link if one description contains several robots."""
 
 
 def description_for_ros(path: str) -> str:
-    """Returns the text of a URDF file for ROS, where the folder of the file is unknown.
+    """Returns the text of a URDF such that ROS nodes can use it without knowing the folder of the file.
 
-    Relative paths of meshes become `file://` addresses; paths in ROS packages stay. Meshes whose textures are missing
-    are replaced by copies without these textures.
+    Relative paths of meshes become `file://` addresses; `package://` addresses stay if ROS can resolve them. Meshes
+    with missing textures are replaced by copies without these textures.
+
+    Args:
+        path: Path of the URDF.
 
     Raises:
-        ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
+        ConfigError: If the file is not a URDF, or a mesh belongs to an unknown package.
     """
     return text_of(_for_ros(UrdfDocument(path)))
 
 
 def joined_for_ros(robots: Mapping[str, tuple[str, Pose]]) -> str:
-    """Returns the text of one URDF of several robots, which are fixed to a root link `world`.
+    """Joins several robots into one URDF with the root link `world`, and returns the text.
 
     Args:
-        robots: File, and pose of the root, by name of the robot. Names of links and joints get the prefix `NAME_`.
+        robots: For each robot name NAME, the path of its URDF, and the pose of its root link in the world. Names of its
+            links and joints get the prefix `NAME_`.
 
     Raises:
         ConfigError: If a file is no URDF, or a mesh belongs to an unknown package.
@@ -67,9 +71,10 @@ def _for_ros(document: UrdfDocument) -> Element:
 
 
 def _with_existing_textures(mesh: Path) -> Path:
-    """Returns a mesh without missing textures, which RViz reports as errors.
+    """Returns a mesh that does not name missing textures, since RViz reports missing textures as errors.
 
-    It is the mesh itself, or a copy of an OBJ file in the cache, without the lines that name missing textures.
+    If an OBJ file names missing textures, its copy in the cache is returned, whose materials lack the lines that name
+    them. Otherwise the mesh itself is returned.
     """
     try:
         data = read_file(mesh) if mesh.suffix.lower() == ".obj" else b""
@@ -95,5 +100,5 @@ def _with_existing_textures(mesh: Path) -> Path:
 
 
 def _texture_file(mesh: Path, texture: str) -> str:
-    """Returns the file name of a texture, which may have options in front; empty if there is no such file."""
+    """Returns the file name in a texture entry, which may start with options; empty if the file does not exist."""
     return next((name for name in (texture, *texture.split()[-1:]) if (mesh.parent / name).is_file()), "")

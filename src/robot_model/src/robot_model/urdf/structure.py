@@ -1,4 +1,4 @@
-"""Faults in the structure of a URDF that PyBullet would accept, or that would crash it."""
+"""Finds faults in the structure of a URDF that PyBullet would accept silently, or that would crash PyBullet."""
 
 import math
 import re
@@ -15,21 +15,22 @@ from .document import Attribute, UrdfDocument
 from .elements import READ, Element
 
 LONGEST_NAME = 250
-"""Largest length of a name [bytes]; PyBullet copies names into 1024 bytes on the stack."""
+"""Largest length of a name [bytes]. PyBullet copies names into buffers of 1024 bytes on the stack."""
 LONGEST_TEXT = 1000
-"""Largest length of any other text, names of files included [bytes]."""
+"""Largest length of any other attribute value, including file names [bytes]."""
 MAX_LINKS = 2000
-"""Largest number of links, those on fixed joints included; a larger robot is refused."""
+"""Largest number of links, including links on fixed joints. Larger robots are refused."""
 MAX_SHAPES = 1000
-"""Largest number of visual and collision shapes of all links."""
+"""Largest number of visual and collision shapes, summed over all links."""
 MAX_ATTRIBUTES = 100_000
-"""Largest number of attributes in a file; the rest is not checked."""
+"""Largest number of XML attributes in a file. A file with more is reported as faulty; the rest is not checked."""
 MAX_PROBLEMS = 20
-"""Largest number of faults reported of one file."""
+"""Largest number of faults that are reported for one file."""
 _NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
 _TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
 _UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
-"""Characters that texts of a URDF must not have, since PyBullet's log uses them as printf formats."""
+"""Characters that are not allowed in attribute values: control characters, and %, since PyBullet's log passes values to
+printf as format."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 _NUMBERS = {
     **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), MAX_COORDINATE_M),
@@ -48,9 +49,9 @@ _NUMBERS = {
         )
     },
 }
-"""Largest allowed number by element and attribute."""
+"""Largest allowed magnitude of a number, by tag and attribute name."""
 _VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
-"""Attributes that have three numbers."""
+"""Tag and name of the attributes that must have three numbers."""
 _SHAPES = {
     "box": ("size",),
     "sphere": ("radius",),
@@ -59,7 +60,7 @@ _SHAPES = {
     "plane": ("normal",),
     "mesh": ("filename",),
 }
-"""Attributes that each shape has."""
+"""Required attributes of each shape, by tag."""
 _LIMITED = ("revolute", "prismatic")
 _INERTIA = ("ixx", "iyy", "izz")
 _CONTACT = (
@@ -69,10 +70,10 @@ _CONTACT = (
 
 
 def check_structure(document: UrdfDocument) -> None:
-    """Checks that a URDF can be loaded safely by PyBullet and other readers.
+    """Checks that PyBullet and other programs can load a URDF safely.
 
     Raises:
-        ConfigError: If it cannot; the error lists the first faults.
+        ConfigError: If the URDF has faults; the error lists up to `MAX_PROBLEMS` faults.
     """
     if problems := structure_problems(document):
         raise ConfigError([Problem(document.path, "", problem) for problem in problems])
@@ -80,7 +81,7 @@ def check_structure(document: UrdfDocument) -> None:
 
 @lru_cache(maxsize=32)
 def structure_problems(document: UrdfDocument) -> tuple[str, ...]:
-    """Returns a sentence for each of the first faults: in the tree of links, names, numbers and other texts."""
+    """Returns up to `MAX_PROBLEMS` messages, one for each fault in the tree of links, in names, numbers or texts."""
     return tuple(islice(_problems(document), MAX_PROBLEMS))
 
 
@@ -108,7 +109,7 @@ def _name_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _type_problems(document: UrdfDocument) -> Iterator[str]:
-    """Yields a sentence for each joint without a valid type, for which PyBullet's own message is broken."""
+    """Yields a message for each joint without a valid type; PyBullet's own message for this fault is broken."""
     for joint in document.joint_elements:
         if (kind := joint.get("type", "")) not in _TYPES:
             name = shortened(joint.get("name", ""))
@@ -173,7 +174,7 @@ def _text_problems(document: UrdfDocument) -> Iterator[str]:
 
 
 def _text_problem(attribute: Attribute) -> str:
-    """Returns why a text must not be passed to PyBullet, which copies it to its stack and its log; None if it may."""
+    """Returns why an attribute's text is unsafe for PyBullet, which copies it to its stack and log; empty if safe."""
     _, tag, key, text, _ = attribute
     longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
     if (size := len(text.encode())) > longest:
@@ -184,7 +185,7 @@ def _text_problem(attribute: Attribute) -> str:
 
 
 def numbers_in(text: str) -> list[float]:
-    """Returns the numbers in a text as PyBullet reads them: from the beginning of each word."""
+    """Reads numbers like PyBullet: each word gives the number at its beginning; words without a number are skipped."""
     return [float(match[0]) for word in text.split() if (match := _NUMBER.match(word))]
 
 
@@ -204,9 +205,9 @@ def _number_problem(tag: str, key: str, text: str) -> str:
 
 
 def missing_parts(document: UrdfDocument) -> Iterator[str]:
-    """Yields a sentence for each element or attribute that PyBullet needs and a URDF lacks, by link and joint.
+    """Yields a message for each missing element or attribute that PyBullet requires; the message names link or joint.
 
-    PyBullet itself only reports "Cannot load URDF file".
+    PyBullet's own message is only "Cannot load URDF file".
     """
     if "name" not in document.root.attrib:
         yield "<robot> has no name"
@@ -243,8 +244,10 @@ def _link_faults(link: Element) -> Iterator[str]:
 
 
 def _shape_faults(part: Element) -> Iterator[str]:
-    """Yields the parts that PyBullet needs and the shape of a visual or collision lacks; PyBullet reads the first
-    shape."""
+    """Yields a message for each part that PyBullet requires and that the first shape of a visual or collision lacks.
+
+    PyBullet reads only the first shape.
+    """
     shapes = [shape for shape in part.iterfind("geometry/*") if shape.tag in READ]
     if not shapes:
         given = [f", got <{shortened(shape.tag)}>" for shape in part.iterfind("geometry/*")][:1]
@@ -256,7 +259,7 @@ def _shape_faults(part: Element) -> Iterator[str]:
 
 
 def _lacking(owner: Element, tag: str, keys: tuple[str, ...]) -> Iterator[str]:
-    """Yields the attributes that an element within another lacks."""
+    """Yields a message if the element `tag` inside `owner` is missing, or lacks some of the attributes `keys`."""
     if (found := owner.find(tag)) is None:
         yield f"<{owner.tag}> has no <{tag}>"
         return
