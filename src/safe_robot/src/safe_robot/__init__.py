@@ -1,1 +1,1 @@
-"""The guard between targets and a robot: no target reaches the robot unchecked."""
+"""Guard between targets and a robot: checks each target before it reaches the robot."""

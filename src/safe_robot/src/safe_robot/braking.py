@@ -1,4 +1,4 @@
-"""Braking trajectories in discrete time: how joints that move come to rest within their acceleration and jerk limits.
+"""Braking trajectories in discrete time: moving joints come to rest within their acceleration and jerk limits.
 
 Time advances in periods of T, and derivatives are backward differences, as in a controller with one command per period:
 v_k = (q_k - q_{k-1}) / T, a_k = (v_k - v_{k-1}) / T, j_k = (a_k - a_{k-1}) / T.
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 GROWTH = 1.15
-"""Ratio of each prepared braking duration to the next shorter one."""
+"""Approximate ratio of each precomputed braking duration to the next shorter one."""
 INSIDE = 1.0 - 1e-6
 """Share of the limits that braking uses, so that rounding errors cannot exceed the limits."""
 TINY = 1e-300
@@ -41,7 +41,7 @@ class Brake(NamedTuple):
 
         Args:
             other: The other braking, which may have another number of periods.
-            joints: n booleans: whether each joint is selected.
+            joints: Mask of the selected joints, n booleans.
         """
         rows = max(len(self.velocity), len(other.velocity))
         return Brake(
@@ -85,8 +85,8 @@ class Braking:
     """Finds braking trajectories of n joints, independently for each joint.
 
     A joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
-    linear in velocity and acceleration. The factors are prepared for a series of lengths N, so a braking is one matrix
-    product. The shortest prepared length that keeps the limits is used.
+    linear in the joint's velocity and acceleration at the start. The factors are precomputed for several lengths N, so
+    a braking is one matrix product. The shortest of these lengths that keeps the limits is used.
 
     Args:
         max_velocity: Largest speeds, shape (n,) [rad/s or m/s]; inf for a joint without a limit.
@@ -114,7 +114,7 @@ class Braking:
             lengths.append(max(lengths[-1] + 1, round(lengths[-1] * GROWTH)))
         self._lengths = np.array(lengths)
         lines = np.array([_jerk_line(length) for length in lengths])
-        first, slope = lines[:, 0], lines[:, 1]  # jerk m of length l is first[l] + slope[l] m, times (v, a)
+        first, slope = lines[:, 0], lines[:, 1]  # jerk m of length l is (first[l] + slope[l] m) @ (v, a)
         last = first + slope * self._lengths[:, None]
         self._lines = np.stack((first, slope, first + slope, last, first + slope + (0.0, 1.0)))
         m = np.arange(1, lengths[-1] + 1)[None, :, None]
@@ -128,9 +128,10 @@ class Braking:
         self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
-        """Returns the braking of n joints from n velocities and n accelerations; None if the limits forbid it.
+        """Returns the braking of n joints from their n velocities and n accelerations.
 
-        Velocities and positions during braking are not checked here.
+        Returns None if no precomputed length keeps the acceleration and jerk limits. Velocities and positions during
+        braking are not checked here.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state[:, None])[:, 0]
@@ -145,8 +146,8 @@ class Braking:
     def ends(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns the braking distances [rad or m], and the largest speeds until rest [rad/s or m/s].
 
-        The arguments are m states of n joints. All arrays have the shape (m, n). Results are NaN where the limits
-        forbid the braking.
+        The arguments are m states of n joints. All arrays have the shape (m, n). Results are NaN where
+        no braking keeps the acceleration and jerk limits.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state)
@@ -157,7 +158,7 @@ class Braking:
         return can * (end[..., 0] * state[0] + end[..., 1] * state[1]), can * speed
 
     def _turning_speed(self, state: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Returns the velocity where the acceleration first changes its sign; the unit of time is the period."""
+        """Returns the velocity at which the acceleration first changes sign; the unit of time is the period."""
         v, a = state
         lines = self._lines[:2, which]  # 2 x m x n x 2
         first, slope = lines[..., 0] * v + lines[..., 1] * a
@@ -168,10 +169,11 @@ class Braking:
         return speed
 
     def factors(self, velocity: np.ndarray, acceleration: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the factors of velocity and of acceleration in the distances of n joints, two arrays of (count, n).
+        """Returns two arrays of factors, each of shape (count, n), from which the braking distances of n joints follow.
 
-        The distance of a joint at an instant is its velocity times the first factor plus its acceleration times the
-        second. Rows are instants, evenly spaced from the beginning until all joints rest.
+        The distance that a joint has travelled at an instant is its initial velocity times the first factor plus its
+        initial acceleration times the second factor. Rows are instants, evenly spaced from the start of braking until
+        all joints rest.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
@@ -180,7 +182,7 @@ class Braking:
         return way[0] * self._period_s, way[1] * self._period_s**2
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
-        """Returns whether each of the l prepared lengths keeps the limits, shape (l, m, n).
+        """Returns whether each of the l precomputed braking lengths keeps the limits, shape (l, m, n).
 
         Args:
             state: Velocities and accelerations of m states of n joints, shape (2, m, n); the unit of time is the
@@ -206,7 +208,9 @@ def _padded(values: np.ndarray, rows: int, repeats: bool) -> np.ndarray:
 
 
 def _jerk_line(length: int) -> np.ndarray:
-    """Returns the factors of velocity and acceleration in p and in r, where p + r m is jerk m = 1 ... N of a braking.
+    """Returns the factors of a braking's jerks p + r m in the periods m = 1 ... N, shape (2, 2).
+
+    Row 0 gives p, and row 1 gives r. The columns are multiplied by velocity and acceleration.
 
     With T = 1, a joint rests after N periods if sum(j_m) = -a and sum((N - m + 1) j_m) = -v - N a. The sum of squares
     is smallest where j is a linear combination of the coefficients of both equations, which is linear in m.
@@ -222,8 +226,8 @@ def _jerk_line(length: int) -> np.ndarray:
 def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
     """Returns an upper bound of the duration of braking from any state within limits [s].
 
-    In continuous time, the braking of duration D with the least squares starts with the jerk (6 v + 4 a D) / D^2. Its
-    opposite acceleration is at most a third of the present acceleration plus 1.5 v / D.
+    In continuous time, the least-squares braking of duration D starts with the jerk (6 v + 4 a D) / D^2. Its
+    acceleration in the opposite direction is at most a third of the present acceleration plus 1.5 v / D.
     """
     velocity = min(velocity, FASTEST)
     acceleration = min(acceleration, 2.0 * math.sqrt(velocity * jerk))

@@ -1,4 +1,7 @@
-"""Distances between collision shapes, measured in a separate PyBullet client; meshes become their convex hulls."""
+"""Distances between collision shapes, measured in a separate PyBullet client.
+
+Meshes are replaced by their convex hulls.
+"""
 
 import math
 import weakref
@@ -27,7 +30,7 @@ OF_PYBULLET: dict[int, ObstacleKind] = {
 NO_FILE = ("", "unknown_file")
 """Names that PyBullet reports for a mesh without a file."""
 EDGE_M = (math.sqrt(3.0) - 1.0) * 1e-3
-"""Largest distance from the corner of a box to the corner that PyBullet rounds with a radius of 1 mm [m]."""
+"""Largest distance between the corner of a box and PyBullet's corner, which is rounded with a radius of 1 mm [m]."""
 EDGED = (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER)
 """Shapes whose edges and corners PyBullet rounds."""
 AABB_MARGIN_M = 6e-3
@@ -35,7 +38,7 @@ AABB_MARGIN_M = 6e-3
 
 
 class BulletShapes:
-    """Collision shapes of a robot and of obstacles in PyBullet, see `Shapes`.
+    """Collision shapes of a robot and of obstacles in PyBullet; implements `Shapes`.
 
     Args:
         robot: The robot; its mesh files must exist.
@@ -139,7 +142,7 @@ def _solids_of_link(pb: Client, body: int, link: int) -> list[Solid]:
 
 
 def _missing_m(pb: Client, body: int, link: int) -> float:
-    """Returns by how much PyBullet may overestimate distances from a link, because it rounds edges [m]."""
+    """Returns the largest error by which PyBullet overestimates distances from a link, because it rounds edges [m]."""
     return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
 
 
@@ -147,8 +150,8 @@ def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
     """Returns the collision shapes of a link in their true size, in the frame of its centre of mass.
 
     If PyBullet does not report the corners of all shapes, the result is the axis-aligned box around the link in its
-    present pose. The result is this box, too, if only some of the shapes are meshes from files, or if meshes are
-    rotated relative to each other.
+    present pose. The same box is returned if only some of the shapes are meshes from files, or if meshes are rotated
+    relative to each other.
     """
     shapes = pb.getCollisionShapeData(body, link)
     if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):
@@ -168,7 +171,7 @@ def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
     boxes = [box_of(*each.moved(0, np.linalg.inv(place)).extent).moved(0, place) for each, place in zip(solids, places)]
     lower, upper = pb.getAABB(body, link)
     if boxes and all(np.isfinite(box.balls).all() for box in boxes):
-        # PyBullet's box contains those of all shapes: it is larger only if some shapes were not reported
+        # PyBullet's box encloses all shapes: it is larger than the reported shapes only if some were not reported
         least, most = box_of(*Solid(0, np.concatenate([box.balls for box in boxes])).extent).moved(0, pose).extent
         if (least - AABB_MARGIN_M <= lower).all() and (most + AABB_MARGIN_M >= upper).all():
             return solids

@@ -1,4 +1,4 @@
-"""The interface of checks."""
+"""Interface of safety checks, and the data that the guard passes to them."""
 
 import math
 from abc import ABC, abstractmethod
@@ -34,8 +34,8 @@ class Violation(NamedTuple):
         limit: Allowed value, in `unit`; NaN if the violation has no numbers.
         unit: Unit of `value` and `limit`.
         is_while_braking: Whether the braking after the target is unsafe, not the target itself.
-        quantity: Name of the quantity of `value` and `limit`; empty if `subject` names the quantity.
-        words: Text with advice; if not empty, it replaces the text made from the attributes after `check`.
+        quantity: Name of the quantity that `value` and `limit` measure; empty if `subject` names the quantity.
+        words: Message with advice; if not empty, it replaces the generated message after the check's name.
     """
 
     check: str
@@ -57,7 +57,7 @@ class Violation(NamedTuple):
 
 
 class MarginViolation(NamedTuple):
-    """A pair that is nearer than its margin.
+    """A pair of shapes that is nearer than its safety margin.
 
     Attributes:
         check: Name of the check.
@@ -77,19 +77,19 @@ class MarginViolation(NamedTuple):
 
 
 class CheckContext(NamedTuple):
-    """What checks use in addition to the motion: times, measurements and obstacles.
+    """Inputs of checks in addition to the motion: times, measurements and obstacles.
 
     Attributes:
         now_s: Present time of a monotonic clock [s].
         age_s: Age of the target [s]; 0 if unknown.
-        stamp_step_s: Stamp of the target minus stamp of the previous target [s]; None if there is none.
-        since_command_s: Time since the previous command [s]; for a repeated stamp, time since this stamp first arrived.
+        stamp_step_s: Stamp of the target minus stamp of the previous target [s]; None without a previous stamp.
+        since_command_s: Time since the previous command [s]. For a repeated stamp: time since this stamp first arrived.
         measured: Measured positions, indexed by joint name [rad or m]; empty if there are none.
         measured_age_s: Age of the oldest measured position [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].
         wrench_age_s: Age of the wrench [s]; inf if there is no wrench.
-        obstacles: Present bodies of the environment; None without a source. While they do not change, this is the same
-            tuple object.
+        obstacles: Present bodies of the environment; None without a source of bodies. While no body changes, this is
+            the same tuple object.
     """
 
     now_s: float = 0.0
@@ -106,8 +106,8 @@ class CheckContext(NamedTuple):
 class Check(ABC):
     """Base class of checks, each of which decides whether a motion is safe.
 
-    Results do not depend on earlier calls: equal motions and contexts have equal results. For trials, only the decision
-    whether the motion is safe has to be equal.
+    Results do not depend on earlier calls: equal motions and contexts have equal results. For a trial motion, the
+    reported violation may differ, but not whether the motion is safe.
 
     Args:
         config: Options of the check.
@@ -120,7 +120,7 @@ class Check(ABC):
 
     Attributes:
         Config: Model of the check's options.
-        name: Name of the check in the table and in messages.
+        name: Name of the check in the configuration and in messages.
         is_default: Whether the check is used even without an entry in the configuration.
         watches: Whether the check examines the context, not the command; such checks also run while no targets arrive.
         takes_obstacles: Whether the check uses `CheckContext.obstacles`.
@@ -157,7 +157,7 @@ class Check(ABC):
         return ()
 
     def inside(self, q: np.ndarray) -> Sequence[MarginViolation]:
-        """Returns the margin violations at n positions [rad or m], with the obstacles of the last `check`."""
+        """Returns the margin violations at n joint positions [rad or m]; obstacles are as in the last `check` call."""
         return ()
 
     def require_link(self, link: str, key: str) -> None:
@@ -188,7 +188,7 @@ class Check(ABC):
     def of_joint(
         self, i: int, value: float, limit: float, quantity: str, unit: tuple[str, str], is_while_braking: bool
     ) -> Violation:
-        """Returns the violation for joint `i`; see `Violation` and, for `unit`, `first_above`."""
+        """Returns the violation for the joint with index `i`; see `Violation` and, for `unit`, `first_above`."""
         which = unit[0] if self.robot.joints[i].is_revolute else unit[1]
         subject = f"joint '{self.robot.joint_names[i]}'"
         return Violation(self.name, subject, value, limit, which, is_while_braking, quantity)

@@ -84,7 +84,7 @@ class CheckConformance:
         assert f"{violation.limit:.6g}" in str(violation)
 
     def test_equal_motions_have_equal_answers_in_any_order(self) -> None:
-        """A second instance with the same options has the same answers."""
+        """The answer depends neither on earlier calls nor on the instance of the check."""
         check, other = self.make(), self.make()
         answers = [check.check(*each()) for each in (self.unsafe, self.safe, self.unsafe, self.unsafe, self.safe)]
         assert answers == [answers[0], None, answers[0], answers[0], None]
@@ -100,7 +100,7 @@ class CheckConformance:
         assert self.make().check(nowhere, context) is not None
 
     def test_an_unknown_option_is_named(self) -> None:
-        """A misspelt option would silently remove a limit."""
+        """An unknown option raises an error: otherwise, a misspelt option would silently remove a limit."""
         robot = self.robot
         limits = MotionLimits.of(robot, LimitsConfig(), "guard.yaml")
         with pytest.raises(ConfigError, match=f"guard.yaml: checks.{self.check_name}.no_such_option"):

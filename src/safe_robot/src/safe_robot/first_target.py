@@ -1,4 +1,4 @@
-"""Check of the first target after a start, which has to be near the robot, and safe."""
+"""Check of the first target after a start: the target has to be safe and near the robot."""
 
 import math
 from collections.abc import Sequence
@@ -40,11 +40,11 @@ class FirstTarget:
         self._config, self._robot, self._checks = config, robot, checks
 
     def judged(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> State | Violation:
-        """Returns the state at rest in which the robot starts, or a violation if it cannot start.
+        """Returns the state at rest from which the robot starts, or the violation that forbids the start.
 
         Args:
             target: n positions [rad or m].
-            last: The n positions that were commanded last [rad or m]; None if there are none.
+            last: The n positions of the last command [rad or m]; None before the first command.
             context: Context of the checks, with the measured positions.
         """
         there = self._present_position(target, last, context)

@@ -27,15 +27,15 @@ from .motion import CommandedMotion, State
 log = logging.getLogger(__name__)
 
 MENDED_BY_BRAKING = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
-"""Checks that the next braking command may pass when a smoothed command fails them."""
+"""If a smoothed command fails one of these checks, the next braking command is tried instead."""
 
 
 class Decision(NamedTuple):
     """Answer of a guard to a target.
 
     Attributes:
-        command: The n positions to command [rad or m], equal to the target if the target is safe and not smoothed; None
-            if nothing is sent, for example for a repeated stamp.
+        command: The n positions to command [rad or m]. A safe target that is not smoothed is commanded unchanged. None:
+            nothing is sent, for example because the stamp is repeated.
         violation: Reason why the target is not safe; None if the target is safe, or was not checked.
         is_halted: Whether targets are refused until `Guard.start` is called.
         is_shaped: Whether the target was smoothed.
@@ -62,7 +62,7 @@ class Guard:
     known braking can therefore bring the robot to rest within all limits.
 
     Except at a start, motions are computed from the previous command, never from a measurement. Every command counts as
-    lasting one period, whatever its stamp is, so stamps cannot make the robot faster; the caller ensures that commands
+    lasting one period, whatever its stamp is, so stamps cannot make the robot faster. The caller ensures that commands
     are at least a period apart.
 
     Targets with the same stamp count as one target: only the first of them causes a command. While the stamp does not
@@ -112,7 +112,7 @@ class Guard:
 
     @property
     def is_moving(self) -> bool:
-        """Whether the last commands move the robot."""
+        """Whether the robot still moves, according to the last commands."""
         return self._state is not None and not self._state.is_at_rest
 
     @property
@@ -133,7 +133,7 @@ class Guard:
         return self._stop.position.copy()
 
     def way_out(self) -> EscapeDirection | None:
-        """Returns the motion out of the margins that are violated at the last command.
+        """Returns the margins that the last command violates, and the motion that leaves them.
 
         Returns None if no margin is violated, or before the first command.
         """
@@ -209,7 +209,7 @@ class Guard:
         return decision
 
     def refuse(self, reason: str) -> Decision:
-        """Decides on the command in place of a target that cannot be checked; `reason` says why."""
+        """Decides on the command in place of a target that cannot be checked; `reason` becomes the violation."""
         if self.is_halted:
             return Decision(None, None, True)
         decision = self._brake_or_halt(Violation("input", reason, math.nan, math.nan, ""))
@@ -220,7 +220,7 @@ class Guard:
     def check_watchdogs(self, context: CheckContext) -> Violation | None:
         """Runs the checks that apply between targets, and returns the first violation; None if there is none.
 
-        After a violation, the guard halts. If targets are late, it calls `wait_for_target` instead.
+        After a violation, the guard halts. If targets are late, the guard calls `wait_for_target` instead.
         """
         if self.is_halted or self._is_first or self._state is None:
             return None
@@ -245,13 +245,13 @@ class Guard:
             return self._brake_or_halt(violation)
         is_first = self._is_first
         if is_first and (violation := self._start_at(target, context)):
-            return Decision(None, violation, math.isfinite(violation.value))  # unknown values are waited for
+            return Decision(None, violation, math.isfinite(violation.value))  # positions unknown: wait, do not halt
         assert self._state is not None
         if context.stamp_step_s == 0.0 and not is_first:
             repeated = self._watchdog_violation(context)
             return Decision(None) if repeated is None else self._brake_or_halt(repeated)
         wanted = target
-        if self._shaper is not None:  # controllers assume rest at the first command, so it is the present position
+        if self._shaper is not None:  # controllers assume rest at the first command: command the present position
             wanted = (
                 tuple(self._state.position.tolist())
                 if is_first
@@ -269,7 +269,7 @@ class Guard:
         return Decision(self._commit(found), is_shaped=wanted != target)
 
     def _overshoot(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
-        """Returns a violation if braking would carry a joint past its target, and this target has not changed.
+        """Returns a violation if braking would carry a joint past a target that has not changed.
 
         Returns None if no joint would pass its target, or with the policy `reject`.
         """
@@ -286,7 +286,7 @@ class Guard:
 
     @property
     def _braking_commands(self) -> np.ndarray:
-        """Commands that bring the robot to rest, k x n, k >= 1; if the robot rests, its position."""
+        """Commands that bring the robot to rest, shape (k, n), k >= 1; one row with the position if the robot rests."""
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
 
@@ -323,7 +323,7 @@ class Guard:
     def _evaluate(
         self, command: Sequence[float], context: CheckContext, checks: Sequence[Check], is_trial: bool = False
     ) -> _Safe | Violation:
-        """Returns a safe command with its braking, or the violation of the first check that the command fails."""
+        """Runs checks on a command; returns the command with its braking, or the first violation."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
@@ -340,7 +340,7 @@ class Guard:
     def _brake(self, state: State) -> Brake | None:
         """Returns the braking after a command; None if the limits forbid it.
 
-        Joints that already follow the present braking keep it.
+        Joints that already follow the present braking continue this braking.
         """
         keeps_braking = np.zeros(len(state.position), dtype=bool)
         if len(self._stop.position):
@@ -366,7 +366,7 @@ class Guard:
         return safe.command
 
     def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
-        """Decides in place of an unsafe target: on a safe command near the target, or else on the next braking command.
+        """Replaces an unsafe target by a safe command near the target, or else by the next braking command.
 
         With the policy `reject`, the guard halts. If the failed check examines only the context, the robot brakes.
         """

@@ -1,4 +1,4 @@
-"""Translation of parameters of the authors' release, and of its README, to the configuration of a guard."""
+"""Translates the parameters of the authors' original release and of its README to the configuration of a guard."""
 
 import math
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ CHECKERS = {
     "linkboxlimit": "link_box",
     "statevalidity": "self_collision",
 }
-"""The check of this guard for each NAME in the parameters `~checker/NAME/active`."""
+"""Maps each NAME in the original parameters `~checker/NAME/active` to the check of this guard."""
 SWITCHES = {
     "check_joint_position_limits": "joint_position",
     "check_joint_velocity_limits": "joint_velocity",
@@ -29,23 +29,23 @@ BY_JOINT = {
 AXES = {f"{prefix}_{axis}lim": axis for prefix in ("box", "link") for axis in "xyz"}
 LINKS = ("links", "safe_links")
 UNUSED = ("exotica_xml_filename", "stop_after_first_fail", "debug")
-"""Keys of the authors' release that this guard ignores."""
+"""Keys of the authors' original release that this guard ignores."""
 KEYS = (
     "checker", "joint_name_order", "safe_distance", *SWITCHES, *FACTORS, *BY_JOINT, *AXES, *LINKS, *UNUSED,
 )  # fmt: skip
 
 
 def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> dict[str, Any]:
-    """Translates parameters of the authors' release to the keys of `GuardConfig`.
+    """Translates parameters of the authors' original release to the keys of `GuardConfig`.
 
     Args:
-        given: The parameters; parameters that the release does not have are returned unchanged.
-        joint_names: Names of the joints to which numbers in lists belong; the parameter `joint_name_order` replaces
-            them.
+        given: The parameters; parameters that the original release does not have are returned unchanged.
+        joint_names: Joint names in the order of the numbers in lists; the parameter `joint_name_order` overrides this
+            order.
         file: Source of the parameters, for messages.
 
     Raises:
-        ConfigError: If a parameter does not have the form that the release requires.
+        ConfigError: If a parameter does not have the form that the original release requires.
     """
     config = {key: value for key, value in given.items() if key not in KEYS}
     limits = dict(_mapping(given, "limits", file))

@@ -52,8 +52,8 @@ class MotionLimits(NamedTuple):
         """Returns the limits of a robot's joints, narrowed by a configuration.
 
         Raises:
-            ConfigError: If limits contradict each other, or a joint's limit is wider than in the robot's description;
-                the message names the file, the key and both values.
+            ConfigError: If a lower limit is not below the upper limit, a limit given for one joint is wider than in the
+                robot's description, or a joint is unknown. The message names the file and the key.
         """
         problems: list[Problem] = []
         lower = _narrowed(robot, "lower", [joint.lower for joint in robot.joints], config.lower, problems, file)

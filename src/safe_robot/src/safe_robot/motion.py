@@ -1,4 +1,4 @@
-"""Motions that are checked: a command, and the braking that would follow it."""
+"""Motions that are checked: a command, and the braking that would follow the command."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -10,11 +10,11 @@ from robot_model.model import RobotModel
 from .braking import Brake, BrakingCommands
 
 WAYPOINT_SPACING = 0.15
-"""Largest sum of all joints' motions between two waypoints [rad or m], unless it is larger in a single period."""
+"""Approximate path length between two waypoints, summed over all joints [rad or m]."""
 
 
 class State(NamedTuple):
-    """Last command to n joints, with derivatives that are backward differences.
+    """Commanded positions of n joints, and their velocities and accelerations as backward differences.
 
     Attributes:
         position: Positions, shape (n,) [rad or m].
@@ -37,7 +37,7 @@ class State(NamedTuple):
         return not (self.velocity.any() or self.acceleration.any())
 
     def then(self, position: np.ndarray, period_s: float) -> "State":
-        """Returns the state after the next command, n positions [rad or m], which is a period [s] later."""
+        """Returns the state after n positions [rad or m] are commanded one period [s] later."""
         velocity = (position - self.position) / period_s
         return State(position, velocity, (velocity - self.velocity) / period_s)
 
@@ -57,7 +57,7 @@ class Bound(NamedTuple):
 
 
 class CommandedMotion:
-    """A command to n joints, and the braking that would follow it.
+    """A command to n joints, and the braking that would follow the command.
 
     Arrays have k rows, a period apart. Row 0 is the command, and the other rows are the braking.
 
@@ -65,7 +65,7 @@ class CommandedMotion:
         robot: The guarded robot.
         period_s: Time between two rows [s].
         start: The state before the command.
-        is_trial: Whether it only matters if the motion is safe, so that checks may report any of its violations.
+        is_trial: Whether only safe or unsafe matters; checks may then report any violation, not only the first one.
         position: Positions, shape (k, n) [rad or m].
         velocity: Velocities, shape (k, n) [rad/s or m/s].
         acceleration: Accelerations, shape (k, n) [rad/s^2 or m/s^2].
@@ -130,9 +130,9 @@ class CommandedMotion:
         return path
 
     def link_positions(self, link: str) -> np.ndarray:
-        """Returns the positions of a link's origin in the robot's root [m], shape (k + 1, 3).
+        """Returns the positions of a link's origin in the frame of the robot's root link, shape (k + 1, 3) [m].
 
-        The first one belongs to the previous command, the others to the k rows.
+        The first position belongs to the previous command, the others to the k rows.
         """
         if link not in self._link_positions:
             self._link_positions[link] = self.robot.frames.positions(self.with_start, link)

@@ -10,13 +10,13 @@ Item = TypeVar("Item")
 PATIENCE_S = 0.1
 """Longest time that targets wait for a newer target [s]."""
 WAKE_UP_S = 0.0002
-"""Time before a target is due at which the queue's thread wakes up [s]."""
+"""Time by which the queue's thread wakes up before a target is due [s]."""
 
 
 class TargetQueue(Generic[Item]):
     """Passes targets on, at least a period apart, while the newest target is recent.
 
-    A target that arrives after the period is passed on at once, in the thread that delivers it. An earlier target
+    A target that arrives after the period is passed on at once, in the thread that calls `put`. An earlier target
     waits, so that a burst does not make the robot faster. Waiting targets are passed on only while the newest target is
     younger than a limit, so that the robot stops when the source of targets has ended.
 
@@ -26,7 +26,7 @@ class TargetQueue(Generic[Item]):
             `PATIENCE_S`.
         size: Largest number of waiting targets; if there are more, the oldest are dropped.
         on_target: Called with each target while `lock` is held; returns whether a new period begins.
-        give_up: Called with the age of the newest target [s] when waiting targets are dropped, while `lock` is held.
+        give_up: Called when waiting targets are dropped, with the age of the newest target [s]; `lock` is held.
 
     Attributes:
         lock: Held while a target is passed on.
@@ -49,7 +49,7 @@ class TargetQueue(Generic[Item]):
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
     def put(self, item: Item, age_s: float) -> None:
-        """Passes a target on, at once or later.
+        """Passes a target on at once if the period is over, and otherwise queues the target.
 
         Args:
             item: The target.
@@ -88,7 +88,7 @@ class TargetQueue(Generic[Item]):
 
     def _pass_on(self) -> None:
         item, _ = self._waiting.popleft()
-        begin_s = time.monotonic()  # otherwise each period would be longer by the time of a decision
+        begin_s = time.monotonic()  # before the decision, whose duration would lengthen each period
         if self._on_target(item):
             self._due_s = max(self._due_s, begin_s) + self._period_s
 
@@ -98,7 +98,7 @@ class TargetQueue(Generic[Item]):
                 self.lock.wait(self._rest_s())
 
     def _rest_s(self) -> float | None:
-        """Passes on all targets, or runs all steps, that are due; returns the time until the next one [s], or None."""
+        """Passes on all due targets, or runs all due steps; returns the time until the next one [s], or None."""
         while self._step or self._waiting:
             now_s = time.monotonic()
             if (left_s := self._left_s(now_s)) > WAKE_UP_S:

@@ -15,7 +15,7 @@ from .bullet import NO_FILE, OF_PYBULLET
 
 
 def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) -> tuple[Obstacle, ...]:
-    """Returns the collision shapes of a world's rigid bodies at the start, in the root link of the guarded robot.
+    """Returns the collision shapes of a world's rigid bodies at the start, in the frame of the robot's root link.
 
     Args:
         path: The main YAML file of the world.

@@ -1,4 +1,4 @@
-"""The checks; to add one, write a class in its own file and a line here."""
+"""Table of the safety checks. To add a check, write its class in a new file, and add a line to the table."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,20 +26,20 @@ CHECKS: PluginTable[Check] = PluginTable(
         "force": "safe_robot.checks.force:Force",
     },
 )
-"""All checks, in the order in which a guard makes them."""
+"""All checks, in the order in which a guard runs them."""
 
 
 def make_checks(
     options: Mapping[str, Mapping[str, Any]], robot: RobotModel, limits: MotionLimits, file: str
 ) -> list[Check]:
-    """Returns the checks of a guard: the default ones and those with options, except those that are not active.
+    """Creates the checks of a guard: default checks and checks with options, except inactive checks.
 
     Args:
-        options: Options by name of the check.
+        options: Options of each check, indexed by check name.
         file: Source of the options, for messages.
 
     Raises:
-        ConfigError: If a check is not known, or its options are wrong.
+        ConfigError: If a check is unknown, or a check's options are wrong.
     """
     checks = []
     for name in dict.fromkeys((*CHECKS, *options)):

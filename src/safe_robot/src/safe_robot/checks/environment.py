@@ -1,4 +1,4 @@
-"""Distances to bodies of the environment."""
+"""Check of the distances between links and bodies of the environment."""
 
 import math
 from typing import Any
@@ -38,8 +38,8 @@ class EnvironmentConfig(CheckConfig):
 class Environment(ProximityCheck):
     """Links keep away from bodies of the environment, also while the robot brakes.
 
-    Bodies are those of a world file and, with a source of them, live ones. If a body comes nearer than the margin by
-    itself, the robot may only move such that the distance does not decrease.
+    Bodies come from a world file, from `CheckContext.obstacles`, or from both. If a body itself comes nearer than the
+    margin, the robot may only move such that the distance does not decrease.
     """
 
     Config = EnvironmentConfig
@@ -67,7 +67,7 @@ class Environment(ProximityCheck):
         """See `Check`.
 
         Raises:
-            ValueError: If an obstacle has no shape.
+            ValueError: If an obstacle has non-finite numbers, or a shape that is not supported.
         """
         if (violation := self.undefined(motion)) is not None:
             return violation
@@ -83,8 +83,8 @@ class Environment(ProximityCheck):
         return f"link '{pair[0]}' and '{self._obstacles[int(pair[1])].name}'"
 
     def _update_poses(self, live: tuple[Obstacle, ...]) -> None:
-        """Updates the poses of obstacles that have moved."""
-        self._live = None  # until all poses are updated
+        """Replaces the live obstacles, and updates the distances of those that have changed."""
+        self._live = None  # marks the poses as outdated until all are updated
         count = len(self._obstacles)
         obstacles = (*self._of_world, *live)
         for obstacle in live:

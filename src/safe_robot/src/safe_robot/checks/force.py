@@ -1,4 +1,4 @@
-"""Measured forces and torques."""
+"""Check of measured forces and torques."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Accelerations of joints within their limits."""
+"""Check that joint accelerations are within their limits."""
 
 import numpy as np
 

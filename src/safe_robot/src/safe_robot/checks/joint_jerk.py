@@ -1,4 +1,4 @@
-"""Jerks of joints within their limits."""
+"""Check that joint jerks are within their limits."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Positions of joints within their limits."""
+"""Check that joint positions are within their limits."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Speeds of joints within their limits."""
+"""Check that joint speeds are within their limits."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Boxes that links stay in."""
+"""Check that the origins of links stay in boxes."""
 
 import math
 from typing import Any, NamedTuple
@@ -13,9 +13,9 @@ from safe_robot.limits import MotionLimits
 from safe_robot.motion import Bound, CommandedMotion
 
 STEP = 1e-6
-"""Step of the joints for numerical derivatives of a link's motion [rad or m]."""
+"""Joint displacement for numerical derivatives of link positions [rad or m]."""
 SPARE_M = 1e-4
-"""Safety distance from the faces of the box when a command is searched [m]."""
+"""Distance that the search for a safe command keeps from the faces of a box [m]."""
 
 
 class BoxConfig(ConfigModel):
@@ -44,9 +44,9 @@ class Box(NamedTuple):
     """Box that a link stays in.
 
     Attributes:
-        low: Least x, y and z in the robot's root [m].
-        high: Greatest x, y and z [m].
-        reach: Largest motion of the link by each of n joints, for 1 rad or m each.
+        low: Smallest x, y and z in the frame of the robot's root link, shape (3,) [m].
+        high: Greatest x, y and z, shape (3,) [m].
+        reach: Upper bounds of the displacement of the link's origin by each joint, shape (n,) [m per rad or m].
     """
 
     low: np.ndarray
@@ -63,7 +63,7 @@ class LinkBox(Check):
     def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._boxes: dict[str, Box] = {}
-        self._room: dict[str, tuple[np.ndarray, float]] = {}  # largest value over random configurations
+        self._room: dict[str, tuple[np.ndarray, float]] = {}  # last n positions, and distance to the faces there
         for link, box in config.boxes.items():
             self.require_link(link, "boxes")
             low = [-math.inf if axis[0] is None else axis[0] for axis in (box.x, box.y, box.z)]

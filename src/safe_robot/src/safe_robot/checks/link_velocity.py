@@ -1,4 +1,4 @@
-"""Speeds of links."""
+"""Check that the speeds of links are within their limits."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ class LinkVelocity(Check):
 
     def __init__(self, config: Any, robot: RobotModel, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self._reach: dict[str, np.ndarray] = {}  # largest motion of a link by each joint, for 1 rad or m
+        self._reach: dict[str, np.ndarray] = {}  # largest link motion per rad or m of each joint
         for link in config.links:
             self.require_link(link, "links")
             self._reach[link] = robot.reach(link, 0.0)
@@ -34,7 +34,7 @@ class LinkVelocity(Check):
     def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         for link, limit in self.config.links.items():
-            if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # a bound for all joints together
+            if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # upper bound of the speed
                 continue
             position = motion.link_positions(link)
             step = position[1:] - position[:-1]

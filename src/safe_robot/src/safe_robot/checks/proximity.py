@@ -10,13 +10,13 @@ from robot_model.collision.separation import Separation
 from safe_robot.motion import Bound, CommandedMotion
 
 LEAST_SPACING_M = 0.01
-"""Smallest sampling distance of the braking [m], for small margins."""
+"""Smallest motion of links between two rows that are checked first [m]; used for small margins."""
 ROUNDING_M = 1e-9
-"""Distances that differ by less are equal [m]."""
+"""Distances whose difference is smaller than this count as equal [m]."""
 SPARE_M = 3e-4
-"""Safety distance beyond the margin when a command is searched [m], since distances are linearised there."""
+"""Distance that the search for a safe command adds to the margin [m], since it uses linearised distances."""
 LOOSE_M = 0.003
-"""A bound that is this much below the distance is renewed [m]."""
+"""A lower bound that is at least this much below the measured distance is improved [m]."""
 FAR_M = 10.0
 """Largest distance that is measured [m]."""
 
@@ -27,7 +27,7 @@ class TooNear(NamedTuple):
     Attributes:
         pair: The pair.
         distance: Distance [m].
-        is_while_braking: Whether the braking causes it, not the command.
+        is_while_braking: Whether the pair comes too near during the braking, not at the command.
     """
 
     pair: Pair
@@ -36,15 +36,15 @@ class TooNear(NamedTuple):
 
 
 class Proximity:
-    """Finds pairs that come nearer than a margin, and nearer than before.
+    """Finds pairs that come nearer than a margin, and nearer than at the start of the motion.
 
-    For most pairs, a bound by the joints' motion or a separating plane is sufficient. Only the other pairs are
-    measured.
+    For most pairs, a lower bound of the distance is sufficient. Such bounds follow from the joints' motion or from a
+    separating plane. Only the other pairs are measured.
 
     Args:
-        distances: Distances between shapes.
-        pairs: The pairs.
-        margin_m: The margin [m].
+        distances: Measures distances between shapes.
+        pairs: The pairs to examine: two links, or a link and an obstacle.
+        margin_m: Smallest allowed distance [m].
     """
 
     def __init__(self, distances: LinkDistances, pairs: Sequence[Pair], margin_m: float) -> None:
@@ -52,9 +52,9 @@ class Proximity:
         self._reach = np.array([distances.reach(pair) for pair in pairs])
         self._furthest = self._reach.max(axis=0, initial=0.0)
         self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
-        self._last = -1, 0  # pair and row that were too near last, and likely are in a similar motion
-        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair, both ends of a motion
-        self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of its distance there
+        self._last = -1, 0  # index of the last pair that was too near, and the row
+        self._known_at = np.zeros((2, *self._reach.shape))  # configurations at both ends of a motion
+        self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of the pairs' distances there
 
     def forget(self, indices: Sequence[int]) -> None:
         """Discards the bounds of pairs whose second member, an obstacle, has moved or changed."""
@@ -63,10 +63,10 @@ class Proximity:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
 
     def first(self, motion: CommandedMotion) -> TooNear | None:
-        """Returns a pair that comes too near in a motion; None if none does in any row.
+        """Returns a pair that comes too near in any row of a motion; None if all pairs keep their distance.
 
-        If the distances of a pair at two rows are d and e, and it moves by m in between, its distance in between is at
-        least (d + e - m) / 2. If that bound is not sufficient, every row is checked.
+        If a pair has the distances d and e at two rows, and moves by m in between, its distance in between is at least
+        (d + e - m) / 2. Where this bound is not sufficient, every row is checked.
         """
         if not len(self._pairs):
             return None
@@ -94,15 +94,15 @@ class Proximity:
         return self._first_in_rows(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
 
     def _first_in_rows(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
-        """Returns one of s pairs that comes too near in some of k rows of a motion; None if none does in any of them.
+        """Returns one of s pairs that comes too near in one of k rows; None if no pair does.
 
-        Rows far from each other are checked first: they reveal an unsafe motion soonest, and their distances bound
-        those of most rows in between.
+        Rows that are far apart are checked first. They reveal an unsafe motion soonest, and their distances give bounds
+        for most rows in between.
 
         Args:
             motion: The motion.
-            suspects: Numbers of the pairs.
-            rows: Numbers of the rows.
+            suspects: Indices of the s pairs.
+            rows: Indices of the k rows of the motion.
         """
         moved = motion.travelled[rows] @ self._reach[suspects].T
         spare = np.full(moved.shape, -np.inf)
@@ -122,19 +122,19 @@ class Proximity:
         moved: np.ndarray,
         spare: np.ndarray,
     ) -> TooNear | None:
-        """Returns one of s pairs that comes too near in some of k rows, measured if necessary.
+        """Returns one of s pairs that comes too near in the chosen rows; measures distances only where necessary.
 
-        In a trial, the row with the smallest bound is measured next, since it is most likely too near. Otherwise rows
-        are measured in order, so that equal motions have equal answers.
+        In a trial, the pair and row with the smallest bound are measured next, since they are most likely too near.
+        Otherwise rows are measured in order, so that equal motions have equal answers.
 
         Args:
             motion: The motion.
-            suspects: Numbers of the pairs.
-            rows: Numbers of the k rows.
-            chosen: Indices of the rows to examine.
-            moved: Distance that each pair has moved by each row, k x s [m].
-            spare: Lower bounds of distances less the margin, k x s [m], updated in place; inf where the pair is allowed
-                to be near.
+            suspects: Indices of the s pairs.
+            rows: Indices of the k rows of the motion.
+            chosen: Indices of the rows to examine, in the array `rows`.
+            moved: Path length of each pair's relative motion from row 0 to each row, at most, shape (k, s) [m].
+            spare: Lower bounds of distance minus margin, shape (k, s) [m]; updated in place. A measured pair and row
+                has inf.
         """
         least_m = self._margin_m + ROUNDING_M
         frames = self._distances.frames(motion.position[rows[chosen]])
@@ -159,16 +159,22 @@ class Proximity:
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
-        """Returns lower bounds of the distances [m] from the data at both ends of a motion, ... x 2 x pairs.
+        """Returns lower bounds of all pairs' distances [m], shape (..., 2, pairs).
+
+        The bounds follow from the stored bounds at both ends of a previous motion, and from the joints' motion since.
 
         Args:
-            q: Positions of the n joints, ... x 2 x 1 x n; or ... x 1 x 1 x n for both.
+            q: Joint positions, shape (..., 2, 1, n); or (..., 1, 1, n) to use the same positions for both ends.
         """
         known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
 
     def _sparse(self, travelled: np.ndarray) -> np.ndarray:
-        """Returns some of k rows in order, a spacing apart, including the first and the last."""
+        """Returns indices of rows about one spacing apart, including the first and the last of k rows.
+
+        Args:
+            travelled: Path length up to each row, shape (k,) [m].
+        """
         spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
         marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
         between = np.searchsorted(travelled, marks, side="right").tolist()
@@ -178,9 +184,9 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns a pair that is nearer than the margin and nearer than at the start, else None.
+        """Returns pair `i` if it is nearer than the margin and nearer than at the start; otherwise None.
 
-        The robot has to be at the row.
+        The caller has placed the robot in the configuration of the row.
         """
         if contact is None or contact.distance >= self._margin_m:
             return None
@@ -193,7 +199,7 @@ class Proximity:
         return TooNear(self._pairs[i], contact.distance, row > 0)
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """Returns bounds that keep pairs apart near some configurations, see `Check.bounds`."""
+        """Returns linear bounds that keep pairs apart near given configurations; see `Check.bounds`."""
         if not len(self._pairs):
             return []
         within_m = self._margin_m + SPARE_M + self._reach @ spread
@@ -226,7 +232,7 @@ class Proximity:
         return bounds
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
-        """Yields the pairs that are nearer than a distance in a configuration of n positions, with their contacts."""
+        """Yields the pairs that are nearer than `within_m` at n joint positions, with their contacts."""
         self._distances.place(q)
         for pair in self._pairs:
             contact = self._distances.contact(pair, within_m, within_m)
@@ -235,13 +241,14 @@ class Proximity:
 
 
 def _spread_bounds(bounds: np.ndarray, rows: np.ndarray, moved: np.ndarray) -> None:
-    """Raises lower bounds in k rows from those in some of them: between two rows, a distance changes at most by the
-    pair's motion.
+    """Raises the lower bounds of distances in k rows, in place, with the bounds in some of these rows.
+
+    Between two rows, the distance of a pair changes at most by the pair's motion.
 
     Args:
-        bounds: k x s [m]; inf of a row bounds no other one.
-        rows: Numbers of the rows, in ascending order.
-        moved: Distance that each pair has moved by each row, k x s [m].
+        bounds: Lower bounds for s pairs, shape (k, s) [m]. Values of inf are not used for other rows.
+        rows: Indices of the rows whose bounds are used, in ascending order.
+        moved: Path length of each pair's relative motion from row 0 to each row, at most, shape (k, s) [m].
     """
     known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
     after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)

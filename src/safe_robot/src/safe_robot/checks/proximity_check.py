@@ -1,4 +1,4 @@
-"""Base of the checks of distances between shapes, and the library that measures them."""
+"""Base class of checks of distances between shapes, and the choice of the library that measures distances."""
 
 import math
 from abc import abstractmethod
@@ -37,7 +37,7 @@ def shapes_of(robot: RobotModel) -> Shapes:
 
 
 def link_distances(robot: RobotModel, geometry: Geometry = "hulls") -> LinkDistances:
-    """Returns the distances between the shapes of a robot, measured by the library of `shapes_of`.
+    """Returns an object that measures the distances of a robot's links, with the library that `shapes_of` chooses.
 
     Raises:
         ConfigError: If the robot cannot be loaded.
@@ -47,11 +47,11 @@ def link_distances(robot: RobotModel, geometry: Geometry = "hulls") -> LinkDista
 
 
 class ProximityCheck(Check):
-    """Base of the checks that keep pairs further apart than the margin of their configuration.
+    """Base class of checks that keep pairs of shapes further apart than the configured margin.
 
     Attributes:
-        distances: Distances between shapes.
-        proximity: The pairs.
+        distances: Measures distances between shapes.
+        proximity: Finds the pairs that come too near.
     """
 
     distances: LinkDistances
@@ -87,7 +87,7 @@ class ProximityCheck(Check):
         return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
 
     def too_near(self, motion: CommandedMotion) -> Violation | None:
-        """Returns a violation by a pair that comes too near, None if none does."""
+        """Returns a violation if a pair comes too near in a motion; otherwise None."""
         found = self.proximity.first(motion)
         if found is None:
             return None

@@ -1,4 +1,4 @@
-"""Distances between the links of the robot."""
+"""Check of the distances between the links of the robot."""
 
 import math
 import os
@@ -25,7 +25,7 @@ from .proximity_check import GEOMETRY, ProximityCheck, link_distances
 SAMPLES = 200
 """Number of random configurations that are used to find pairs that are always near."""
 NEARLY_ALWAYS = 0.95
-"""Share of configurations above which a pair that is too near is left out, since it is near by construction."""
+"""A pair that is too near in at least this share of configurations is left out: it is near by construction."""
 
 
 class SelfCollisionConfig(CheckConfig):
@@ -117,8 +117,9 @@ class SelfCollision(ProximityCheck):
 def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: float) -> list[tuple[str, str]]:
     """Returns the pairs of links that may come nearer than a margin [m].
 
-    Pairs connected by a joint, or by several fixed ones, are left out, and so are pairs that are nearly always nearer
-    than the margin, as in a compact wrist. Random configurations, always the same, decide this.
+    Pairs that are connected by one moving joint, or by fixed joints only, are left out. Pairs that are nearly always
+    nearer than the margin, as in a compact wrist, are left out, too. Random configurations with a fixed seed show which
+    pairs are nearly always near.
     """
     groups = {link: _group(robot, link) for link in distances.links}
     parents = {joint.child: _group(robot, joint.parent) for joint in robot.document.joints.values() if joint.is_moving}
@@ -138,7 +139,7 @@ def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: f
 
 
 def _group(robot: RobotModel, link: str) -> str:
-    """Returns the first of the links that fixed joints connect to a link."""
+    """Returns the link nearest to the root among those that fixed joints connect to a link."""
     for joint in reversed(robot.chain(link)):
         if joint.is_moving:
             return joint.child

@@ -1,4 +1,4 @@
-"""Targets that are late, and stamps that decrease."""
+"""Check that targets are recent, and that their stamps do not decrease."""
 
 from pydantic import Field
 
@@ -46,7 +46,7 @@ class Staleness(Check):
 
 
 def too_old(age_s: float, limit_s: float, key: str) -> Violation:
-    """Returns the violation of a target whose age [s] is beyond a limit [s]; `key` names the parameter of the limit."""
+    """Returns the violation of a target whose age [s] exceeds a limit [s]; `key` is the parameter of the limit."""
     if age_s < 0.0:
         words = (
             f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"

@@ -1,4 +1,4 @@
-"""Distance of the robot from its commands."""
+"""Check of the distance between measured positions and commands."""
 
 import numpy as np
 from pydantic import Field

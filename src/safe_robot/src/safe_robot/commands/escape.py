@@ -1,4 +1,4 @@
-"""The motion by which a robot leaves margins: it separates all pairs that are too near at once."""
+"""Search for a joint motion that leaves all violated safety margins at once."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -11,22 +11,23 @@ from safe_robot.check import MarginViolation
 from safe_robot.limits import MotionLimits
 
 STEP = 1e-3
-"""Test step: a motion counts if pairs are further apart after the fastest joint has moved this far [rad or m]."""
+"""Length of the step with which a motion is tested: the displacement of the fastest joint [rad or m]."""
 MIN_SPEED_SHARE = 0.05
-"""A motion counts if it separates each pair at least at this share of the fastest separation of that pair alone."""
+"""Smallest separation speed of a pair that counts, as a share of the norm of the pair's gradient."""
 MIN_GAIN_SHARE = 0.1
-"""Least share of its expected gain that a motion has to reach."""
+"""Share of the predicted increase of each distance that the test step has to reach."""
 TRIES = 12
 MIN_GRADIENT = 1e-4
-"""Norm of a gradient below which no joint counts as moving a pair apart [m/rad or 1]."""
+"""Smallest norm of a gradient that is used; smaller norms are replaced by this value [m/rad or 1]."""
 
 
 class EscapeDirection(NamedTuple):
-    """Violations of margins, and the motion that leaves them.
+    """Margin violations of a configuration, and the joint motion that leaves all of them.
 
     Attributes:
-        inside: Violations of margins; if it is locked, also those that a motion would cause.
-        direction: Motion of n joints that increases all distances; the largest is 1 or -1. None: no motion does.
+        inside: The margin violations. If no motion was found, also violations that the tested motions would cause.
+        direction: Joint velocities that increase all distances, shape (n,), scaled such that the largest absolute value
+            is 1. None: no such motion was found.
     """
 
     inside: Sequence[MarginViolation]
@@ -34,11 +35,11 @@ class EscapeDirection(NamedTuple):
 
     @property
     def is_locked(self) -> bool:
-        """Whether no motion separates all pairs at once."""
+        """Whether no motion was found that separates all pairs at once."""
         return self.direction is None
 
     def words(self, joint_names: Sequence[str]) -> str:
-        """Returns a sentence that describes it."""
+        """Returns a message that names the violations, and the joints to move or that no motion leads away."""
         each = ", ".join(
             f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)"
             for one in self.inside
@@ -54,17 +55,20 @@ class EscapeDirection(NamedTuple):
 def find_escape(
     q: np.ndarray, limits: MotionLimits, inside: Callable[[np.ndarray], Sequence[MarginViolation]]
 ) -> EscapeDirection | None:
-    """Returns the motion of n joints that leaves violated margins; None if no margin is violated.
+    """Returns the margin violations of a configuration, and a joint motion that leaves all of them.
 
-    It is a linear program: the largest t with `gradient @ direction >= t |gradient|` for all pairs, no joint faster
-    than 1, none further out of its limits. If t is at most `MIN_SPEED_SHARE` there is no direction. Distances have
-    kinks, for instance where another corner becomes the nearest. The motion is therefore tested, and each pair that
-    comes nearer is added as a row.
+    The motion solves a linear program: maximise t subject to `gradient @ direction >= t |gradient|` for all pairs.
+    Speeds are at most 1, and a joint at a position limit may not move further out. If t is at most `MIN_SPEED_SHARE`,
+    there is no direction. Distances have kinks, for instance where another corner becomes the nearest. The motion is
+    therefore tested. Pairs that do not separate as predicted are added to the program, which is solved again.
 
     Args:
-        q: n positions.
+        q: Joint positions, shape (n,) [rad or m].
         limits: Limits of the joints.
-        inside: Returns the margin violations of a configuration.
+        inside: Computes the margin violations at n joint positions.
+
+    Returns:
+        The violations and the motion; None if no margin is violated.
     """
     now = inside(q)
     if not now:

@@ -1,4 +1,4 @@
-"""Motion of joints towards a target as fast as their limits allow, stopping there."""
+"""Computes commands that move joints to a target as fast as their limits allow, and stop them at the target."""
 
 from typing import NamedTuple
 
@@ -9,17 +9,21 @@ from safe_robot.limits import MotionLimits
 from safe_robot.motion import State
 
 STEPS = 10
-"""Number of commands tried between the hardest braking and the fastest motion, and again between two of them."""
+"""Number of equal intervals into which the range from the slowest to the fastest command is divided.
+
+The commands at the `STEPS + 1` ends of the intervals are tried. The interval above the fastest suitable command is
+divided once more in the same way.
+"""
 ROUNDING = 1e-12
-"""Positions that differ by less are equal [rad or m]."""
+"""A target that is passed by at most this counts as not passed [rad or m]."""
 
 
 class Pursuit(NamedTuple):
     """Range of the commands that n joints can follow in the next period.
 
     Attributes:
-        wanted: n reachable positions nearest to the targets [rad or m].
-        slowest: n positions at the other end, for most a braking [rad or m].
+        wanted: Positions at the end of the range that is nearest to the targets, shape (n,) [rad or m].
+        slowest: Positions at the other end of the range, shape (n,) [rad or m]; most joints brake there.
     """
 
     wanted: np.ndarray
@@ -35,21 +39,23 @@ def pursue(
     stop: np.ndarray,
     acceleration: np.ndarray | None = None,
 ) -> Pursuit:
-    """Returns the command nearest to n targets, a period later, without any joint having to pass its target.
+    """Returns the command for the next period that is nearest to a target from which all joints can still stop.
 
-    It keeps the limits of joints; checks decide whether the command is safe. If n accelerations [rad/s^2 or m/s^2] are
-    given, it returns the command nearest to these instead. The shortest braking from a new state may be longer than the
-    rest of the present braking, and pass a target that the present one does not pass. Such joints continue the present
-    braking.
+    After the command, each joint can brake without passing its target. A joint that cannot avoid passing its target
+    gets the slowest command. The command respects the joint limits, but safety checks have not examined it.
+
+    The shortest braking from a new state may be longer than the rest of the present braking. It may then pass a target
+    that the present braking does not pass. In this case, the joint continues the present braking.
 
     Args:
-        target: n positions [rad or m].
+        target: Target positions, shape (n,) [rad or m].
         state: State before the command.
         limits: Limits of the joints.
-        braking: Computes their braking.
+        braking: Computes the braking of the joints.
         period_s: Time between two commands [s].
-        stop: Commands of the present braking, k x n [rad or m].
-        acceleration: n accelerations.
+        stop: Commands of the present braking, shape (k, n) [rad or m].
+        acceleration: Desired accelerations, shape (n,) [rad/s^2 or m/s^2]. None: those that reach the target in one
+            period.
     """
     target = np.clip(target, limits.lower, limits.upper)
     exact = state.then(target, period_s).acceleration if acceleration is None else acceleration
@@ -62,7 +68,7 @@ def pursue(
     sense = np.sign(target - state.position)
     fastest = np.minimum(np.maximum(exact, low), high)
     slowest = np.where(sense > 0.0, low, high)
-    at = np.zeros(len(target))  # from 0, slowest, to 1, fastest
+    at = np.zeros(len(target))  # 0: slowest command, 1: fastest command
     joints = np.arange(len(target))
     for width in (1.0, 1.0 / STEPS):
         shares = np.minimum(at + width * (np.arange(STEPS + 1.0) / STEPS)[:, None], 1.0)

@@ -1,7 +1,8 @@
-"""Search for a safe command near a target that is not safe.
+"""Search for a safe command near an unsafe target.
 
-DAQP solves the quadratic program for the command that satisfies linear bounds of the checks and is nearest to the
-target. Without DAQP, which is in the extra `ik`, only commands between braking and the target are tried.
+The safety checks provide linear bounds on positions. The QP solver DAQP finds the command that satisfies these bounds
+and is nearest to the target. DAQP is in the extra `ik`. Without DAQP, only commands between braking and the target are
+tried.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from .pursuit import pursue
 Safe = TypeVar("Safe")
 
 SHARES = (0.5, 0.2)
-"""Shares of the step from braking to the desired command that are tried."""
+"""Interpolation factors of the commands that are tried between braking, 0, and the desired command, 1."""
 DETOURS = 3
-"""Number of times that violated bounds are added and another command is tried."""
+"""Largest number of times that violated bounds are added to the quadratic program to compute another command."""
 OVER, OVER_M = 0.5, 1e-8
-"""Tightening of a violated bound: a share of the violation, and a constant."""
+"""Tightening of a violated bound: a share of the violation, plus a constant [m]."""
 MOMENTS = 5
-"""Number of instants during braking at which bounds are kept."""
+"""Number of instants during braking at which bounds are enforced."""
 TINY = 1e-12
-"""A bound that changes by less than this within the range of commands is ignored [m]."""
+"""Smallest divisor with which the row of a bound is normalised [m]; prevents a division by 0."""
 
 
 class SafeCommandSearch:
@@ -38,8 +39,8 @@ class SafeCommandSearch:
 
     Args:
         limits: Limits of the joints.
-        braking: Their braking.
-        checks: Checks of commands, which also report obstacles in the way.
+        braking: Computes the braking of the joints.
+        checks: Checks that commands have to pass; they also provide the linear bounds.
         period_s: Time between two commands [s].
     """
 
@@ -55,15 +56,15 @@ class SafeCommandSearch:
         stop: np.ndarray,
         judged: Callable[[np.ndarray, Sequence[Check]], Safe | Violation],
     ) -> Safe | None:
-        """Returns the first safe command among those near the desired one; None if there is none.
+        """Tries commands near a target, and returns the first safe one; None if all are unsafe.
 
-        The check that refused the last candidate is asked first, since it likely refuses again.
+        The check that refused the last candidate runs first, since it likely refuses again.
 
         Args:
-            target: n positions.
+            target: Target positions, shape (n,) [rad or m].
             state: Present state of the robot.
-            stop: The commands of the braking from there that was found safe, k x n, k >= 1.
-            judged: Evaluates n positions by checks in a given order.
+            stop: Commands of the braking from this state, which has passed the checks; shape (k, n), k >= 1 [rad or m].
+            judged: Runs checks on n positions in the given order. Returns the safe command, or a violation.
         """
         for command in self._commands(target, state, stop):
             found = judged(command, sorted(self._checks, key=lambda check: check.name != self._suspect))
@@ -73,7 +74,7 @@ class SafeCommandSearch:
         return None
 
     def _commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields candidate commands, the best first; each one after the last was not safe."""
+        """Yields candidate commands, the best first; the caller stops at the first safe one."""
         best, slowest = pursue(target, state, self._limits, self._braking, self._period_s, stop)
         for wanted in self._detours(best, slowest, state, stop) if self._keeps_bounds else [best]:
             best = wanted
@@ -82,7 +83,7 @@ class SafeCommandSearch:
             yield stop[0] + share * (best - stop[0])
 
     def _detours(self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields the command nearest to the desired one that satisfies the bounds, then improved ones."""
+        """Yields the command nearest to `wanted` that satisfies the bounds, then commands with additional bounds."""
         there, after = stop[-1:], StoppingTrajectory(wanted, state, self._braking, self._period_s)
         spread = np.abs(after.of(wanted)[-1] - there[0])
         end = after.of(slowest)[-1]
@@ -99,7 +100,7 @@ class SafeCommandSearch:
                 yield found
 
     def _add_missed(self, detour: CommandQP, command: np.ndarray, state: State) -> bool:
-        """Adds the bounds that are violated during braking after a command; returns whether there are any."""
+        """Adds to `detour` the bounds that the braking after a command violates; returns whether there are any."""
         stop = StoppingTrajectory(command, state, self._braking, self._period_s)
         at = stop.of(command)
         missed = [bound for bound in self._bounds(at, np.zeros_like(command), state) if bound.room < 0.0]
@@ -112,21 +113,22 @@ class SafeCommandSearch:
 
 
 def can_keep_bounds() -> bool:
-    """Returns whether the solver of quadratic programs is installed: DAQP, of the extra `ik`."""
+    """Returns whether the QP solver DAQP, from the extra `ik`, is installed."""
     return find_spec("daqp") is not None
 
 
 class StoppingTrajectory:
-    """Positions of n joints at some instants of braking after a command, linearised about the command.
+    """Positions of n joints at `MOMENTS` instants of braking after a command, linearised about the command.
 
     Args:
-        command: n positions [rad or m].
-        state: The state before it.
-        period_s: The period [s].
+        command: Commanded positions, shape (n,) [rad or m].
+        state: State before the command.
+        braking: Computes the braking of the joints.
+        period_s: Time between two commands [s].
 
     Attributes:
-        slope: Derivative of the positions at each instant by the command, MOMENTS x n; the first instant is the
-            command, the last is rest.
+        slope: Derivative of each joint's position with respect to its commanded position, shape (MOMENTS, n). At the
+            first instant, the joints are at the command; at the last instant, they rest.
     """
 
     def __init__(self, command: np.ndarray, state: State, braking: Braking, period_s: float) -> None:
@@ -138,19 +140,19 @@ class StoppingTrajectory:
         self._start = state.position
 
     def of(self, command: np.ndarray) -> np.ndarray:
-        """Returns the positions after a command, MOMENTS x n."""
+        """Returns the linearised positions during braking after a command, shape (MOMENTS, n) [rad or m]."""
         return self._offset + self.slope * (command - self._start)
 
 
 class CommandQP:
-    """The command nearest to a desired one, between two others, that satisfies bounds until the robot rests.
+    """Quadratic program for a command that is as near as possible to a desired command and satisfies linear bounds.
 
-    Bounds are linearised constraints. If a command turns out to be unsafe, bounds that are linearised there are added,
-    and the next command is better.
+    Bounds apply to the command and to the braking after it. If a solution turns out to be unsafe, the caller adds
+    bounds that are linearised at this solution, and solves again.
 
     Args:
-        wanted: n positions [rad or m].
-        other: n positions, at the other end of the range of commands.
+        wanted: Desired positions, at one end of the range of commands, shape (n,) [rad or m].
+        other: Positions at the other end of the range, shape (n,) [rad or m].
     """
 
     def __init__(self, wanted: np.ndarray, other: np.ndarray) -> None:
@@ -160,22 +162,28 @@ class CommandQP:
         self._rooms: list[float] = []
 
     def add(self, bounds: Sequence[Bound], at: np.ndarray, stop: StoppingTrajectory) -> None:
-        """Adds bounds that hold near k x n positions, at the last k instants of braking."""
+        """Adds bounds on the positions at the last k instants of braking.
+
+        Args:
+            bounds: Bounds that are linearised at the positions `at`.
+            at: Positions at these instants, shape (k, n) [rad or m].
+            stop: Computes the positions at these instants from the command.
+        """
         slope, way = stop.slope[-len(at) :], stop.of(self._wanted)[-len(at) :] - at
         for row, gradient, room in bounds:
             self._rows.append(gradient * slope[row])
             self._rooms.append(room + float(gradient @ way[row]))
 
     def command(self) -> np.ndarray | None:
-        """Returns the command, n positions; None if there is none."""
+        """Solves the program. Returns the command, n positions [rad or m]; None if the program has no solution."""
         import daqp  # of the extra `ik`
 
         wanted, n = self._wanted, len(self._wanted)
         if not self._rows:
             return wanted
-        scale = np.maximum(self._most - self._least, 1e-9)  # of joints, so that the program has ordinary numbers
+        scale = np.maximum(self._most - self._least, 1e-9)  # range of each joint: scaled variables are of order 1
         rows = np.array(self._rows) * scale
-        sizes = np.maximum(np.linalg.norm(rows, axis=1), TINY)  # of bounds, since the solver's tolerance is absolute
+        sizes = np.maximum(np.linalg.norm(rows, axis=1), TINY)  # normalises rows: the solver's tolerance is absolute
         matrix = np.ascontiguousarray(rows / sizes[:, None])
         upper = np.concatenate(((self._most - wanted) / scale, np.full(len(matrix), 1e30)))
         lower = np.concatenate(((self._least - wanted) / scale, -np.array(self._rooms) / sizes))

@@ -1,4 +1,4 @@
-"""Smoothing of rough targets to a motion within the limits of joints, before the checks."""
+"""Smoothing of targets that joints cannot follow within their limits; runs before the checks."""
 
 from typing import Annotated
 
@@ -13,9 +13,9 @@ from safe_robot.motion import State
 from .pursuit import pursue
 
 CAUGHT_UP_SHARE = 0.05
-"""A joint has caught up if it needs at most this share of its acceleration and jerk to reach its target."""
+"""A joint has caught up if it needs at most this share of its acceleration and jerk limits to reach its target."""
 OVERSHOOT = 0.01
-"""Targets outside limits by at most this count as at the limit, since motors overshoot by as much [rad or m]."""
+"""Targets that exceed a position limit by at most this are moved to the limit: motors overshoot as much [rad or m]."""
 
 
 class ShapingConfig(ConfigModel):
@@ -33,14 +33,14 @@ class ShapingConfig(ConfigModel):
 class Shaper:
     """Follows the targets of n joints within their limits of velocity, acceleration and jerk.
 
-    Targets within these limits are passed on unchanged. After a target outside of them, commands follow the targets
+    Targets within these limits are passed on unchanged. After a target that violates them, commands follow the targets
     like a critically damped second-order filter, within limits and without overshoot, until all joints have caught up.
     Jitter of targets therefore does not reach the robot.
 
     Args:
         config: Parameters of the smoothing.
         limits: Limits of the joints.
-        braking: Their braking.
+        braking: Computes the braking of the joints.
         period_s: Time between two commands [s].
     """
 
@@ -50,15 +50,15 @@ class Shaper:
         self._is_behind = False
 
     def shaped(self, target: tuple[float, ...], state: State, stop: np.ndarray) -> tuple[float, ...]:
-        """Returns the next command towards n positions [rad or m].
+        """Returns the next command towards a target, n positions [rad or m].
 
-        Positions that can be commanded are returned unchanged, and so are jumps and positions outside limits by more
-        than `OVERSHOOT`.
+        A target that the joints can follow is returned, moved to the position limits. A target that jumps by more than
+        the option `reach`, or exceeds a position limit by more than `OVERSHOOT`, is returned unchanged.
 
         Args:
             target: n positions [rad or m].
             state: Present state of the robot.
-            stop: The commands of the braking from there, k x n [rad or m].
+            stop: Commands of the braking from this state, shape (k, n) [rad or m].
         """
         asked = np.array(target)
         position = asked.clip(self._limits.lower, self._limits.upper)
@@ -73,7 +73,10 @@ class Shaper:
         return tuple(wanted.tolist())
 
     def _can_command(self, position: np.ndarray, state: State) -> bool:
-        """Returns whether positions can be commanded: joints can stop from there, and have caught up."""
+        """Returns whether the joints can reach a position in one period and then stop, within their limits.
+
+        While joints are behind their targets, they must also have caught up.
+        """
         limits, share = self._limits, CAUGHT_UP_SHARE if self._is_behind else 1.0
         after = state.then(position, self._period_s)
         jerk = (after.acceleration - state.acceleration) / self._period_s
@@ -90,7 +93,7 @@ class Shaper:
         )
 
     def _smooth(self, position: np.ndarray, state: State) -> np.ndarray:
-        """Returns n accelerations [rad/s^2 or m/s^2] of the filter, by the implicit Euler method."""
+        """Returns the n accelerations of the filter [rad/s^2 or m/s^2], computed with the implicit Euler method."""
         rate, period_s = self._rate, self._period_s
         way = position - state.position - period_s * state.velocity
         acceleration: np.ndarray = (rate * rate * way - 2.0 * rate * state.velocity) / (1.0 + rate * period_s) ** 2

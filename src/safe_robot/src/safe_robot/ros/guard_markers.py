@@ -20,12 +20,12 @@ HZ = 10.0
 WITHIN_M = 0.15
 """Pairs that are further apart are not shown [m]."""
 UNLIMITED_M = 2.0
-"""Coordinate at which a box without a limit is drawn to end [m]."""
+"""Coordinate, positive or negative, at which an unlimited side of a box is drawn [m]."""
 NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.0), ColorRGBA(0.2, 0.5, 1.0, 0.15)
 
 
 class GuardMarkers:
-    """Publishes `robot_safety/markers`, and the boxes alone on `safe_robot/box_limit/marker`.
+    """Publishes near pairs and boxes on `robot_safety/markers`, and only boxes on `safe_robot/box_limit/marker`.
 
     A topic without subscribers gets no messages.
 
@@ -42,7 +42,7 @@ class GuardMarkers:
         self._timer = WallTimer(HZ, self._publish)
 
     def close(self) -> None:
-        """Closes the topics."""
+        """Stops the timer, and closes the topics."""
         self._timer.stop()
         self._publisher.unregister()
         self._box.unregister()

@@ -1,4 +1,4 @@
-"""`safe_robot_node.py`: targets of a robot in, safe commands out."""
+"""The node `safe_robot_node.py`, which subscribes to targets of a robot and publishes safe commands."""
 
 import gc
 import sys
@@ -33,11 +33,11 @@ QUEUE_SIZE = 100
 WATCH_HZ = 100.0
 """Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
-"""Largest excess of the difference of two stamps over the time between the targets [s]; a larger one is a jump."""
+"""A stamp jumps if it advances by more than the time since the previous target plus this value [s]."""
 FIRST_STATE_S = 1.0
 """Longest wait for a measured state before the node subscribes to targets [s]."""
 BODIES_TIMEOUT_S = 0.5
-"""Largest age of the poses of bodies for checks without `timeout_s` [s]."""
+"""Largest age of the poses of bodies [s], for checks without the option `timeout_s`."""
 NEVER_S = float("-inf")
 REPEATED = "the stamp equals that of the previous target: both are one target, with one command"
 SWITCH_S = 0.0005
@@ -45,10 +45,10 @@ SWITCH_S = 0.0005
 
 
 class GuardNode:
-    """Publishes commands for those targets that are safe.
+    """Checks targets with a guard, and publishes the commands on which the guard decides.
 
     Raises:
-        ConfigError: If a parameter, or the robot, is wrong.
+        ConfigError: If a parameter, or the robot's description, is wrong.
     """
 
     def __init__(self) -> None:
@@ -103,7 +103,7 @@ class GuardNode:
     def _handle_target(self, message: JointState) -> bool:
         """Sends a command for a target, reports the decision and returns whether a command was sent.
 
-        A node that shuts down, whose topics have closed, drops the target.
+        While the node shuts down, topics are closed, and the target is dropped.
         """
         if self._guard.is_halted:
             if not rospy.core.is_shutdown_requested():
@@ -148,13 +148,13 @@ class GuardNode:
         self._brake_for(violation, header)
 
     def _brake_for(self, violation: Violation | None, header: Header | None = None) -> None:
-        """Sends the commands of the braking, if the guard has any, and reports the reason; the queue's lock is held."""
+        """Starts to send braking commands, if the guard has any, and reports the violation; the lock is held."""
         self._queue.run_instead(self._brake)
         if violation is not None:
             self._status.publish(header or Header(stamp=_now()), violation, self._measurements.obstacles)
 
     def _brake(self) -> bool:
-        """Sends the next command of the braking; returns whether there was one."""
+        """Sends the next braking command; returns False if none is left, or if sending failed."""
         command = self._guard.next_braking()
         if command is None:
             return False
@@ -189,10 +189,10 @@ class GuardNode:
         return self._guard.decide(values.position, self._measurements.context(since_s, age_s, step_s))
 
     def _guarded_values(self, message: JointState) -> JointValues:
-        """Returns the values of the guarded joints, in order.
+        """Returns the values of the guarded joints, in the order of the guard's joints.
 
         Raises:
-            MissingJointsError: If some are missing.
+            MissingJointsError: If a guarded joint is missing.
             ValueError: If the message has values that the guard cannot check.
         """
         values, names = values_in(message), self._guard.joint_names

@@ -20,7 +20,7 @@ violation."""
 
 
 def violation_of(check: str, reason: str) -> Violation:
-    """Returns a violation that is not about a number."""
+    """Returns a violation without value and limit."""
     return Violation(check, reason, math.nan, math.nan, "")
 
 
@@ -29,8 +29,8 @@ class GuardStatus:
 
     Args:
         guard: The guard.
-        subject: Subject of warnings: the topic of targets.
-        as_diagnostic: Whether the status is a `DiagnosticStatus`.
+        subject: Topic of the targets, with which warnings begin.
+        as_diagnostic: Whether the status is a `DiagnosticStatus`; otherwise a `safe_robot/Status`.
     """
 
     def __init__(self, guard: Guard, subject: str, as_diagnostic: bool = False) -> None:
@@ -52,10 +52,10 @@ class GuardStatus:
         """Reports a decision.
 
         Args:
-            header: The target's.
-            violation: Its violation; None if it is safe.
-            obstacles: Bodies of the environment; equal ones are the same tuple.
-            note: The message of a safe target.
+            header: Header of the target.
+            violation: Violation of the target; None if the target is safe.
+            obstacles: Bodies of the environment; the same tuple object while no body changes.
+            note: Message of the status for a safe target.
         """
         if violation is None:
             self._status.publish(self._status_message(header, note, None))
@@ -93,7 +93,7 @@ class GuardStatus:
         return status
 
     def warn_of_halt(self) -> None:
-        """Warns that a target was ignored."""
+        """Warns that a target was ignored because the guard is halted."""
         self._warn(self._subject, "halted; call robot_safety/start_subscriber to continue")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:

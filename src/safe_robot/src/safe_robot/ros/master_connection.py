@@ -1,4 +1,4 @@
-"""A connection to the ROS master that detects its end at once."""
+"""Connection to the ROS master, which detects at once when the master's process ends."""
 
 import socket
 import threading
@@ -14,7 +14,7 @@ TIMEOUT_S = 1.0
 
 
 class MasterConnection:
-    """Keeps an idle connection to the ROS master open; it closes when the master's process ends.
+    """Keeps an idle connection to the ROS master open. The connection closes when the master's process ends.
 
     A master that hangs, or a pulled cable, is not detected.
 

@@ -27,7 +27,7 @@ MARKERS = "rpbi/markers"
 MARKERS_HZ = 50.0
 """Rate at which the poses of bodies are read [Hz]."""
 LEAST_MOTION = 1e-4
-"""Smallest motion of a body [m, and parts of a quaternion]; smaller ones are ignored."""
+"""Changes of a body's position [m] and of its quaternion's components are ignored up to this value."""
 KIND_OF_MARKER: dict[int, ObstacleKind] = {
     Marker.CUBE: "box",
     Marker.SPHERE: "sphere",
@@ -38,17 +38,17 @@ KIND_OF_MARKER: dict[int, ObstacleKind] = {
 
 
 class Measurements:
-    """Receives measured states and wrenches, and bodies of the environment; keeps the newest.
+    """Receives and stores the newest joint states, wrenches and bodies of the environment.
 
-    A state may have only some of the guarded joints, for instance those of one of several arms. The newest position of
-    each joint is used; the age is that of the oldest of these. A state without any guarded joint, or with values that
-    are not finite, is refused with a warning. Wrenches are in N and N m of their own frame. A missing value is
-    infinitely old.
+    A joint state may contain only some of the guarded joints, for instance of one of several arms. The newest position
+    of each joint is stored, and the age of the measurement is the largest age of these positions. A joint state without
+    any guarded joint, or with non-finite values, is refused with a warning. Wrenches [N, N m] are kept in the frame of
+    the sensor. A missing value has an infinite age.
 
     Args:
-        joint_names: The n guarded joints.
-        base_frame: TF frame of the robot's root; None without a source of bodies.
-        left_out: Bodies that are no obstacles.
+        joint_names: Names of the n guarded joints.
+        base_frame: TF frame of the robot's root link; None if bodies are not needed.
+        left_out: Names of bodies that are not obstacles.
         bodies_timeout_s: Largest age of the poses of bodies [s].
     """
 
@@ -68,7 +68,7 @@ class Measurements:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...] | None:
-        """Present bodies of the environment; None without a source."""
+        """Present bodies of the environment; None without a source of bodies, or while they are unknown."""
         return None if self._live_obstacles is None else self._live_obstacles.obstacles
 
     def wait(self, timeout_s: float) -> None:
@@ -76,12 +76,12 @@ class Measurements:
         self._has_measured.wait(timeout_s)
 
     def context(self, sent_s: float, age_s: float = 0.0, stamp_step_s: float | None = None) -> CheckContext:
-        """Returns the context of the checks of a target.
+        """Returns the context with which checks examine a target.
 
         Args:
-            sent_s: Time from which `since_command_s` counts [s], by the monotonic clock.
-            age_s: Age of the target [s].
-            stamp_step_s: Difference to the stamp before [s].
+            sent_s: Time of the monotonic clock from which `since_command_s` counts [s].
+            age_s: Age of the target [s]; 0 if unknown.
+            stamp_step_s: Stamp of the target minus stamp of the previous target [s]; None without a previous stamp.
         """
         now_s = time.monotonic()
         measured, (wrench, wrench_s) = self._measured, self._wrench
@@ -118,15 +118,15 @@ class Measurements:
 
 
 class LiveObstacles:
-    """The visual shapes of all bodies of `rpbi/markers`, except those left out, at their poses in TF.
+    """Visual shapes of the bodies on `rpbi/markers`, except those left out, at their poses in TF.
 
     Args:
         base_frame: TF frame of the robot's root.
-        left_out: Bodies that are no obstacles: the robot itself, and bodies that it may pass through.
-        timeout_s: Largest age of a transform [s]; beyond it, the pose of the body is unknown.
+        left_out: Names of bodies that are not obstacles: the robot itself, and bodies that the robot may pass through.
+        timeout_s: Largest age of a transform [s]; with an older transform, the pose of the body is unknown.
 
     Attributes:
-        obstacles: The shapes in the robot's root; None while bodies or poses are unknown.
+        obstacles: The shapes in the frame of the robot's root link; None while bodies or poses are unknown.
     """
 
     def __init__(self, base_frame: str, left_out: Sequence[str], timeout_s: float) -> None:
@@ -141,7 +141,7 @@ class LiveObstacles:
         self._timer = WallTimer(MARKERS_HZ, self._update)
 
     def close(self) -> None:
-        """Stops reading, and unsubscribes."""
+        """Stops the timer, and unsubscribes."""
         self._timer.stop()
         self._subscriber.unregister()
         self._listener.unregister()

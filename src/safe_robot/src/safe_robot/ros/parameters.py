@@ -1,4 +1,4 @@
-"""Parameters of the guard's node."""
+"""Creation of a guard from the ROS parameters of its node."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,10 +22,10 @@ START_FROM_TARGET = (
 
 
 def guard_of_parameters() -> tuple[Guard, NodeConfig]:
-    """Returns the guard of the private parameters and `robot_description`, and the configuration of its node.
+    """Creates a guard from the private parameters and `robot_description`; also returns the node's configuration.
 
     Raises:
-        ConfigError: If a parameter, or the robot, is wrong.
+        ConfigError: If a parameter, or the robot's description, is wrong.
     """
     given: dict[str, Any] = dict(rospy.get_param("~", {}))
     given.pop(DESCRIPTION, None)
@@ -36,15 +36,16 @@ def guard_of_parameters() -> tuple[Guard, NodeConfig]:
 
 
 def guard_of(given: Mapping[str, Any], path: str, node: str) -> tuple[Guard, NodeConfig]:
-    """Returns the guard described by parameters, and the configuration of its node.
+    """Creates a guard from parameters; also returns the node's configuration.
 
     Args:
-        given: The parameters.
-        path: File of the robot's description.
+        given: The parameters of the guard and of the node.
+        path: Path of the robot's URDF.
         node: Name of the node, for messages.
 
     Raises:
-        ConfigError: If a parameter, or the robot, is wrong; it names the parameter, what it expected and what it got.
+        ConfigError: If a parameter, or the robot's description, is wrong. The message names the parameter, the expected
+            and the given value.
     """
     given = dict(given)
     output = NodeConfig.parse({key: given.pop(key) for key in NodeConfig.model_fields if key in given}, node)
@@ -57,13 +58,13 @@ def guard_of(given: Mapping[str, Any], path: str, node: str) -> tuple[Guard, Nod
 
 
 def _description_file(given: Mapping[str, Any]) -> str:
-    """Returns a file of the robot's description.
+    """Returns the path of the robot's URDF; a URDF in the parameter `robot_description` is written to a file.
 
     Args:
-        given: The other parameters.
+        given: The private parameters, for a hint in the error message.
 
     Raises:
-        ConfigError: If there is none.
+        ConfigError: If the parameter `robot_description` is missing, or is not text.
     """
     key = rospy.search_param(DESCRIPTION)
     text = None if key is None else rospy.get_param(key)
