@@ -1,6 +1,6 @@
-"""Tools around the simulator.
+"""Tools for the simulator: console commands, windows, tracking, interpolation and an emulated driver.
 
-The names in `__all__` are those of `rpbi_data`, and are loaded from there when they are used.
+The names in `__all__` are re-exported from `rpbi_data`, which is imported for them at their first use.
 """
 
 from typing import Any

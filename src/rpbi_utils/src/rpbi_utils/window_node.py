@@ -1,4 +1,4 @@
-"""The life of a node with a Qt window, which needs PyQt5 and a display."""
+"""Runs a node with a Qt window, which requires PyQt5 and a display."""
 
 import ctypes
 import ctypes.util
@@ -12,16 +12,16 @@ import rospy
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 
 Opened = tuple[Any, Any, Any]
-"""The application, objects that live as long as the window, and the window, which has a method `end`."""
+"""Qt application, objects to keep alive while the window is open, and the window. The window has a method `end`."""
 
 
 def run_window(name: str, open_window: Callable[[], Opened], *, anonymous: bool = False) -> None:
-    """Runs a node until its window is closed; exits with 1 without a display.
+    """Runs a node until its window is closed. Exits with 1 if PyQt5 or a display is missing.
 
     Args:
         name: Name of the node.
-        open_window: Makes the application and its window.
-        anonymous: Whether several nodes of this name may run.
+        open_window: Function that creates the Qt application and its window.
+        anonymous: Whether ROS makes the node's name unique, so that several such nodes can run.
     """
     if missing := _missing():
         sys.exit(f"{name}: {missing}")
@@ -39,7 +39,7 @@ def _show(opened: Opened) -> None:
 
 
 def _missing() -> str:
-    """Returns a missing requirement of Qt windows in words; empty if none is missing."""
+    """Returns an error message if PyQt5 or a display is missing, otherwise an empty text."""
     try:
         import PyQt5.QtWidgets  # noqa: F401
     except ImportError:
@@ -49,7 +49,7 @@ def _missing() -> str:
     x11 = ctypes.CDLL(ctypes.util.find_library("X11") or "libX11.so.6")
     x11.XOpenDisplay.restype = ctypes.c_void_p
     display = x11.XOpenDisplay(None)
-    if not display:  # Qt would abort
+    if not display:  # without a display, Qt would abort the process
         given = os.environ.get("DISPLAY")
         return f"no display for its window: DISPLAY is {given!r}; on a computer without a screen use xvfb-run"
     x11.XCloseDisplay(ctypes.c_void_p(display))

@@ -1,4 +1,4 @@
-"""A running simulator: its objects, calls of its services, and arguments of the commands for it."""
+"""Access to a running simulator for console commands: objects, service calls, and common command arguments."""
 
 import math
 from collections.abc import Sequence
@@ -14,20 +14,20 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ListObjects, RobotInfo
 
 LIST = "rpbi/list_objects"
-"""A service that every simulator has, and no other node."""
+"""Service by which a simulator is recognized. Only simulators offer this service."""
 OBJECTS = "objects"
-"""Completions: the objects in the running world."""
+"""Name of the shell completion that lists the objects in the running world."""
 Namespace = Annotated[str | None, Argument("NAMESPACE")]
 
 
 class RunningSimulator:
-    """The simulator of a namespace.
+    """The simulator that runs in a namespace.
 
     Args:
-        namespace: Its namespace, such as `left`; without it, that of this process.
+        namespace: Namespace of the simulator, such as `left`. None: the namespace of this process.
 
     Raises:
-        InterfaceError: If there is no ROS master, or none of its nodes is a simulator in that namespace.
+        InterfaceError: If no ROS master answers, or no simulator runs in the namespace.
     """
 
     def __init__(self, namespace: str | None = None) -> None:
@@ -54,14 +54,14 @@ class RunningSimulator:
             raise InterfaceError(f"no simulator runs {where} on the ROS master at {uri}{advice}")
 
     def full_name(self, name: str) -> str:
-        """Returns the full name of one of its topics or services, such as `rpbi/step`."""
+        """Returns the full name, with namespace, of a topic or service such as `rpbi/step`."""
         return f"{self._namespace}{name}"
 
     def call(self, name: str, service_type: type, *arguments: object, **fields: object) -> Any:
-        """Calls one of its services and returns the answer.
+        """Calls a service of the simulator and returns the answer.
 
         Raises:
-            InterfaceError: If no node answers, or the call did not succeed.
+            InterfaceError: If the service does not answer, or the answer reports a failure.
         """
         full_name = self.full_name(name)
         try:
@@ -73,16 +73,21 @@ class RunningSimulator:
         return answer
 
     def objects(self) -> dict[str, str]:
-        """Returns the types of its objects and cameras by name."""
+        """Returns the types of all objects and cameras, keyed by name."""
         listed = self.call(LIST, ListObjects)
         return dict(zip(listed.names, listed.types))
 
     def require(self, body: str, name: str, what: str) -> str:
-        """Returns an optional topic or service of a body, `rpbi/BODY/NAME`.
+        """Checks that a body has a topic or service, and returns the name `rpbi/BODY/NAME`.
+
+        Args:
+            body: Name of the object.
+            name: Last part of the name of the topic or service.
+            what: Kind of body that has the topic or service, such as `a robot`; used in the error message.
 
         Raises:
-            UnknownNameError: If there is no such body.
-            InterfaceError: If it has none; `what` describes a suitable body in the message.
+            UnknownNameError: If the world has no such body.
+            InterfaceError: If the body lacks the topic or service.
         """
         wanted = f"rpbi/{body}/{name}"
         if self.full_name(wanted) not in self._services | self._subscribed:
@@ -96,16 +101,16 @@ class RunningSimulator:
 def joint_values(
     simulator: RunningSimulator, robot: str, words: Sequence[str], are_positions: bool
 ) -> dict[str, float]:
-    """Returns values by joint, from words like `JOINT:=VALUE`.
+    """Reads words like `JOINT:=VALUE` and returns the values, keyed by joint name.
 
     Args:
-        simulator: The simulator.
+        simulator: Simulator of the robot.
         robot: Name of the robot.
-        words: The words.
-        are_positions: Whether values are positions, which are checked against the limits of the joints.
+        words: Words to read. The suffix `deg` converts a value from degrees to radians.
+        are_positions: Whether the values are positions, which are checked against the joint limits.
 
     Raises:
-        InterfaceError: If a word is no such value, or beyond a limit, or there is none.
+        InterfaceError: If a word has another form, a position is beyond a limit, or `words` is empty.
         UnknownNameError: If the robot lacks a joint.
     """
     info = simulator.call(simulator.require(robot, "robot_info", "a robot"), RobotInfo)
@@ -126,7 +131,10 @@ def joint_values(
 
 
 def _check_limit(joint: JointInfo, word: str) -> None:
-    """Raises an InterfaceError for a position beyond the limits of a joint, degrees that lack their unit included."""
+    """Raises an InterfaceError for a position beyond the joint's limits.
+
+    The message suggests the suffix `deg` if the position would be valid in degrees.
+    """
     lower, upper, position = joint.jointLowerLimit, joint.jointUpperLimit, number(word)
     if not lower < upper or lower - LIMIT_ROUNDING <= position <= upper + LIMIT_ROUNDING:
         return

@@ -17,7 +17,7 @@ from .running_simulator import OBJECTS, Namespace, RunningSimulator, joint_value
 
 SEND_HZ = 50.0
 CONNECT_S = 5.0
-"""Time within which the simulator has to connect to the topic [s]; otherwise the command fails."""
+"""Time limit for the simulator to connect to the topic [s]. Afterwards the command fails."""
 Numbers = list[float] | None
 _PLURALS = {"position": "positions", "velocity": "velocities", "effort": "efforts"}
 
@@ -79,7 +79,7 @@ def send(
 
 
 def _check_mode(simulator: RunningSimulator, robot: str, quantity: str) -> None:
-    """Raises an InterfaceError if a robot's control mode does not accept targets of that quantity."""
+    """Raises an InterfaceError if a robot's control mode does not accept `position`, `velocity` or `effort` targets."""
     if simulator.objects().get(robot) == "visual_robot":
         mode = "POSITION_CONTROL"
     else:
@@ -95,11 +95,11 @@ def _check_mode(simulator: RunningSimulator, robot: str, quantity: str) -> None:
 
 
 def _publish(simulator: RunningSimulator, topic: str, message: Any, duration_s: float = 0.0, last: Any = None) -> None:
-    """Publishes a message once, or repeats it for a time [s] of the wall clock and then publishes the last one."""
+    """Publishes a message once or, if `last` is given, for `duration_s` [s of wall time] and then publishes `last`."""
     rospy.init_node("rpbi_world", anonymous=True, disable_signals=True, disable_rostime=True)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
+            warnings.simplefilter("ignore")  # without a queue, `publish` returns after sending the message
             publisher = rospy.Publisher(simulator.full_name(topic), type(message), queue_size=None)
         end_s = time.monotonic() + CONNECT_S
         while not publisher.get_num_connections():

@@ -24,7 +24,7 @@ Numbers = list[float] | None
 
 
 def kinds() -> Iterator[str]:
-    """Yields the types of things that can be added to a world."""
+    """Yields the names of the types that can be added to a world: all types of objects, and `camera`."""
     from rpbi.bodies import BODY_TYPES  # slow to import, and rarely needed
 
     yield from BODY_TYPES
@@ -72,7 +72,7 @@ def spawn(
             raise InterfaceError(f"{file}: a camera is where its object_tf says, not --at or --rpy")
         return str(simulator.call("rpbi/add_rgbd_sensor", SetString, config_to_str({FILE: path, **changes})).message)
     object_type = getattr(PybulletObject, kind.upper(), None)
-    if object_type is None:  # the type in a YAML counts before this number
+    if object_type is None:  # `type` in the YAML data overrides this number
         object_type, changes["type"] = PybulletObject.VISUAL, kind
     asked = PybulletObject(object_type=object_type)
     if is_urdf:
@@ -87,10 +87,10 @@ def spawn(
 
 
 def kind_in(data: Mapping[str, Any]) -> str:
-    """Returns the type of thing that a YAML describes.
+    """Returns the type of object, or `camera`, whose configuration model fits the keys of YAML data best.
 
-    The model of that type requires no key that is missing. Of such models, it has the most of the given keys; ties are
-    broken by the most required keys, then by the fewest others.
+    Models whose required keys are all present come first. Among these, the model that knows the most of the given keys
+    is chosen. Ties are broken by more required keys, then by fewer keys in total.
     """
     from rpbi.bodies import BODY_TYPES
     from rpbi.config.sensors import RgbdSensorConfig
@@ -105,7 +105,10 @@ def kind_in(data: Mapping[str, Any]) -> str:
 
 
 def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
-    """Returns the YAML of a URDF that has none."""
+    """Returns YAML data for an object that is given by a URDF file only.
+
+    The type `robot` has a fixed base and position-controlled joints. All other types have a free base and no motors.
+    """
     name = re.sub(r"\W", "_", Path(path).stem)
     if kind != "robot":
         return {"name": name, "loadURDF": {"fileName": path}}
@@ -114,7 +117,7 @@ def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
 
 
 def _placement(data: Mapping[str, Any], at: Numbers, rpy: Numbers) -> dict[str, Any]:
-    """Returns the keys that place an object, as far as its type has them."""
+    """Returns the YAML keys that place an object at a position `at` [m] and at angles `rpy` [rad]."""
     keys: dict[str, Any] = {} if at is None else {"basePosition": at}
     if rpy is not None:
         keys["baseOrientation"] = quat_of(rpy).tolist()

@@ -1,4 +1,4 @@
-"""Requests that run in the background, each with a time limit."""
+"""Runs requests in the background, each with a time limit."""
 
 import threading
 import time
@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 from custom_ros_tools.errors import InterfaceError
 
 LIMIT_S = 10.0
-"""Time after which a request counts as unanswered [s]; its late answer is dropped."""
+"""Time after which a request counts as unanswered [s]. A later answer is dropped."""
 
 
 class RequestResult(NamedTuple):
-    """The end of a request.
+    """Result of a request that has finished, failed or timed out.
 
     Attributes:
-        name: Name of the request, for people.
-        value: What its function returned; None if it failed.
-        error: Why it failed; empty if it did not.
-        duration_s: Time that it took [s].
-        then: Function that is called with the outcome, by the window.
+        name: Name of the request, as shown to the user.
+        value: Return value of the request's function; None after a failure.
+        error: Reason of the failure; empty on success.
+        duration_s: Duration of the request [s].
+        then: Function that the window calls with this result; None to call nothing.
     """
 
     name: str
@@ -30,10 +30,10 @@ class RequestResult(NamedTuple):
 
 
 class BackgroundRequests:
-    """Runs functions in threads of their own.
+    """Runs each requested function in its own thread.
 
     Args:
-        deliver: Receives each outcome exactly once, in any thread.
+        deliver: Function that is called with each request's result exactly once, from any thread.
     """
 
     def __init__(self, deliver: Callable[[RequestResult], None]) -> None:
@@ -46,7 +46,10 @@ class BackgroundRequests:
         then: Callable[[RequestResult], None] | None = None,
         limit_s: float = LIMIT_S,
     ) -> None:
-        """Runs a function; returns at once. An exception of it is a failure."""
+        """Starts a function in the background and returns at once.
+
+        The result is an error if the function raises an exception or takes longer than `limit_s` [s].
+        """
         threading.Thread(target=self._watch, args=(name, function, then, limit_s), name=name, daemon=True).start()
 
     def _watch(
@@ -61,7 +64,7 @@ class BackgroundRequests:
                 results.append((function(), ""))
             except InterfaceError as error:
                 results.append((None, str(error)))
-            except Exception as error:  # of rospy, or of the answering node
+            except Exception as error:  # raised by rospy or by the node that answers
                 results.append((None, f"{type(error).__name__}: {error}"))
             done.set()
 

@@ -1,4 +1,4 @@
-"""Images of cameras."""
+"""Panel with the image of a camera."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ NONE = "none"
 
 
 class CamerasPanel(Panel):
-    """The colour image of the selected camera; nothing is drawn without a selection."""
+    """Shows the colour image of the selected camera. Without a selection, the panel stays empty."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Cameras", link, requests)

@@ -1,4 +1,4 @@
-"""Sliders for the joints of robots."""
+"""Panel with sliders for the joints of robots."""
 
 import math
 from functools import partial
@@ -29,20 +29,19 @@ from .link import SimulatorLink, SimulatorSnapshot
 from .panel import Panel, ScrolledDown, named
 
 UNLIMITED_RAD, UNLIMITED_M = math.pi, 1.0
-"""Range of the slider of a joint without limits, to both sides."""
+"""Half the slider range of a joint without limits: of a revolute joint [rad], and of another joint [m]."""
 SLIDER_STEPS = 10_000
 MOVED = "font-weight: bold"
 """Style of the name of a joint whose slider was moved."""
 
 
 class JointRow:
-    """The slider, target and position of one joint.
+    """A slider, a target field and the measured position of one joint.
 
-    A slider that was not moved follows the joint.
+    The slider follows the measured position until the user moves the slider.
 
     Args:
-        info: The joint.
-        unit: Its unit.
+        info: Name, type and limits of the joint.
     """
 
     def __init__(self, info: JointInfo) -> None:
@@ -69,20 +68,20 @@ class JointRow:
         self._digits, self._unit = self.target.decimals(), unit
         self.title = plain_label(self.name)
         self.title.setStyleSheet(MOVED)
-        self.title.setMinimumWidth(self.title.sizeHint().width())  # else the slider would move under the mouse
+        self.title.setMinimumWidth(self.title.sizeHint().width())  # otherwise the slider would move under the mouse
         self.title.setStyleSheet("")
         self.is_moved = False
         self.slider.valueChanged.connect(self._on_slider)
         self.target.valueChanged.connect(self._on_target)
 
     def show_position(self, position: float) -> None:
-        """Shows the joint's position [rad or m]."""
+        """Shows the joint's measured position [rad or m]."""
         self.measured.setText(f"{position:.{self._digits}f} {self._unit}")
         if not self.is_moved and not self.slider.isSliderDown():
             self._set(position)
 
     def release(self) -> None:
-        """Makes the slider follow the joint again."""
+        """Makes the slider follow the measured position again."""
         self._mark(False)
 
     def _on_slider(self, step: int) -> None:
@@ -109,11 +108,11 @@ class JointRow:
 
 
 class RobotTab(QWidget):
-    """The joints of one robot.
+    """Tab with the joints of one robot.
 
     Args:
-        robot: Its name.
-        panel: The panel that the tab is in.
+        robot: Name of the robot.
+        panel: Panel that contains the tab.
     """
 
     def __init__(self, robot: str, panel: Panel) -> None:
@@ -145,7 +144,7 @@ class RobotTab(QWidget):
         layout.addLayout(line)
 
     def refresh(self, snapshot: SimulatorSnapshot, state: JointState | None) -> None:
-        """Shows positions, and enables buttons."""
+        """Shows the measured positions, and enables the buttons whose services exist."""
         if not self._is_known:
             self._ask_for_joints()
         positions = dict(zip(state.name, state.position)) if state is not None else {}
@@ -157,7 +156,7 @@ class RobotTab(QWidget):
         self._show_moved()
 
     def _show_moved(self) -> None:
-        """Enables buttons; also called at once when a slider is moved."""
+        """Enables or disables Send, Discard and the duration. Each move of a slider calls this method, too."""
         snapshot = self._snapshot
         is_moved = any(row.is_moved for row in self._rows.values())
         moves = snapshot.has(self._service("move_to_joint_state"))
@@ -229,10 +228,10 @@ class RobotTab(QWidget):
 
 
 class JointsPanel(Panel):
-    """Sliders for the joints of all robots, a tab for each.
+    """Sliders for the joints of all robots, with one tab per robot.
 
     Args:
-        first: Name of the robot whose tab is shown first, if there is one.
+        first: Name of the robot whose tab is selected initially; None selects the first tab.
     """
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests, first: str | None) -> None:

@@ -1,4 +1,4 @@
-"""The window's access to the running simulator: topics and the ROS master, without Qt."""
+"""Watches the running simulator for the controls window, by topics and the ROS master. Does not use Qt."""
 
 import threading
 import time
@@ -20,25 +20,28 @@ from rpbi_utils.console.running_simulator import LIST, RunningSimulator
 LOOK_S = 1.0
 """Period of queries of the ROS master [s]."""
 MAX_FAILED_LOOKS = 3
-"""Number of consecutive failed queries after which all names count as missing: one may fail on a busy machine."""
+"""Number of consecutive failed queries after which all topics and services count as missing.
+
+A single query may fail on a busy machine.
+"""
 SILENCE_S = 2.5
-"""Time without any message after which a simulator counts as gone [s]; /diagnostics comes once a second."""
+"""Time without a message on `rpbi/status` and `rpbi/state` after which the simulator counts as stopped [s]."""
 IMAGE = "/colour/image/compressed"
-"""End of the topic of a camera that the window shows."""
+"""End of the name of a camera's image topic, after `rpbi/CAMERA`."""
 
 
 @dataclass(frozen=True)
 class SimulatorSnapshot:
-    """The simulator at one moment.
+    """State of the simulator at one moment.
 
     Attributes:
-        is_alive: Whether it publishes, and has its services.
-        is_running: Whether its world runs.
-        names: Topics and services of its namespace that a node offers, without the namespace, such as `rpbi/step`.
-        topics: All published topics, with full names.
-        objects: Types of objects and cameras by name.
-        state: Its newest state; None if it publishes none.
-        warning: Its warning of /diagnostics; empty if there is none.
+        is_alive: Whether the simulator has published recently and offers its services.
+        is_running: Whether the world is running, not stopped.
+        names: Topics and services in the simulator's namespace, without the namespace, such as `rpbi/step`.
+        topics: Full names of all published topics.
+        objects: Types of the objects and cameras, keyed by name.
+        state: Newest message on `rpbi/state`; None before the first message.
+        warning: The simulator's warning on /diagnostics; empty without a warning.
     """
 
     is_alive: bool = False
@@ -50,7 +53,7 @@ class SimulatorSnapshot:
     warning: str = ""
 
     def has(self, name: str) -> bool:
-        """Returns whether it now offers a service or topic."""
+        """Returns whether the simulator offers a service or topic of this name."""
         return self.is_alive and name in self.names
 
     @property
@@ -60,7 +63,7 @@ class SimulatorSnapshot:
 
     @property
     def cameras(self) -> list[str]:
-        """Names of cameras in topics: `camera` for the first one."""
+        """Names of the cameras in topic names, sorted, such as `camera`."""
         if not self.is_alive:
             return []
         return sorted(
@@ -71,22 +74,22 @@ class SimulatorSnapshot:
 
 
 class Newest:
-    """The newest message of a topic that may change.
+    """Keeps the newest message of a selectable topic.
 
     Args:
-        message_type: Type of its messages.
+        message_type: Message type of the topic.
     """
 
     def __init__(self, message_type: type) -> None:
         self._type = message_type
         self.wanted = ""
-        """Name of the topic to subscribe to; empty for none."""
+        """Name of the selected topic; empty for no subscription."""
         self.message: Any = None
         self._topic = ""
         self._subscriber: rospy.Subscriber | None = None
 
     def follow(self) -> None:
-        """Subscribes to the selected topic alone; may take time."""
+        """Replaces the subscription if another topic was selected; may block for a while."""
         if self._topic == self.wanted:
             return
         if self._subscriber is not None:
@@ -103,11 +106,11 @@ class Newest:
 
 
 class SimulatorLink:
-    """Watches the simulator of this node's namespace, which may come and go.
+    """Watches the simulator in this node's namespace. The simulator may start and end at any time.
 
     Attributes:
-        joints: The joint states that the window shows.
-        image: The image that it shows.
+        joints: Newest joint state of the robot that the window shows.
+        image: Newest image of the camera that the window shows.
     """
 
     def __init__(self) -> None:
@@ -127,18 +130,18 @@ class SimulatorLink:
         threading.Thread(target=self._run, name="link", daemon=True).start()
 
     def look(self) -> None:
-        """Requests a query of the master, without waiting for it."""
+        """Triggers a query of the ROS master and returns at once."""
         self._served = None
         self._wake.set()
 
     def follow(self, newest: Newest, topic: str) -> None:
-        """Requests another topic for `joints` or `image`, without waiting for it."""
+        """Selects another topic for `newest`, which is `joints` or `image`, and returns at once."""
         if newest.wanted != topic:
             newest.wanted, newest.message = topic, None
             self._wake.set()
 
     def snapshot(self) -> SimulatorSnapshot:
-        """Returns the present state."""
+        """Returns the simulator's present state."""
         if time.monotonic() - self._heard_s > SILENCE_S or LIST not in self._names:
             return SimulatorSnapshot(topics=self._topics)
         return SimulatorSnapshot(
@@ -157,7 +160,7 @@ class SimulatorLink:
                 self._failed_looks += 1
                 if self._failed_looks >= MAX_FAILED_LOOKS:
                     self._names = frozenset()
-            except rospy.ROSException:  # it is shutting down
+            except rospy.ROSException:  # the node is shutting down
                 return
             self._wake.wait(LOOK_S)
 

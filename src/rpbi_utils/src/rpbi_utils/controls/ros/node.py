@@ -27,7 +27,7 @@ class ControlsParameters(ConfigModel):
 
 
 def main() -> None:
-    """Runs the node; exits with 1 if it cannot start or has no display, with 0 when it is interrupted or closed."""
+    """Runs the node. Exits with 1 if the node cannot start or has no display, and otherwise with 0."""
     run_window(NAME, _open)
 
 
@@ -55,16 +55,16 @@ def _open() -> Opened:
 
 
 def _rviz_view(config_file: str, world_frame: str) -> Any:
-    """Returns a widget with RViz's 3-D view, or None if its Python bindings are not installed.
+    """Returns a widget with RViz's 3-D view, or None if RViz's Python bindings are not installed.
 
-    Its panels are hidden; the menu of its tool bar, by a right click, shows them.
+    RViz's own panels are hidden. A right click on its tool bar opens a menu to show them.
 
     Args:
-        config_file: Displays and view, as RViz saves them.
-        world_frame: Its fixed frame.
+        config_file: RViz configuration file with the displays and the view.
+        world_frame: TF frame that becomes RViz's fixed frame.
 
     Raises:
-        InterfaceError: If the file is missing or is no configuration of RViz.
+        InterfaceError: If the file is missing or is not an RViz configuration.
     """
     try:
         from rviz import bindings

@@ -1,4 +1,4 @@
-"""The list of objects, adding and removing."""
+"""Panel that lists, adds and removes objects."""
 
 from functools import partial
 
@@ -21,11 +21,11 @@ from .link import SimulatorLink, SimulatorSnapshot
 from .panel import Panel, named
 
 ADD_LIMIT_S = 120.0
-"""Longest time for adding an object [s]; a mesh may have to be simplified."""
+"""Time limit for adding an object [s]. The simulator may have to simplify a mesh first."""
 
 
 class ObjectsPanel(Panel):
-    """All objects in the world, with their types; adds files, and removes the selected object."""
+    """Lists the names and types of all objects, adds objects from files, and removes the selected object."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Objects", link, requests)

@@ -1,4 +1,4 @@
-"""A part of the controls window."""
+"""Base class of the controls window's panels, and helpers for their widgets."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,12 +16,12 @@ Condition = Callable[[SimulatorSnapshot], bool]
 
 
 class Panel(QGroupBox):
-    """A part of the window, with a frame and a title.
+    """Base class of the panels, each of which has a frame and a title.
 
     Args:
-        title: Its title.
-        link: The simulator.
-        requests: Runs what may take time.
+        title: Title of the panel.
+        link: Access to the running simulator.
+        requests: Runs functions that may block.
     """
 
     def __init__(self, title: str, link: SimulatorLink, requests: BackgroundRequests) -> None:
@@ -30,24 +30,24 @@ class Panel(QGroupBox):
         self._needed: dict[QWidget, tuple[str, Condition]] = {}
 
     def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
-        """Runs a function in the background; shows its result, and calls `then` with it in the window's thread."""
+        """Runs a function in the background. The window shows the result, and calls `then` with the result."""
         self._requests.ask(name, function, then, limit_s)
 
     def require(self, service: str, *widgets: QWidget, when: Condition = lambda _: True) -> None:
-        """Disables widgets while a service is missing, or a condition is not met."""
+        """Disables widgets while a service is missing or the condition `when` is not met."""
         self._needed.update(dict.fromkeys(widgets, (service, when)))
 
     def refresh(self, snapshot: SimulatorSnapshot) -> None:
-        """Shows the state of the simulator; called ten times a second and after each request."""
+        """Shows the state of the simulator. The window calls this method ten times a second and after each request."""
         for widget, (service, is_met) in self._needed.items():
             widget.setEnabled(snapshot.has(service) and is_met(snapshot))
 
 
 class ScrolledDown(QScrollArea):
-    """A widget with a bar to scroll if there is too little height; it has the width that it needs, as it changes.
+    """Scroll area that scrolls vertically only, and always has at least the width of its content.
 
     Args:
-        content: The widget.
+        content: Widget to scroll.
     """
 
     def __init__(self, content: QWidget) -> None:
@@ -58,7 +58,7 @@ class ScrolledDown(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Receives all events of the content."""
+        """Adapts the minimum width when the layout of the content changes."""
         if event.type() == QEvent.Type.LayoutRequest:
             bar = self.verticalScrollBar()
             self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar.width() * bar.isVisible())
@@ -66,7 +66,7 @@ class ScrolledDown(QScrollArea):
 
 
 def named(widget: QWidget, name: str, tip: str = "") -> Any:
-    """Returns a widget, with a name by which programs find it, and a tip."""
+    """Sets a widget's tool tip, and the object name by which programs find the widget; returns the widget."""
     widget.setObjectName(name)
     widget.setToolTip(plain_tip(tip))
     return widget

@@ -1,4 +1,4 @@
-"""Recording into a bag, with labels."""
+"""Panel that records topics into a bag, with labels."""
 
 import time
 from pathlib import Path
@@ -16,16 +16,16 @@ from .panel import Panel, named
 
 FOLDER = "~/rpbi_recordings"
 LIMIT_S = 60.0
-"""Longest time until a recorder has subscribed, or has closed its bag [s]."""
+"""Time limit for subscribing to all topics, and for closing the bag [s]."""
 LABEL = "~label"
 ALSO = ("/tf", "/tf_static", "/clock", "/diagnostics")
-"""Topics outside of the simulator's names that are recorded, too."""
+"""Topics outside `rpbi/` that are recorded as well."""
 IMAGES = ("/image", "/segmentation", "/pointcloud", "/compressed", "/visualizer_image", "/visualizer_image_int")
-"""Ends of topics that are recorded only on request."""
+"""Endings of the names of topics that are recorded only if the user selects `with images`."""
 
 
 class RecordingPanel(Panel):
-    """Records all topics of the simulator, and labels that mark moments."""
+    """Records the simulator's topics into a bag, and publishes labels that mark moments in the recording."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Recording", link, requests)
@@ -74,7 +74,7 @@ class RecordingPanel(Panel):
             self._told.setText(f"{self._recorder.path.name}: {seconds:.0f} s, {size_mb:.1f} MB")
 
     def close(self) -> bool:
-        """Ends the recording, if there is one, and waits until its bag is closed."""
+        """Ends a running recording, waits until its bag is closed, and closes the panel."""
         if self._recorder is not None:
             self._recorder.stop()
         return super().close()

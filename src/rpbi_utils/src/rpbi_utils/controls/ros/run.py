@@ -1,4 +1,4 @@
-"""Start, stop and step of the world, and of a model predictive controller."""
+"""Panels that start, stop and step the world, and a model predictive controller."""
 
 from functools import partial
 from typing import Any
@@ -15,13 +15,13 @@ from .link import SimulatorLink, SimulatorSnapshot
 from .panel import Condition, Panel, named
 
 MAX_STEPS = 1_000_000
-"""Largest number of steps of one request; the simulator refuses more."""
+"""Largest number of steps in one request. The simulator refuses more steps."""
 STEPS_LIMIT_S = 3600.0
 DASH = "–"
 
 
 class RunPanel(Panel):
-    """Start, stop, steps, reset and pace, and the state of the world."""
+    """Starts, stops, steps and resets the world, sets its real-time factor, and shows its state."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Simulation", link, requests)
@@ -141,11 +141,11 @@ def _stands(snapshot: SimulatorSnapshot) -> bool:
 
 
 BUTTONS = {"Start": "Lets the controller run", "Step": "Runs one cycle", "Stop": "Lets the robot stand"}
-"""Titles of buttons and their tips; their services are `mpc/start` and so on."""
+"""Title and tool tip of each button. The button `Start` calls the service `mpc/start`, and so on."""
 
 
 class MpcPanel(Panel):
-    """Start, stop and step of the controller behind `mpc/...`; hidden as long as there is none."""
+    """Starts, stops and steps a model predictive controller. Hidden while the service `mpc/step` is missing."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Model predictive control", link, requests)

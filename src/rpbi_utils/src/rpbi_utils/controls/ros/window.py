@@ -21,20 +21,25 @@ SIZE, SIZE_WITH_VIEW = (920, 760), (1400, 800)
 
 
 class Signals(QObject):
-    """Carries events of other threads into that of the window."""
+    """Qt signals that pass events from other threads to the window's thread.
+
+    Attributes:
+        answered: Emitted with the result of each background request.
+        ended: Emitted when the node shuts down.
+    """
 
     answered = pyqtSignal(object)
     ended = pyqtSignal()
 
 
 class ControlsWindow(QMainWindow):
-    """Panels with buttons, RViz's view next to them, and the newest message below.
+    """Main window: control panels at the left, an optional RViz view at the right, the newest message at the bottom.
 
     Args:
-        link: The simulator.
-        signals: Its events.
-        first: Name of the robot whose joints are shown first.
-        view: RViz's view, if any.
+        link: Access to the running simulator.
+        signals: Signals that deliver the results of background requests to the window.
+        first: Name of the robot whose joints are shown first; None shows the first robot.
+        view: Widget with RViz's 3-D view; None for a window without the view.
     """
 
     def __init__(self, link: SimulatorLink, signals: Signals, first: str | None, view: QWidget | None) -> None:
@@ -65,7 +70,7 @@ class ControlsWindow(QMainWindow):
         self._message.setWordWrap(True)
         self._message.setContentsMargins(8, 0, 8, 4)
         two_lines = 2 * self._message.fontMetrics().lineSpacing() + 4
-        self._message.setFixedHeight(two_lines)  # else buttons would move under the mouse when a message comes
+        self._message.setFixedHeight(two_lines)  # otherwise a new message would shift the buttons
         self.statusBar().addWidget(self._message, 1)
         self.resize(*(SIZE if view is None else SIZE_WITH_VIEW))
         self._timer = QTimer(self)
@@ -74,13 +79,13 @@ class ControlsWindow(QMainWindow):
         self.refresh()
 
     def refresh(self) -> None:
-        """Shows the newest state."""
+        """Updates all panels with the simulator's present state."""
         snapshot = self._link.snapshot()
         for panel in self._panels:
             panel.refresh(snapshot)
 
     def end(self) -> None:
-        """Ends running actions of the panels."""
+        """Stops the periodic refresh and closes all panels, which ends a running recording."""
         self._timer.stop()
         for panel in self._panels:
             panel.close()
@@ -89,7 +94,7 @@ class ControlsWindow(QMainWindow):
         if outcome.then is not None:
             outcome.then(outcome)
         text = outcome.error or ("done" if outcome.value is None else outcome.value)
-        if isinstance(text, str):  # data are for a panel, and replace no message
+        if isinstance(text, str):  # other values are data for a panel, not messages
             seconds = outcome.duration_s
             duration = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
             self._message.setText(f"{outcome.name}: {text} ({duration})")
@@ -99,7 +104,7 @@ class ControlsWindow(QMainWindow):
 
 
 def _column(panels: list[Panel]) -> QWidget:
-    """Returns panels below each other, with a bar to scroll if the window is too low."""
+    """Returns a column of panels, with a scroll bar if the window is too low."""
     column = QWidget()
     layout = QVBoxLayout(column)
     for panel in panels:
