@@ -1,4 +1,4 @@
-"""Topics from which a recording can be replayed: the world's description, and its commands by tick."""
+"""Publishes the description of a world and its commands, from which a recording can be replayed."""
 
 import logging
 from collections import deque
@@ -22,11 +22,11 @@ log = logging.getLogger(__name__)
 COMMANDS = Topic("rpbi/commands", WorldCommands, meaning="Commands to the world, by tick, for replays; as they come.")
 DESCRIPTION = Topic("rpbi/world_description", String, meaning="The world as loaded, as JSON, for replays; latched.")
 MAX_COMMANDS_PER_MESSAGE = 25
-"""Largest number of commands in a message, so that making one is fast; the others follow in the next."""
+"""Largest number of commands in a message, so that building a message is fast; further ones follow in the next."""
 
 
 class _Recipient:
-    """A receiver of commands, and the number of the next one to send."""
+    """A receiver of commands, and the index of the next command to send."""
 
     def __init__(self, send: Callable[[WorldCommands], None]) -> None:
         self.send = send
@@ -34,19 +34,19 @@ class _Recipient:
 
 
 class _CommandTopic(FastTopic):
-    """The topic, with a list of new subscribers, which need all earlier commands."""
+    """The topic `rpbi/commands`, with a list of new subscribers, which need all earlier commands."""
 
     def __init__(self) -> None:
         self.newcomers: deque[_Recipient] = deque()
         super().__init__(COMMANDS.name, COMMANDS.message_type)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
-        """Notes a new subscriber; rospy calls it from a thread of its own."""
+        """Stores a new subscriber; rospy calls this method from a thread of rospy's."""
         self.newcomers.append(_Recipient(peer_publish))
 
 
 class CommandPublisher:
-    """Publishes the description of a world and its commands, a few at each pass of the loop."""
+    """Publishes the description of a world once, and its commands in small messages, one in each pass of the loop."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -58,7 +58,7 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends new commands, and earlier ones to new subscribers."""
+        """Sends the next new commands to all subscribers, and the next earlier commands to new subscribers."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())
@@ -77,7 +77,7 @@ class CommandPublisher:
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
     def catch_up(self) -> None:
-        """Sends all new commands."""
+        """Sends all new commands to all subscribers."""
         self.spin()
         while self._all.next != self._world.commands.count:
             self.spin()
@@ -89,7 +89,7 @@ class CommandPublisher:
 
 
 def commands_message(world: World, first: int) -> WorldCommands:
-    """Returns the commands of a world from an index on, at most MAX_COMMANDS_PER_MESSAGE."""
+    """Returns a message with a world's commands from a given index on, at most MAX_COMMANDS_PER_MESSAGE of them."""
     first, commands = world.commands.since(first, MAX_COMMANDS_PER_MESSAGE)
     message = WorldCommands(resets=world.resets, first=first, commands=[_message(each) for each in commands])
     message.header.stamp = to_ros_time(world.clock.stamp_ns)

@@ -1,4 +1,7 @@
-"""Messages that are sent often, packed in one go: the same bytes as their types write, in a fraction of the time."""
+"""Message types with fast serialisation, for messages that are sent often.
+
+They pack all fields in one call, and write the same bytes as the standard types.
+"""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -11,11 +14,11 @@ from tf2_msgs.msg import TFMessage
 
 
 class PackedJointState(JointState):
-    """Joint states of a robot, always with the same names."""
+    """JointState with fast serialisation; the packing format is cached for each list of joint names."""
 
     def __init__(  # the constructor of the type takes five times as long
         self,
-        header: Header | None = None,  # readers of messages make them empty
+        header: Header | None = None,  # rospy creates received messages without arguments
         name: Sequence[str] = (),
         position: Sequence[float] = (),
         velocity: Sequence[float] = (),
@@ -25,7 +28,7 @@ class PackedJointState(JointState):
         self.position, self.velocity, self.effort = position, velocity, effort
 
     def serialize(self, buff: BytesIO) -> None:
-        """Writes it to a buffer."""
+        """Writes the message to a buffer."""
         header, names = self.header, self.name
         try:
             pack, packed_names = _joint_state_format(header.frame_id, tuple(names))
@@ -45,15 +48,15 @@ class PackedJointState(JointState):
                     *self.effort,
                 )
             )
-        except struct.error:  # something else than a number for each joint, which the type itself knows how to tell
+        except struct.error:  # a value is not a number, or a list is too short; the standard type names the error
             super().serialize(buff)
 
 
 class PackedTransforms(TFMessage):
-    """Transforms, always between the same frames."""
+    """TFMessage with fast serialisation; the packing format is cached for each pair of frames."""
 
     def serialize(self, buff: BytesIO) -> None:
-        """Writes it to a buffer."""
+        """Writes the message to a buffer."""
         packed = [_COUNT.pack(len(self.transforms))]
         for each in self.transforms:
             header, place, turn = each.header, each.transform.translation, each.transform.rotation
@@ -67,7 +70,7 @@ class PackedTransforms(TFMessage):
 
 _COUNT = struct.Struct("<I")
 _Format = tuple[Callable[..., bytes], bytes]
-"""Function that packs a message, and the texts in it."""
+"""Function that packs the fields of a message, and the packed texts to pass to it."""
 
 
 @lru_cache(maxsize=1000)

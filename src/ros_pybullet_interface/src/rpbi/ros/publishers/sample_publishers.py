@@ -1,4 +1,4 @@
-"""Publishers of a world's samples, and the order of messages of a tick."""
+"""Publishes the samples of a world's sensors, and defines the order of the messages of a tick."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -18,11 +18,12 @@ from .status import ClockPublisher
 from .transforms import TransformPublisher
 
 SampleKey = tuple[type, str]
-"""Type and name of the samples of a sensor: sensors of a body may have its name."""
+"""Type and name of a sensor's samples, which identify the sensor; several sensors of a body may have the body's name.
+"""
 
 
 class TopicPublisher:
-    """Samples of sensors, each on a topic of its own."""
+    """Publishes the samples of each sensor on the sensor's own topic."""
 
     def __init__(self) -> None:
         self._routes: dict[SampleKey, tuple[FastTopic, Callable[[Any, int], Any]]] = {}
@@ -30,20 +31,25 @@ class TopicPublisher:
         self._last: dict[SampleKey, tuple[Any, int]] = {}
 
     def open(self, key: SampleKey, row: Topic) -> None:
-        """Advertises the topic of a sensor; any thread may call it."""
+        """Advertises the topic of a sensor; any thread may call this method.
+
+        Args:
+            key: Type and name of the sensor's samples.
+            row: The sensor's topic.
+        """
         assert row.handler is not None  # rows of samples have one
         topic = FastTopic(row.name.format(name=key[1]), row.message_type)
         self._routes = {**self._routes, key: (topic, row.handler)}
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
-        """Sends a sample.
+        """Publishes a sample, if its topic has subscribers.
 
         Raises:
-            PluginError: If code of another package fails to make a valid message of it.
+            PluginError: If code of another package fails to convert the sample to a valid message.
         """
         key = type(sample), sample.name
         self._last[key] = sample, stamp_ns
-        route = self._routes.get(key)  # no such stream as long as the body is new
+        route = self._routes.get(key)  # None if the body is so new that its topics are not open yet
         if route is not None and route[0].has_subscribers:
             topic, to_message = route
             try:
@@ -53,7 +59,7 @@ class TopicPublisher:
                 raise
 
     def serve_late(self) -> None:
-        """Sends the last samples to new subscribers."""
+        """Sends the last sample of each sensor to new subscribers."""
         for key, (topic, to_message) in self._routes.items():
             if key in self._last:
                 with plugin_errors(to_message, f"the message of '{key[1]}'"):
@@ -64,7 +70,7 @@ class TopicPublisher:
         self._last.clear()
 
     def forget(self, key: SampleKey) -> FastTopic | None:
-        """Drops the stored samples of a sensor; returns its topic, which the caller closes."""
+        """Drops the stored sample of a sensor, and returns the sensor's topic, which the caller must close."""
         self._last.pop(key, None)
         topic, _ = self._routes.get(key, (None, None))
         self._routes = {other: route for other, route in self._routes.items() if other != key}
@@ -72,10 +78,10 @@ class TopicPublisher:
 
 
 class SamplePublishers:
-    """All publishers of a world's samples.
+    """Publishes all samples of a world: on topics, on TF and as camera images.
 
     Attributes:
-        cameras: That of the images.
+        cameras: Sends the samples of cameras to the renderer process, which publishes the images.
     """
 
     def __init__(self, world: World) -> None:
@@ -90,10 +96,10 @@ class SamplePublishers:
         """The sensors of each body whose topics are open."""
 
     def find_topics(self, name: str) -> None:
-        """Finds the topics of a body before its first sample, including those of other packages.
+        """Looks up the topics of a body's sensors and inputs, before the body's first sample.
 
         Raises:
-            InterfaceError: If there is one that cannot be found.
+            InterfaceError: If a topic that another package defines cannot be found.
         """
         for sensor in self._world.sensors_of(name):
             topic = sample_topic(sensor)
@@ -104,7 +110,7 @@ class SamplePublishers:
                 topic_input(key, taken)
 
     def open(self, name: str) -> None:
-        """Opens the topics of a body's samples."""
+        """Advertises the topics of a body's samples."""
         sensors = self._world.sensors_of(name)
         self._open[name] = [(sensor.sample_type, sensor.name) for sensor in sensors]
         for key, sensor in zip(self._open[name], sensors, strict=True):
@@ -113,10 +119,11 @@ class SamplePublishers:
                 self._topics.open(key, topic)
 
     def publish(self, samples: Iterable[Any], stamp_ns: int) -> None:
-        """Publishes the samples of a tick.
+        """Publishes the samples of a tick, and waits for the images of synchronous cameras.
 
         Raises:
-            PluginError: If code of another package fails to make a valid message of one.
+            PluginError: If code of another package fails to convert a sample to a valid message.
+            PhysicsError: If the image of a synchronous camera is not published in time.
         """
         for sample in samples:
             self._elsewhere.get(type(sample), self._topics).publish(sample, stamp_ns)
@@ -137,10 +144,10 @@ class SamplePublishers:
             publisher.restart()
 
     def forget(self, name: str) -> list[FastTopic]:
-        """Drops the stored samples of a removed body and its sensors; for the simulation thread.
+        """Drops the stored samples of a removed body's sensors; only the simulation thread may call this method.
 
         Returns:
-            The topics that are left to close, by another thread, since the ROS master may be slow to answer.
+            The body's topics. The caller must close them in another thread, since the ROS master may be slow to answer.
         """
         self.cameras.forget(name)
         keys = self._open.pop(name, [])
@@ -150,9 +157,10 @@ class SamplePublishers:
 
 
 class TickPublisher:
-    """Publishes everything of a tick: the time first, then the samples.
+    """Publishes the time of a tick on /clock, then the samples of the tick.
 
-    `idle_ticks` is the number of ticks that would pass between two calls of `publish_idle` if the world ran.
+    Args:
+        idle_ticks: Number of ticks that a running world would advance between two calls of `publish_idle`.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
@@ -164,39 +172,47 @@ class TickPublisher:
         """The tick of the world if it had not been stopped."""
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Publishes the time as often as a pace allows."""
+        """Adapts the rate of /clock to a real-time factor; 0 is as fast as possible."""
         if self._clock is not None:
             self._clock.set_factor(real_time_factor)
 
     def publish_tick(self, samples: list[Any]) -> None:
-        """Publishes a tick and the samples that were due; of a tick without samples, nothing is published here."""
+        """Publishes the time and the samples of a tick; does nothing for a tick without samples."""
         if samples:
             self.publish_time()
             self._publishers.publish(samples, self._world.clock.stamp_ns)
 
     def publish_time(self) -> None:
-        """Publishes the time, if it has changed and its rate permits."""
+        """Publishes the time, if it has changed and a message is due."""
         if self._clock is not None:
             self._clock.publish_tick()
 
     def publish_all(self, samples: list[Any]) -> None:
-        """Publishes the last tick before a stop completely, regardless of rates."""
+        """Publishes the last tick before a stop: the time and the samples of all sensors, due or not.
+
+        Args:
+            samples: The samples that were due; the other sensors are read here.
+        """
         self.publish_last_time()
         self._publishers.publish(samples + self._world.read_rest(), self._world.clock.stamp_ns)
 
     def publish_last_time(self) -> None:
-        """Publishes only the time of the last tick before a stop, since the world may be broken."""
+        """Publishes the time of the last tick before a stop, without samples; also works for a broken world."""
         self._idle_tick = self._world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()
 
     def repeat_time(self) -> None:
-        """Repeats the time for late subscribers."""
+        """Publishes the time of a stopped world again, for new subscribers."""
         if self._clock is not None:
             self._clock.repeat()
 
     def publish_idle(self) -> None:
-        """Publishes a stopped world to late subscribers, without repeating a stamp."""
+        """Publishes the samples of a stopped world, without publishing a stamp twice.
+
+        In simulated time, sensors that were not read at this tick publish a sample, and new subscribers get the last
+        samples. In wall time, sensors publish at their rates with new stamps.
+        """
         if self._clock is not None:
             self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)
             self._publishers.serve_late()
@@ -206,6 +222,6 @@ class TickPublisher:
             self._publishers.publish(self._world.read_idle(self._idle_tick, since), self._world.clock.stamp_ns)
 
     def restart(self) -> None:
-        """Drops data from before a reset, and publishes the present state."""
+        """Drops samples from before a reset, and publishes the time and all samples of the present state."""
         self._publishers.restart()
         self.publish_all([])

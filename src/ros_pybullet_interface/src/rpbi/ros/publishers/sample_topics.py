@@ -1,4 +1,4 @@
-"""The topic of each type of samples, and the samples as messages."""
+"""Topics of the sensors' samples, and functions that convert samples to messages."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -49,20 +49,20 @@ from rpbi.sensors import SENSOR_TYPES, Sensor
 from .packed_messages import PackedJointState
 
 CONTROLLER = "joint_trajectory_controller"
-"""Namespace of a trajectory follower below `rpbi/NAME/`."""
+"""Namespace of a robot's trajectory follower below `rpbi/NAME/`."""
 _ARROW = Vector3(0.015, 0.03, 0.04)
-"""Diameters of shaft and head and length of the head [m]."""
+"""Diameter of the shaft, diameter of the head and length of the head of an arrow [m]."""
 _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
 
 
 def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
-    """Returns positions, velocities and efforts of all joints."""
+    """Converts a sample with positions, velocities and efforts of all joints to a message."""
     header = stamped_header(stamp_ns, "")
     return PackedJointState(header, sample.joint_names, sample.position, sample.velocity, sample.effort)
 
 
 def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
-    """Returns force and moment; frames that are not the world's own get no prefix."""
+    """Converts a sample with force and moment to a message; only frames below `rpbi/` get the TF prefix."""
     message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
     is_ours = sample.frame_id.startswith("rpbi/")
     message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
@@ -71,7 +71,7 @@ def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
 
 
 def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
-    """Returns the contact points of a body, and their forces."""
+    """Converts a sample with a body's contact points and forces to a message."""
     points = [
         ContactPoint(
             link=point.link,
@@ -92,7 +92,7 @@ def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
 
 
 def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
-    """Returns arrows that replace the previous ones."""
+    """Converts a sample with arrows to markers that replace the previous arrows."""
     header = _header(stamp_ns)
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     for number, (start, end) in enumerate(sample.arrows):
@@ -105,7 +105,7 @@ def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> Marker
 
 
 def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
-    """Returns pose and twist of a base; covariances are zero, since both are exact."""
+    """Converts a sample with pose and twist of a base to a message; the covariances are zero, since both are exact."""
     message = Odometry(header=_header(stamp_ns), child_frame_id=prefixed(sample.frame))
     message.pose.pose.position = Point(*sample.pose.position)
     message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
@@ -114,7 +114,7 @@ def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
 
 
 def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
-    """Returns a surface as triangles in the world."""
+    """Converts a sample with a surface to a marker of triangles in the world frame."""
     marker = Marker(ns=sample.name, type=Marker.TRIANGLE_LIST, action=Marker.ADD, scale=Vector3(1.0, 1.0, 1.0))
     marker.header = _header(stamp_ns)
     marker.pose.orientation.w = 1.0
@@ -124,7 +124,7 @@ def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
 
 
 def controller_state_message(sample: ControllerStateSample, stamp_ns: int) -> ControllerStateMessage:
-    """Returns the state of a controller as message."""
+    """Converts a sample with a controller's state to a message."""
     message = ControllerStateMessage(
         name=sample.name.split("/", 1)[1],
         type=sample.type,
@@ -138,12 +138,18 @@ def controller_state_message(sample: ControllerStateSample, stamp_ns: int) -> Co
 
 
 def state_message(state: TrajectoryStateSample, stamp_ns: int) -> JointTrajectoryControllerState:
-    """Returns the message of a follower's state."""
+    """Converts a sample with a trajectory follower's state to a message."""
     return fill_state(JointTrajectoryControllerState(), state, stamp_ns)
 
 
 def fill_state(message: Any, state: TrajectoryStateSample, stamp_ns: int) -> Any:
-    """Fills in a message with the fields of a follower's state, and returns it."""
+    """Fills the fields of a message with a trajectory follower's state, and returns the message.
+
+    Args:
+        message: A JointTrajectoryControllerState, or the feedback of the trajectory action.
+        state: State of the follower.
+        stamp_ns: Stamp [ns].
+    """
     desired = state.desired
     since_start = genpy.Duration.from_sec(state.time_from_start_s)
     message.header.stamp = to_ros_time(stamp_ns)
@@ -243,7 +249,11 @@ APRIL_TAGS = Topic(
 
 
 def address(sensor: Sensor) -> str:
-    """Returns the name of a sensor in requests: its topic below `rpbi/`, `NAME/tf`, or the name of a camera."""
+    """Returns the name by which requests address a sensor.
+
+    It is the sensor's topic without `rpbi/`. A sensor that only publishes on TF is addressed as `NAME/tf`, a camera by
+    the camera's name.
+    """
     topic = sample_topic(sensor)
     if topic is not None:
         return topic.name.format(name=sensor.name).removeprefix("rpbi/")
@@ -251,10 +261,10 @@ def address(sensor: Sensor) -> str:
 
 
 def sample_topic(sensor: Sensor) -> Topic | None:
-    """Returns the topic of a sensor, None if its samples go elsewhere.
+    """Returns the topic of a sensor; None if its samples are not published on a topic of their own.
 
     Raises:
-        ConfigError: If it comes from another package and has no topic that can be found.
+        ConfigError: If another package defines the sensor, and its `ros_topic` is missing or cannot be found.
     """
     place = sensor.ros_topic
     if place == "":

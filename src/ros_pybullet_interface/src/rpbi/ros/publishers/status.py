@@ -1,4 +1,4 @@
-"""State of the simulation: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
+"""Publishes the state of the simulation on /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
 
 import logging
 import math
@@ -44,16 +44,17 @@ STOPPED_CLOCK_PERIOD_S = 0.05
 MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
-"""Share of the asked real-time factor below which the diagnostics warn."""
+"""Share of the requested real-time factor; if the measured factor is below it, the diagnostics warn."""
 SLOW_PERIODS = 3
-"""Number of slow diagnostics in a row after which a warning explains why; a world may be slow at its start."""
+"""Number of consecutive diagnostics of a slow world after which a warning names the cause; a start may be slow."""
 WINDOW_ADVICE = "without a graphics card use RViz and connection_mode DIRECT"
 SLOW_CALL_S = 0.0005
-"""Duration of a call of PyBullet above which its window slows a world down [s]; without a window it is 10 µs."""
+"""Duration of a PyBullet call above which the window is reported to slow the world down [s]; without a window, a call
+takes 10 µs."""
 
 
 def _warn_of_rivals() -> None:
-    """Warns if another node publishes /clock, too: ROS time would jump between the two."""
+    """Logs a warning if another node publishes /clock too, since ROS time would jump between both clocks."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
     rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
@@ -61,17 +62,17 @@ def _warn_of_rivals() -> None:
 
 
 def clock_message(stamp_ns: int) -> ClockMessage:
-    """Returns the message of a world's time [ns]."""
+    """Returns a /clock message with a given time [ns]."""
     return ClockMessage(to_ros_time(stamp_ns))
 
 
 def state_message(world: World, with_hash: bool, **pace: Any) -> SimulationState:
-    """Returns the state of a world.
+    """Returns a message with the state of a world.
 
     Args:
         world: The world.
-        with_hash: Whether the hash of the state is in it.
-        pace: The fields of the message that the world does not know: whether it runs, and how fast.
+        with_hash: Whether to compute the hash of the state; otherwise that field is empty.
+        pace: Further fields of the message, which come from the simulation loop, such as `running`.
     """
     message = SimulationState(
         tick=world.clock.tick,
@@ -86,7 +87,7 @@ def state_message(world: World, with_hash: bool, **pace: Any) -> SimulationState
 
 
 class ClockPublisher:
-    """Simulated time on /clock, of which the simulator is the only source."""
+    """Publishes simulated time on /clock; warns if another node publishes /clock too."""
 
     def __init__(self, world: World) -> None:
         self._clock, self._most_hz = world.clock, world.config.clock_hz
@@ -96,13 +97,13 @@ class ClockPublisher:
         self.set_factor(world.config.real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Publishes as often as a pace allows."""
+        """Sets the rate of /clock for a real-time factor (0 is as fast as possible), limited by `clock_hz`."""
         limit_hz = min(real_time_factor / self._clock.dt_s, MAX_CLOCK_HZ) if real_time_factor else FREE_RUNNING_CLOCK_HZ
         self._period_s = 1.0 / min(self._most_hz or limit_hz, limit_hz)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Publishes the present tick, if it is a new one and the rate permits."""
+        """Publishes the time of the present tick, if the tick is new and a message is due."""
         now_s = time.monotonic()
         if now_s >= self._due_s and self._clock.stamp_ns != self._sent_ns:
             # The next deadline follows from the last one, which keeps the mean rate, but pauses are not caught up.
@@ -110,12 +111,13 @@ class ClockPublisher:
             self._send()
 
     def publish_now(self) -> None:
-        """Publishes the present tick in any case, such as the last one before a stop."""
+        """Publishes the time of the present tick regardless of the rate, for instance after the last tick before a
+        stop."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 
     def repeat(self) -> None:
-        """Publishes the same tick again at intervals while the world is stopped, for late subscribers."""
+        """Publishes the time of a stopped world again every STOPPED_CLOCK_PERIOD_S, for new subscribers."""
         if time.monotonic() >= self._due_s or self._clock.stamp_ns != self._sent_ns:
             self.publish_now()
 
@@ -126,14 +128,14 @@ class ClockPublisher:
 
 
 class StatusPublisher:
-    """Publishes whether the world runs, and its diagnostics.
+    """Publishes whether the world runs on `rpbi/status`, and its diagnostics on /diagnostics.
 
     Args:
         world: The world.
-        pacer: Its pacer.
+        pacer: Times the ticks of the world.
         facts: Returns further values for the diagnostics.
-        fault: Returns a fault beside the world, of which the diagnostics warn; an empty text if there is none.
-        priority: Scheduling of the node's threads, which depends on its load; None: it is never changed.
+        fault: Returns a fault outside of the world, for a warning in the diagnostics; empty without a fault.
+        priority: Changes the scheduling of the node's threads with the load; None if it is never changed.
     """
 
     def __init__(
@@ -158,12 +160,12 @@ class StatusPublisher:
         self._overruns = 0
 
     def spin(self, running: bool, stepping: bool = False, busy: str = "") -> None:
-        """Publishes what is due by the wall clock.
+        """Publishes the status and the diagnostics, each if a message is due by the wall clock.
 
         Args:
             running: Whether the world runs.
-            stepping: Whether it runs the ticks of a request.
-            busy: Message of the diagnostics while it does something else.
+            stepping: Whether the ticks of a request are running.
+            busy: Message for the diagnostics while a state is being restored, otherwise empty.
         """
         if self._rate.is_due():
             self.publish(running or stepping)
@@ -171,7 +173,7 @@ class StatusPublisher:
             self._publish_diagnostics(running, stepping, busy)
 
     def publish(self, running: bool) -> None:
-        """Publishes 1 for running, 0 for stopped."""
+        """Publishes the status: 1 if the world runs, 0 if it is stopped."""
         self._status.publish(Int64(int(running)))
 
     def _publish_diagnostics(self, running: bool, stepping: bool, busy: str) -> None:
@@ -210,7 +212,7 @@ class StatusPublisher:
         self._diagnostics.publish(message)
 
     def _warn_of_cause(self, message: str, load: Load) -> None:
-        """Warns of the cause when the world has been too slow for a while, once for each cause."""
+        """Logs why the world has been too slow for SLOW_PERIODS diagnostics in a row, once for each cause."""
         if self._slow_periods < SLOW_PERIODS or WINDOW_ADVICE in self._advice:
             return
         reason, window = load.reason(self._clock.dt_s), self._world.window
@@ -223,7 +225,10 @@ class StatusPublisher:
 
 
 class StatePublisher:
-    """Publishes the state of the simulation, at a rate in wall time, and its hash, at a rate in the world's time."""
+    """Publishes the state of the simulation on `rpbi/state`.
+
+    Messages come at a rate in wall time. Messages with a hash of the state come at a rate in the world's time.
+    """
 
     def __init__(self, world: World, pacer: Pacer) -> None:
         self._world, self._pacer = world, pacer
@@ -239,7 +244,7 @@ class StatePublisher:
         self.restart()
 
     def restart(self) -> None:
-        """Publishes a world that was built or reset, with its hash."""
+        """Publishes the state of a world that was just built or reset; with its hash, if hashes are configured."""
         tick = self._world.clock.tick
         self._hash_tick = None if self._schedule is None else self._schedule.next_due(tick)
         self._begin_window()
@@ -252,7 +257,7 @@ class StatePublisher:
 
     @property
     def ticks_to_hash(self) -> float:
-        """Number of ticks to the next one whose hash is due; inf if none is."""
+        """Number of ticks until the next hash is due; inf if hashes are not configured."""
         return math.inf if self._hash_tick is None else self._hash_tick - self._world.clock.tick
 
     def publish_hash(self) -> None:
@@ -262,10 +267,10 @@ class StatePublisher:
         self._publish(with_hash=True)
 
     def spin(self, moves: bool) -> None:
-        """Publishes what is due by the wall clock, and at once when the world starts or stops.
+        """Publishes the state if a message is due by the wall clock, and measures the real-time factor.
 
         Args:
-            moves: Whether the world runs, or is stepping.
+            moves: Whether the world runs, or the ticks of a request are running.
         """
         now_s = time.monotonic()
         if moves != self._moves:
@@ -279,7 +284,7 @@ class StatePublisher:
             self._publish()
 
     def _begin_window(self) -> None:
-        """Starts to measure the real-time factor, which is 0 until then."""
+        """Starts to measure the real-time factor, which is 0 until the first measurement."""
         self._factor = 0.0
         self._window_s, self._window_tick = time.monotonic(), self._world.clock.tick
 

@@ -1,4 +1,4 @@
-"""Transforms on TF: poses of links, and frames of the main file."""
+"""Publishes link poses on TF, and the static frames that the main YAML file defines."""
 
 from collections.abc import Sequence
 
@@ -19,14 +19,14 @@ TF_STATIC = Topic("/tf_static", TFMessage, meaning="Where the frames under `pose
 
 
 class TransformCollector:
-    """Link poses as transforms, all that a tick has in one message."""
+    """Collects the link poses of a tick as transforms of one message."""
 
     def __init__(self) -> None:
         self._last: dict[str, list[TransformStamped]] = {}
         self._collected: list[TransformStamped] = []
 
     def collect(self, sample: LinkPoseSample, stamp_ns: int) -> None:
-        """Collects the transforms of a body."""
+        """Adds the link poses of a body to the message."""
         transforms = self._last.get(sample.name)
         if transforms is None or len(transforms) != len(sample.frames):
             transforms = self._last[sample.name] = [_transform(frame) for frame in sample.frames]
@@ -39,47 +39,53 @@ class TransformCollector:
         self._collected += transforms
 
     def drain(self) -> PackedTransforms | None:
-        """Returns what was collected, valid until the next sample; None if that is nothing."""
+        """Returns a message with the collected transforms, and clears the collection.
+
+        The next `collect` overwrites the transforms.
+
+        Returns:
+            The message; None if there are no transforms.
+        """
         collected, self._collected = self._collected, []
         return PackedTransforms(collected) if collected else None
 
     def last(self) -> TFMessage:
-        """Returns the last poses of all bodies."""
+        """Returns a message with the last link poses of all bodies."""
         return TFMessage([one for body in self._last.values() for one in body])
 
     def restart(self) -> None:
-        """Drops all poses."""
+        """Drops the stored poses of all bodies."""
         self._last.clear()
 
     def forget(self, name: str) -> None:
-        """Drops the poses of a body."""
+        """Drops the stored poses of a body."""
         self._last.pop(name, None)
 
 
 class TransformPublisher(TransformCollector):
-    """Link poses on TF."""
+    """Publishes link poses on TF."""
 
     def __init__(self) -> None:
         super().__init__()
         self._topic = FastTopic(TF.name, TF.message_type)
 
     def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
-        """Collects the transforms of a body for the next `flush`."""
+        """Collects the link poses of a body, which the next `flush` publishes."""
         self.collect(sample, stamp_ns)
 
     def flush(self) -> None:
-        """Sends what was collected."""
+        """Publishes the collected transforms, if TF has subscribers."""
         message = self.drain()
         if message is not None and self._topic.has_subscribers:
             self._topic.publish(message)
 
     def serve_late(self) -> None:
-        """Sends all last poses to new subscribers."""
+        """Sends the last link poses of all bodies to new subscribers."""
         self._topic.serve_late(self.last)
 
 
 class StaticFrames:
-    """Puts frames on TF once and for all; without any there is no topic."""
+    """Publishes static frames once on the latched topic /tf_static; without frames, the topic is not opened."""
 
     def __init__(self, poses: Sequence[StaticFrame]) -> None:
         if poses:
@@ -88,7 +94,7 @@ class StaticFrames:
 
 
 def static_frames_message(poses: Sequence[StaticFrame]) -> TFMessage:
-    """Returns frames with their poses as transforms."""
+    """Converts static frames to a message with their transforms."""
     return TFMessage([_static_transform(each) for each in poses])
 
 

@@ -1,4 +1,4 @@
-"""The whole world as markers for RViz, which otherwise shows robots only."""
+"""Publishes the visual shapes of all bodies as markers, since RViz on its own shows only robots."""
 
 import math
 import time
@@ -29,13 +29,13 @@ MARKER_TYPES = {
 
 
 def shape_marker(name: str, number: int, shape: BodyShape, frame: str, pose: Pose) -> Marker:
-    """Returns the marker of a shape, which moves with its frame.
+    """Returns a marker that shows a shape and moves with a TF frame.
 
     Args:
-        name: The body, for RViz a namespace that can be switched off.
-        number: Which of the body's shapes it is.
+        name: Name of the body, which becomes the marker's namespace; RViz can hide namespaces.
+        number: Number of the shape within the body, which becomes the marker's id.
         shape: The shape.
-        frame: TF frame.
+        frame: TF frame that the marker moves with.
         pose: Pose of the shape in that frame.
     """
     marker = Marker(ns=name, id=number, type=MARKER_TYPES[shape.kind], action=Marker.ADD, frame_locked=True)
@@ -51,21 +51,24 @@ def shape_marker(name: str, number: int, shape: BodyShape, frame: str, pose: Pos
 
 
 def deletion(marker: Marker) -> Marker:
-    """Returns the marker that deletes another one."""
+    """Returns a marker message that deletes a given marker."""
     gone = Marker(ns=marker.ns, id=marker.id, action=Marker.DELETE)
     gone.header.frame_id = marker.header.frame_id
     return gone
 
 
 def moved(marker: Marker, pose: Pose) -> Marker:
-    """Returns a copy of a marker at another pose in its frame; the original may be about to be sent."""
+    """Returns a copy of a marker with another pose in the same frame.
+
+    The original stays unchanged, since rospy may still have to send it.
+    """
     copied = Marker(*(getattr(marker, slot) for slot in Marker.__slots__))
     copied.pose = pose_message(pose)
     return copied
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """Returns a pose as a message."""
+    """Converts a pose to a message."""
     return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
 
 
@@ -76,20 +79,25 @@ MARKERS = Topic(
     key="markers_hz",
 )
 SMALLEST_MOTION = 1e-4
-"""Smallest motion of a shape that is sent [m, and parts of a quaternion]; less is ignored."""
+"""Smallest change of a pose that is published: of a coordinate [m] or of a quaternion component."""
 
 LONGEST_CHECK_S = 0.002
-"""Longest check of all shapes in one poll [s]; the next poll continues it."""
+"""Longest time that one poll spends on checking shapes [s]; the next poll continues the check."""
 
 _Key = tuple[str, int]
 
 
 class WorldMarkers:
-    """Publishes every visual shape of the world on a latched topic, all together whenever one is added or removed.
+    """Publishes the visual shapes of all bodies on a latched topic, whenever a shape is added, removed or moved.
 
-    Each is in the frame of its link, which TF moves. Shapes of links that are not on TF are in the world frame; they
-    are checked while there are subscribers, and all is sent again when one of them has moved. Checks run at a rate [Hz]
-    of wall time, with many shapes in several polls; only the simulation thread may make and poll it.
+    A shape whose link is on TF has a marker in the link's frame, and is not sent again when the link moves. Other
+    shapes have markers in the world frame. While the topic has subscribers, these shapes are checked, and all markers
+    are sent again when one of these shapes has moved. A check of many shapes takes several polls. Only the simulation
+    thread may create and poll this object.
+
+    Args:
+        world: The world.
+        hz: Rate of the checks [Hz] of wall time.
     """
 
     def __init__(self, world: World, hz: float) -> None:
@@ -107,7 +115,7 @@ class WorldMarkers:
         self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
 
     def poll(self) -> None:
-        """Publishes changes, if a check is due."""
+        """Checks the shapes and publishes changes, if a check is due or has not ended yet."""
         if self._check is None and not self._rate.is_due():
             return
         present = (len(self._world.log), *self._world.bodies.values())
@@ -126,7 +134,7 @@ class WorldMarkers:
         self._check = None
 
     def _check_all(self) -> Iterator[None]:
-        """Yields after each shape, and publishes all at the end."""
+        """Builds the markers of all shapes and yields after each; at the end, publishes all if anything has changed."""
         self._markers, self._loose, self._shown = {}, [], {}
         for body in self._world.bodies.values():
             for number, shape in enumerate(body_shapes(body)):

@@ -1,4 +1,7 @@
-"""Services, topics and other parts of a body in ROS, besides its samples and inputs."""
+"""Opens the services, command topics, trajectory action and URDF parameter of each body.
+
+`SamplePublishers` opens the topics of samples, and `Inputs` the topics of inputs.
+"""
 
 import time
 from collections.abc import Callable, Sequence
@@ -55,11 +58,11 @@ from .trajectory_action import open_trajectory_action
 from .trajectory_commands import follow_command, followers, query_state
 
 SAMPLES = 100
-"""Number of samples of a force-torque sensor that are averaged."""
+"""Number of force-torque samples whose mean becomes the new zero."""
 LOOK_AGAIN_AFTER_S = 0.2
-"""Period of checks whether samples still come [s] of wall time."""
+"""Period of checks whether the sensor still takes samples [s] of wall time."""
 LONGEST_ZEROING_S = 60.0
-"""Wall time within which all samples come [s]; beyond it, the old zero stays."""
+"""Longest wait for all samples [s] of wall time; beyond it, zeroing fails and the old zero stays."""
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
@@ -86,8 +89,8 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
     """Zeroes that force-torque sensor to the mean of its next 100 samples.
 
     Raises:
-        InterfaceError: If the simulation is stopped or the sensor is off, before or meanwhile, the robot goes, or the
-            samples take more than a minute; the old zero stays then.
+        InterfaceError: If the simulation is stopped, the sensor is off, the robot is removed, or the samples take more
+            than a minute. The old zero stays then.
     """
     body = context.body
     sensor = next(each for each in body.force_torque_sensors if each.name == context.owner)
@@ -159,18 +162,20 @@ BODY_PARTS: tuple[Callable[[BodyContext], Callable[[], None] | None], ...] = (
     publish_description,
     open_trajectory_action,
 )
-"""Functions that open everything else for a body that has it, and return its close function."""
+"""Functions that open a further ROS interface of a body and return the function that closes it.
+
+They return None if the body does not have the interface."""
 
 
 class BodyEndpoints:
-    """Opens services, topics and other parts of bodies, and closes them with the body."""
+    """Opens and closes the services, topics and other ROS interfaces of bodies."""
 
     def __init__(self, simulation: Simulation, ask: Requests) -> None:
         self._simulation, self._ask = simulation, ask
         self._open: dict[str, ExitStack] = {}
 
     def open(self, body: Body) -> None:
-        """Opens all parts of a body; if one fails, none stays open."""
+        """Opens all interfaces of a body; if one cannot be opened, those opened before are closed again."""
 
         def contexts(owners: Sequence[str]) -> list[BodyContext]:
             return [BodyContext(body.name, owner, self._simulation, self._ask) for owner in owners]
@@ -190,7 +195,7 @@ class BodyEndpoints:
             self._open[body.name] = stack.pop_all()
 
     def close(self, name: str) -> None:
-        """Closes all parts of a body."""
+        """Closes all interfaces of the body with a given name."""
         stack = self._open.pop(name, None)
         if stack is not None:
             stack.close()

@@ -1,6 +1,6 @@
 """The services of the node: time, objects, cameras, sensors and dynamics.
 
-Handlers never call PyBullet, they ask the simulation thread.
+Only the simulation thread calls PyBullet; the handlers send requests to it.
 """
 
 import logging
@@ -71,10 +71,10 @@ from .states import restore, save, save_keyframe
 log = logging.getLogger(__name__)
 
 MAX_STEPS = 1_000_000
-"""Ticks of one request, which is answered when they are done."""
+"""Largest number of ticks in one request."""
 YAML_SUFFIXES = (".yaml", ".yml")
 NO_FOLDER = "~config"
-"""Stands for the path of a YAML that came without one."""
+"""Stands for the path of the YAML file if the YAML was given as text."""
 OBJECT_TYPES = {
     PybulletObject.VISUAL: VisualObject.section,
     PybulletObject.COLLISION: CollisionObject.section,
@@ -83,19 +83,19 @@ OBJECT_TYPES = {
     PybulletObject.SOFT: SoftObject.section,
     PybulletObject.URDF: UrdfObject.section,
 }
-"""List of the main file for each number in PybulletObject."""
+"""Section of the main YAML file for each object type of the message PybulletObject."""
 
 
 class NodeContext(NamedTuple):
-    """The node.
+    """Objects that the handlers of the node's services use.
 
     Attributes:
         simulation: The loop that runs the world.
-        ask: Calls a function in the simulation thread.
-        objects: Objects that are added and removed.
-        predictor: Predicts from the present state.
-        loading: Context for the files of objects, see `load_object`.
-        state_folder: Folder that states are saved in and restored from.
+        ask: Makes the simulation thread call a function.
+        objects: Adds and removes objects, and resets the world.
+        predictor: Predicts motion from the present state.
+        loading: Context for loading the files of objects, see `load_object`.
+        state_folder: Folder in which states are saved.
         keyframes: Makes keyframes between ticks.
     """
 
@@ -191,10 +191,12 @@ def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
 
 
 def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
-    """Returns an object's YAML, the name of its file in messages, and the path beside which its own files are.
+    """Reads the YAML of an object from the file or text of a request.
 
-    The caller's working directory is unknown. Files of a YAML without a folder, such as a text, are looked for in the
-    world's search paths and PyBullet's data only.
+    Returns:
+        The content, the name of the file for error messages, and the path of the file. Relative paths in the content
+        are relative to the folder of the file. For text, the path is NO_FOLDER, and relative paths are searched only in
+        the world's search paths and PyBullet's data, since the caller's working directory is unknown.
     """
     if asked.filename:
         path = _find(node, asked.filename, "filename")
@@ -205,7 +207,16 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
-    """Returns the same of the YAML text of a key, which is an object, or `file` and the keys that differ."""
+    """Reads YAML text: the keys of an object, or the key `file` and keys that override those of the file.
+
+    Args:
+        node: The node.
+        text: YAML text of the request.
+        key: Field of the request that has the text, for error messages.
+
+    Returns:
+        The same as `_read_object`.
+    """
     data = load_configs(text, key, MAX_BYTES)
     if FILE not in data:
         return data, key, NO_FOLDER
@@ -226,7 +237,13 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:
-    """Returns the path of the YAML file that a key names; a service reveals no other files."""
+    """Finds a YAML file and returns its path; other types of files are refused, so that services do not reveal them.
+
+    Args:
+        node: The node.
+        name: Name of the file.
+        key: Field of the request that has the name, for error messages.
+    """
     if not name.lower().endswith(YAML_SUFFIXES):
         raise InterfaceError(f"{key}: expected the name of a YAML file ({', '.join(YAML_SUFFIXES)}), got {shown(name)}")
     try:

@@ -1,4 +1,4 @@
-"""Objects that are added and removed while the node runs, in the world and in ROS."""
+"""Adds and removes objects while the node runs, with their topics and services."""
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,9 +23,10 @@ from rpbi.world.saved.state import MAX_TICKS, WorldState
 
 
 class ObjectLifecycle:
-    """Adds and removes objects and resets the world, one at a time; for any thread but the simulation's.
+    """Adds and removes objects, and resets the world, one operation at a time.
 
-    On construction, it opens the topics and services of the world's objects.
+    The constructor opens the topics and services of all objects in the world. Any thread except the simulation thread
+    may call the methods.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
@@ -41,14 +42,19 @@ class ObjectLifecycle:
             self._open(name)
 
     def add(self, kind: str, config: Any, file: str) -> None:
-        """Adds a body.
+        """Adds a body and opens its topics and services.
+
+        Args:
+            kind: Type of the body, a key of BODY_TYPES.
+            config: Configuration of the body.
+            file: Name of its YAML file, for error messages.
 
         Raises:
-            InterfaceError: If it does not fit, or its topics cannot be opened; then nothing of it remains.
+            InterfaceError: If the body cannot be created, or its topics cannot be opened; the body is removed again.
         """
         with self._alone():
             config = with_initial_state(config, file)
-            self._prepare(kind, config, file)  # in this thread, since the simulation's has no time for large files
+            self._prepare(kind, config, file)  # here, since reading large files would delay the simulation thread
             self._ask(lambda: self._add_body(kind, config, file))
             try:
                 self._open(config.name)
@@ -60,7 +66,7 @@ class ObjectLifecycle:
         """Adds a camera.
 
         Raises:
-            ConfigError: If its name is taken.
+            ConfigError: If an object or camera of the same name exists.
         """
         with self._alone():
             self._ask(lambda: self._world.add_camera(config, file))
@@ -70,7 +76,7 @@ class ObjectLifecycle:
         """Removes a body or a camera.
 
         Raises:
-            UnknownNameError: If there is none of that name.
+            UnknownNameError: If neither a body nor a camera has that name.
         """
         with self._alone():
             if name in self._world.cameras:
@@ -82,13 +88,16 @@ class ObjectLifecycle:
                 raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
 
     def reset(self, to: WorldState | None = None) -> None:
-        """Resets the world, or restores a state; topics and services of bodies that stay remain open.
+        """Resets the world or restores a saved state, and waits until that is done.
+
+        Topics and services of bodies that exist before and after stay open.
 
         Args:
-            to: A saved state; by default that of the start.
+            to: The saved state to restore; None resets the world to its initial state.
 
         Raises:
-            InterfaceError: If something cannot be loaded any more, or the state is of another world or not reached.
+            InterfaceError: If an object can no longer be loaded, the state belongs to another world, or the state
+                cannot be reached.
         """
         with self._alone():
             for name in self._ask(self._world.changed_names):
@@ -113,7 +122,11 @@ class ObjectLifecycle:
                 raise error
 
     def end(self, timeout_s: float) -> None:
-        """Waits for running additions and removals, and refuses further ones."""
+        """Waits for the operation that is running; later operations wait forever.
+
+        Args:
+            timeout_s: Longest wait [s].
+        """
         self._lock.acquire(timeout=timeout_s)
 
     def _prepare(self, kind: str, config: Any, file: str) -> None:
@@ -125,11 +138,11 @@ class ObjectLifecycle:
         with (
             plugin_errors(body_type, f"preparing '{config.name}'"),
             suppress(ConfigError),
-        ):  # reported when it is created
+        ):  # creating the body reports the error
             body_type.prepare(config, self._world.window is not None)
 
     def _add_body(self, kind: str, config: Any, file: str) -> None:
-        """Does the simulation thread's part of adding."""
+        """Adds a body to the world and finds its topics; runs in the simulation thread."""
         self._world.add(kind, config, file)
         try:
             self._publishers.find_topics(config.name)
@@ -139,7 +152,11 @@ class ObjectLifecycle:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Waits for other additions, removals and resets; raises at once while a state is restored."""
+        """Waits until other operations are done, and blocks them meanwhile.
+
+        Raises:
+            InterfaceError: If a state is being restored.
+        """
         self._ask(lambda: None)
         with self._lock:
             yield
@@ -150,11 +167,12 @@ class ObjectLifecycle:
     def _start_again(
         self, to: WorldState | None
     ) -> tuple[set[str], list[FastTopic], InterfaceError | None, Future[None] | None]:
-        """Does the simulation thread's part of a reset, or the first part of restoring a state.
+        """Resets the world, or starts to restore a saved state; runs in the simulation thread.
 
         Returns:
-            The bodies that have gone or may be others now, their topics to close, what went wrong, and what is done
-            when the state is restored.
+            Four values. First, the names of the bodies that were added or removed since the world was built or reset.
+            Second, the topics of these bodies, which the caller must close. Third, the error of the reset, or None.
+            Fourth, for a saved state, the future of the restoration, otherwise None.
         """
         if to is not None:
             self._world.require_own(to)
@@ -172,7 +190,7 @@ class ObjectLifecycle:
         return changed, topics, None, None
 
     def _place_cameras(self) -> None:
-        """Follows the TF frames of the present cameras, and no others."""
+        """Starts to follow the TF frames of new cameras, and stops following those of removed cameras."""
         cameras = self._world.cameras
         for name, camera in self._placed_cameras.items():
             if cameras.get(name) is not camera:
@@ -191,19 +209,20 @@ class ObjectLifecycle:
         self._endpoints.open(body)
 
     def _close(self, name: str) -> None:
-        """Closes the inputs and services of a body."""
+        """Closes the inputs and services of a body; its sample topics stay open."""
         self._open_bodies.discard(name)
         self._inputs.close(name)
         self._endpoints.close(name)
 
     def _withdraw(self, name: str) -> None:
-        """Removes a body from the world, and its ROS interfaces; its inputs first."""
+        """Closes the inputs of a body, removes the body from the world, then closes its topics and services."""
         self._inputs.close(name)
         for topic in self._ask(lambda: self._remove_body(name)):
             topic.close()
         self._close(name)
 
     def _remove_body(self, name: str) -> list[FastTopic]:
-        """Does the simulation thread's part of it; returns the topics that are left to close."""
+        """Removes a body from the world, and returns the topics that the caller must close; runs in the simulation
+        thread."""
         self._world.remove(name)
         return self._publishers.forget(name)

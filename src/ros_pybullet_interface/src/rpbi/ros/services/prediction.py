@@ -1,4 +1,4 @@
-"""The service `rpbi/predict`: future motion, while the world continues."""
+"""The service `rpbi/predict`, which predicts motion in other processes while the world continues."""
 
 from __future__ import annotations
 
@@ -26,26 +26,28 @@ from rpbi.world.forks.shadow import Shadow
 from rpbi.world.saved.command_log import RecordedCommand
 
 MAX_TICKS = 1_000_000
-"""Largest number of ticks of all candidates of a request by default; more are rejected."""
+"""Default of the largest number of ticks in a request, summed over all candidates."""
 MAX_ROWS = 100_000
-"""Largest number of rows of motion in an answer, of all bodies and candidates; more are rejected."""
+"""Largest number of rows of motion in an answer, summed over all bodies and candidates."""
 EVERY = 10
 """Ticks between two rows of motion by default."""
 POSE_NAMES = ("x", "y", "z", "qx", "qy", "qz", "qw")
-"""Names of the values of an input that is a pose in the world."""
+"""Names of the values of a pose input (a pose in the world)."""
 NICENESS = 5
-"""Niceness of the processes that predict, so that the running world is not late."""
+"""Niceness of the predicting processes, so that they do not slow down the running world."""
 
 
 class Predictor:
-    """Predicts from the present state of a running world, in processes that follow it and end with this one.
+    """Predicts motion from the present state of a running world.
 
-    The first prediction takes as long as simulating again from the last start or reset; later ones continue from there.
+    A second process, the shadow, repeats the simulation of the world up to the present tick and predicts from there.
+    The first prediction simulates all ticks since the last start, reset or keyframe. Later predictions simulate only
+    the ticks since the prediction before.
 
     Args:
         simulation: The loop that runs the world.
-        ask: Calls a function in the simulation thread.
-        max_ticks: Largest number of ticks of all candidates of a request.
+        ask: Makes the simulation thread call a function.
+        max_ticks: Largest number of ticks in a request, summed over all candidates.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, max_ticks: int = MAX_TICKS) -> None:
@@ -59,11 +61,18 @@ class Predictor:
         """Number of calls of `cancel`."""
 
     def predict(self, candidates: list[Candidate], job: PredictionJob) -> tuple[int, int, list[Prediction]]:
-        """Returns the tick and stamp [ns] at which predictions begin, and the prediction for each candidate.
+        """Predicts the motion for each candidate, and waits for the results.
+
+        Args:
+            candidates: Alternative sequences of inputs.
+            job: Length of the predictions and the values to return.
+
+        Returns:
+            Tick and stamp [ns] at which all predictions start, and a prediction for each candidate.
 
         Raises:
-            InterfaceError: If it is cancelled, the world cannot be saved, or does not reach the same state in another
-                process.
+            InterfaceError: If the prediction is cancelled, the world cannot be saved, or the other process does not
+                reach the same state as the world.
         """
         cancels = self._cancels
         with self._lock:
@@ -76,12 +85,12 @@ class Predictor:
                 raise
 
     def cancel(self) -> bool:
-        """Ends the prediction that is under way and those that wait; any thread may call it.
+        """Ends the running prediction and all waiting ones; any thread may call this method.
 
-        The next prediction starts another process, as the first one does.
+        The next prediction starts a new process, and takes as long as the first one.
 
         Returns:
-            False if there is none.
+            False if no prediction is running.
         """
         if not self._lock.locked():
             return False
@@ -95,7 +104,14 @@ class Predictor:
             raise InterfaceError("the prediction was cancelled")
 
     def _follow(self, cancels: int) -> tuple[Shadow, int, int]:
-        """Brings the process that follows to the present state; returns it with the tick and its stamp [ns]."""
+        """Makes the shadow simulate up to the world's present state.
+
+        Args:
+            cancels: Number of cancellations when the prediction was requested; an increase ends the prediction.
+
+        Returns:
+            The shadow, and the tick and stamp [ns] that it has reached.
+        """
         world = self._simulation.world
         if self._shadow is None or self._resets != world.resets:
             self._end()
@@ -118,7 +134,7 @@ class Predictor:
         return shadow, tick, stamp_ns
 
     def _restore(self, shadow: Shadow) -> None:
-        """Has the process that follows go to the last keyframe, or ends it if the world was reset."""
+        """Restores the world's last keyframe in the shadow; if the world was reset, ends the shadow instead."""
         world = self._simulation.world
         state, commands, resets = self._ask(lambda: (world.save(), world.commands.count, world.resets))
         if resets == self._resets:
@@ -170,10 +186,10 @@ def _job(node: Any, request: PredictRequest) -> PredictionJob:
 
 
 def planned_input(message: PlannedInputMessage) -> PlannedInput:
-    """Returns an input as a world takes it.
+    """Converts a message to a planned input of a world.
 
     Raises:
-        InterfaceError: If there is not one value for each name.
+        InterfaceError: If the numbers of names and values differ.
     """
     names, values = message.names, tuple(message.values)
     if names and len(names) != len(values):

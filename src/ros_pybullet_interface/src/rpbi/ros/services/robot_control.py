@@ -31,7 +31,7 @@ from .robot_ik import arrival, solve_for_robot
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
     """Moves the joints that are named, in `duration` [s]; answers at the end.
 
-    Those that are asked to go beyond their limits stop there, and `success` is false.
+    A joint whose target is beyond its limits stops at the limit, and `success` is false.
     """
     state = request.joint_state
     target = JointCommand(state.name, state.position, state.velocity, state.effort)
@@ -55,7 +55,7 @@ def move_to_init_joint_state(context: BodyContext, request: ResetJointStateReque
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
     """Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.
 
-    Nothing moves if there is no solution.
+    Without a solution, the robot does not move.
     """
     solution = solve_for_robot(context, request.problem)
     if not solution.success:
@@ -71,10 +71,10 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
     """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
 
-    An empty text switches nothing; the answer is the present mode.
+    An empty text keeps the mode; the answer then has the present mode.
 
     Raises:
-        ValueError: If the text is none of these.
+        ValueError: If the text is neither empty nor one of these modes.
     """
     before = MODE_NAMES[context.body.motors.mode]
     if not request.data:
@@ -87,7 +87,7 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
 def stop_motion(context: BodyContext, _: Any) -> Answer:
     """Ends a timed motion.
 
-    Its joints hold where they are.
+    The joints hold their present positions.
     """
     was_moving = context.act("stop_motion", "it was stopped")
     return Answer(was_moving, "stopped" if was_moving else "no motion is running")
@@ -98,7 +98,7 @@ def set_motor_gains(context: BodyContext, request: SetMotorGainsRequest) -> Answ
 
     Raises:
         UnknownNameError: If the robot lacks one of the joints.
-        ValueError: If there is nothing to change, lengths differ or a gain is negative or not finite.
+        ValueError: If the request has no gains, the lengths of its lists differ, or a gain is negative or not finite.
     """
     context.act("set_gains", MotorGains(request.name, request.position_gains, request.velocity_gains))
     return Answer(True, f"changed gains of {', '.join(request.name)}")
@@ -122,10 +122,10 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
 def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
     """Sets targets as the topic `joint_states/target` does; it answers when they count from the next tick on.
 
-    Controllers in lock-step use it, since a message may arrive after the step that is requested next.
+    It is for controllers that step the world: a message on the topic could arrive after the next requested step.
 
     Raises:
-        ValueError: If a target is refused, with its reason.
+        ValueError: If a target is refused; the error has the reason.
     """
     state = request.joint_state
     target = JointCommand(state.name, state.position, state.velocity, state.effort, state.header.stamp.to_nsec())
@@ -134,23 +134,23 @@ def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
 
 
 def robots_with_controllers(body: Body) -> list[str]:
-    """Returns the name of a robot that has controllers."""
+    """Returns a list with the body's name if the body is a robot with controllers, otherwise an empty list."""
     return [body.name] if isinstance(body, Robot) and body.config.controllers else []
 
 
 def controllers(body: Body) -> list[str]:
-    """Returns the names of the controllers of a body, as `BODY/CONTROLLER`."""
+    """Returns the names of a body's controllers, as `BODY/CONTROLLER`."""
     return [f"{body.name}/{name}" for name in body.config.controllers] if isinstance(body, Robot) else []
 
 
 def switch_controllers(context: BodyContext, request: SwitchControllersRequest) -> Answer:
     """Stops and starts controllers of the robot, all at one tick.
 
-    Joints that no controller drives any more hold where they are.
+    Joints that are no longer driven by a controller hold their present positions.
 
     Raises:
-        UnknownNameError: If there is none of a name.
-        ValueError: If two would drive one joint; then nothing has changed.
+        UnknownNameError: If the robot lacks one of the controllers.
+        ValueError: If two controllers would drive the same joint; all controllers then stay as they were.
     """
     switch = ControllerSwitch(tuple(request.start), tuple(request.stop))
     if not (switch.start or switch.stop):
@@ -163,11 +163,11 @@ def switch_controllers(context: BodyContext, request: SwitchControllersRequest) 
 def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
     """Changes keys of that controller, such as `{stiffness: 200}`; the others stay.
 
-    One that is active begins again where the robot is.
+    An active controller starts again from the robot's present state.
 
     Raises:
-        ConfigError: If the text is no mapping.
-        ValueError: If a value is refused.
+        ConfigError: If the text is not a YAML mapping.
+        ValueError: If a key cannot be changed or a value is invalid.
     """
     name = context.owner.split("/", 1)[1]
     changes = load_configs(request.data, "data", MAX_BYTES)
@@ -186,11 +186,16 @@ def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
 
 
 def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:
-    """Moves and waits for the end.
+    """Moves joints to goal positions, waits for the end of the motion and returns its result.
+
+    Args:
+        context: Context of the robot.
+        goal: Goal positions [rad or m], keyed by joint index.
+        duration_s: Duration of the motion [s].
 
     Raises:
         InterfaceError: If the simulation is stopped, has ended or makes no progress.
-        ValueError: If the goal or the duration is refused; nothing moves then.
+        ValueError: If the goal or the duration is refused; the robot does not move then.
     """
 
     def start() -> Motion:

@@ -1,4 +1,4 @@
-"""Inverse kinematics of robots, as a service that answers and a topic that moves."""
+"""Inverse kinematics of robots: a service that returns solutions, and a topic that moves the robot to them."""
 
 import math
 from dataclasses import fields, replace
@@ -21,12 +21,14 @@ from rpbi.ros.headers import to_ros_time
 from rpbi.ros.requests import BodyContext
 
 NEAR_M, NEAR_RAD = 0.01, 0.02
-"""Tolerances of a moved link: joints within 0.01 rad of their goals may add up to this error."""
+"""Largest position error [m] and angle error [rad] of a link that has reached its target.
+
+They allow for an error of 0.01 rad in each joint."""
 _warn = ThrottledWarning()
 
 
 def moved_by_ik(body: Body) -> tuple[str, ...]:
-    """Returns the owner of the topic, for a robot that has it."""
+    """Returns the owner of the topic `rpbi/NAME/ik`: the body's name if its key `start_ik_callback` is true."""
     return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
@@ -35,12 +37,12 @@ def inverse_kinematics(
 ) -> tuple[bool, str, JointState]:
     """Returns joint positions that bring a link to a pose; moves nothing.
 
-    They are those of all joints that a motor can move. Out of reach they bring it as near as possible, which is a
-    success unless the robot is `strict`.
+    The answer has the positions of all joints that a motor can move. If the pose is out of reach, they bring the link
+    as near as possible; that is a success unless the robot is configured as `strict`.
 
     Raises:
         InterfaceError: If the robot has no such link or was removed.
-        ValueError: If a field of the problem does not make sense.
+        ValueError: If a field of the problem is invalid.
     """
     solution = solve_for_robot(context, request.problem)
     success, message = _judged(context, solution)
@@ -54,12 +56,14 @@ def inverse_kinematics(
 
 
 def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:
-    """Makes the solution the target of the joints that move the link; other joints keep theirs.
+    """Solves a problem, and sets the solution as the target of the joints that move the link.
+
+    The other joints keep their targets.
 
     Raises:
         InterfaceError: If the robot has no such link or was removed.
-        ValueError: If a field of the problem does not make sense, or the target is out of reach of a robot that is
-            `strict`: then nothing moves.
+        ValueError: If a field of the problem is invalid, or the robot is configured as `strict` and the pose is out of
+            reach. The robot does not move then.
     """
     solution = solve_for_robot(context, problem)
     success, message = _judged(context, solution)
@@ -75,7 +79,10 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
 
 
 def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) -> tuple[bool, str]:
-    """Returns whether the link of a problem is now near the problem's target in the world, and in words how far off.
+    """Compares the present pose of a problem's link with the problem's target pose, both in the world.
+
+    Returns:
+        Whether the errors are within the tolerances NEAR_M and NEAR_RAD, and a text with the errors.
 
     Raises:
         InterfaceError: If the robot was removed.
@@ -92,14 +99,14 @@ def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) ->
 
 
 def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> PybulletSolution:
-    """Solves a problem with a target in the world, for the present state of the robot.
+    """Solves an inverse-kinematics problem whose target pose is in the world frame, for the robot's present base pose.
 
-    The search starts at the message's `currentPosition`, or else where the robot's joints are. Any thread but that of
-    the simulation may call it; the simulation continues meanwhile.
+    The search starts at the message's `currentPosition`; if that is empty, at the robot's present joint positions. Any
+    thread except the simulation thread may call this function; the simulation continues meanwhile.
 
     Raises:
         InterfaceError: If the robot has no such link or was removed.
-        ValueError: If a field of the problem does not make sense.
+        ValueError: If a field of the problem is invalid.
     """
     robot: JointedBody = context.body
     problem = IKProblem(**{field.name: getattr(message, field.name) for field in fields(IKProblem)})
@@ -118,17 +125,19 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
 
 
 def _judged(context: BodyContext, solution: PybulletSolution) -> tuple[bool, str]:
-    """Returns whether a solution is a success, and a message."""
+    """Returns whether a solution counts as a success for this robot, and a message for the caller."""
     if solution.success or context.body.config.strict:
         return solution.success, solution.message
     return True, f"as near as possible: {solution.message}"
 
 
 def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:
-    """Returns the velocities [rad/s or m/s] to the solution in the given time, none without a start or time.
+    """Returns the constant joint velocities [rad/s or m/s] from `currentPosition` to the solution in the time `dt`.
+
+    The list is empty if the problem has no `currentPosition` or its `dt` is 0.
 
     Raises:
-        ValueError: If the time is too short.
+        ValueError: If `dt` is too short for finite velocities.
     """
     if not (problem.dt and problem.currentPosition):
         return []

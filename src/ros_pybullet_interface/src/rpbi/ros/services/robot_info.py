@@ -1,4 +1,4 @@
-"""Robots in ROS: the parameter with the URDF, and the service that returns the joints."""
+"""ROS parameter with a robot's URDF, and service with a robot's joints."""
 
 import argparse
 import sys
@@ -45,7 +45,12 @@ def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
 
 
 def _joint_info(info: tuple, joint: Joint) -> JointInfo:
-    """Returns what PyBullet's `getJointInfo` returns as a message, whose fields have the same order."""
+    """Converts the result of PyBullet's `getJointInfo` to a message; the fields of both have the same order.
+
+    Args:
+        info: Result of `getJointInfo`.
+        joint: The same joint, for the message fields that PyBullet does not return.
+    """
     index, name, joint_type, *numbers, link, axis, position, quat, parent = info
     place = Point(*axis), Point(*position), Quaternion(*quat), parent
     kind = joint_type, joint.type_name
@@ -53,7 +58,11 @@ def _joint_info(info: tuple, joint: Joint) -> JointInfo:
 
 
 def publish_description(context: BodyContext) -> Callable[[], None] | None:
-    """Sets `rpbi/NAME/robot_description`, for robot_state_publisher and RViz; returns what deletes it."""
+    """Sets the parameter `rpbi/NAME/robot_description`, for robot_state_publisher and RViz.
+
+    Returns:
+        A function that deletes the parameter; None if the body is not a robot.
+    """
     body = context.body
     if not isinstance(body, JointedBody):
         return None
@@ -63,7 +72,10 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
 
 
 def main() -> None:
-    """Prints a robot description; launch files need it before the simulator is up: robot_state_publisher does."""
+    """Prints a URDF with mesh paths that RViz finds.
+
+    It is for launch files, which need the URDF for robot_state_publisher before the simulator has started.
+    """
     parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
     parser.add_argument("file", help="the URDF; {package}/path is resolved, and PyBullet's data is looked in")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""The services `rpbi/save`, `rpbi/save_keyframe` and `rpbi/restore`: states of the world as files in one folder."""
+"""The services `rpbi/save`, `rpbi/save_keyframe` and `rpbi/restore`, for states of the world in files."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ STATE_SUFFIX = ".world"
 
 
 def state_folder() -> Path:
-    """Returns the folder of `~state_folder`, the user's home by default.
+    """Returns the folder that the parameter `~state_folder` names; by default the user's home.
 
     Raises:
-        ConfigError: If it is no folder.
+        ConfigError: If the parameter is not the absolute path of an existing folder.
     """
     given = rospy.get_param("~state_folder", "~")
     folder = Path(given).expanduser() if isinstance(given, str) and given else None
@@ -56,7 +56,7 @@ def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
 def restore(node: Any, request: SetStringRequest) -> Answer:
     """Restores the state of a file of this world, by simulating again from its start or keyframe; stamps continue.
 
-    The node answers meanwhile; `rpbi/stop` ends it, and the world is reset.
+    The node answers other requests meanwhile. `rpbi/stop` aborts the restoration and resets the world.
     """
     state = WorldState.read(state_file(node.state_folder, request.data))
     node.objects.reset(state)
@@ -64,14 +64,15 @@ def restore(node: Any, request: SetStringRequest) -> Answer:
 
 
 def state_file(folder: Path, name: str) -> Path:
-    """Returns the path of a state that a caller names.
+    """Returns the path of the state file that a request names.
 
     Args:
-        folder: Folder that it has to be in, or below.
-        name: A full path, or one from the folder on.
+        folder: Folder that must contain the file, possibly in a subfolder.
+        name: Absolute path of the file, or its path relative to the folder.
 
     Raises:
-        InterfaceError: If it is outside, passes a symbolic link, or is no `.world` file.
+        InterfaceError: If the file is outside the folder, its path passes a symbolic link, or its name does not end
+            with `.world`.
     """
     if not name.endswith(STATE_SUFFIX):
         raise InterfaceError(f"data: expected the path of a {STATE_SUFFIX} file, got {shortened(repr(name))}")

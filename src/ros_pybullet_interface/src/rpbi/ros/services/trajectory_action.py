@@ -1,4 +1,4 @@
-"""The action of a follower of trajectories, for planners such as MoveIt."""
+"""The action `follow_joint_trajectory` of robots with a trajectory follower, for planners such as MoveIt."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ log = logging.getLogger(__name__)
 
 ACTION = Service(f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction, None, followers)
 MAX_TASKS = 100
-"""Largest number of waiting tasks; beyond it, feedback is dropped."""
+"""Largest number of tasks that wait for the action's thread; beyond it, feedback is dropped."""
 LONGEST_END_S = 5.0
-"""Longest wait for the last answers when closing [s]."""
+"""Longest wait for the answers to all goals when the action is closed [s]."""
 
 
 class StampedActionServer(ActionServer):
     """An action server for a node that does not use ROS time.
 
-    actionlib takes all stamps and its timer from rospy, which in the simulator is the wall clock regardless of
-    `use_sim_time`: right for the timer, not for the stamps. It also passes messages to threads that may lose the last
-    ones when the server closes; here they are sent at once.
+    In this node, rospy's time is wall time regardless of `use_sim_time`. actionlib's own server would stamp messages
+    with that time; this class uses the world's clock for stamps. actionlib also leaves sending to threads, which may
+    lose the last messages when the server closes; this class sends without such threads, see `FastTopic`.
 
     Args:
         name: Name of the action.
-        action_type: Its ROS type.
+        action_type: ROS type of the action.
         clock: The world's clock.
         on_goal: Called with the handle of a new goal; it must return at once.
         on_cancel: Called with the handle of a goal to cancel; it must return at once.
@@ -67,17 +67,18 @@ class StampedActionServer(ActionServer):
         self._clock = clock
 
     def initialize(self) -> None:
-        """Opens the topics and starts the timer; called by `start`."""
+        """Opens the topics and starts the timer; actionlib's `start` calls this method."""
         super().initialize()
         for key in ("status_pub", "result_pub", "feedback_pub"):
             publisher: rospy.Publisher = getattr(self, key)
-            # Both are one topic to rospy, which must not close in between: new subscribers would be lost.
+            # The new publisher opens before the old one closes: otherwise rospy would close the topic in between, and
+            # new subscribers would be lost.
             setattr(self, key, _StampedTopic(publisher.resolved_name, publisher.data_class, self._clock))
             publisher.unregister()
 
 
 class _StampedTopic(FastTopic):
-    """A topic with the stamps of the world, under the names by which actionlib uses it."""
+    """A topic that stamps messages with the world's clock, and has the methods of a publisher that actionlib calls."""
 
     def __init__(self, topic: str, message_type: type, clock: Clock) -> None:
         super().__init__(topic, message_type)
@@ -88,7 +89,7 @@ class _StampedTopic(FastTopic):
         try:
             super().publish(message)
         except rospy.ROSException:
-            if not rospy.core.is_shutdown_requested():  # else it is closed, which actionlib's timer does not know
+            if not rospy.core.is_shutdown_requested():  # at shutdown, actionlib's timer publishes on closed topics
                 raise
 
     def unregister(self) -> None:
@@ -96,7 +97,11 @@ class _StampedTopic(FastTopic):
 
 
 def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
-    """Serves the action of a robot that follows trajectories; returns what closes it."""
+    """Opens the action of a robot that has a trajectory follower.
+
+    Returns:
+        A function that closes the action; None if the body has no trajectory follower.
+    """
     if not isinstance(context.body, Robot) or context.body.follower is None:
         return None
     return TrajectoryAction(context).close
@@ -107,7 +112,7 @@ _open_actions: set[TrajectoryAction] = set()
 
 @cache
 def _answer_before_shutdown() -> None:
-    """Makes ROS wait for the answers to all goals, which end with the world, before it shuts down."""
+    """Makes ROS send the answers to all goals before it shuts down; the goals end when the world is closed."""
 
     def answer() -> None:
         for action in list(_open_actions):
@@ -117,10 +122,11 @@ def _answer_before_shutdown() -> None:
 
 
 class TrajectoryAction:
-    """Serves `follow_joint_trajectory` of one robot.
+    """Serves the action `follow_joint_trajectory` of one robot.
 
-    actionlib holds one lock during callbacks and answers. To avoid a deadlock, neither the simulation thread answers
-    goals nor do callbacks wait for the simulation thread: both leave tasks to a thread of the action's own.
+    actionlib holds the same lock during callbacks and while a goal is answered. To avoid deadlocks, the simulation
+    thread does not answer goals, and callbacks do not wait for the simulation thread. Both put tasks into a queue,
+    which a thread of this object works off.
     """
 
     def __init__(self, context: BodyContext) -> None:
@@ -141,13 +147,16 @@ class TrajectoryAction:
         _answer_before_shutdown()
 
     def close(self) -> None:
-        """Ends the action, after the robot was removed."""
+        """Answers all goals and closes the action, after the robot was removed."""
         _open_actions.discard(self)
         self.answer_all()
         self._server.stop()
 
     def answer_all(self) -> None:
-        """Waits until all goals have their answers; for when their motions have ended, or are about to."""
+        """Waits until all goals are answered, and ends the action's thread.
+
+        Call it when the motions of all goals have ended or are about to end.
+        """
         wait([motion.result for motion in list(self._motions.values())], LONGEST_END_S)
         self._tasks.put(None)
         self._thread.join(LONGEST_END_S)
@@ -202,14 +211,14 @@ class TrajectoryAction:
     def _cancel(self, goal: ServerGoalHandle) -> None:
         motion = self._motions.get(goal)
         if motion is None:
-            return  # it has ended meanwhile
+            return  # the motion has ended before
         try:
             self._context.ask_body(lambda: self._stop_motion(motion))
         except InterfaceError as error:
             log.warning("%s: could not cancel a goal: %s", self._context.name, error)
 
     def _stop_motion(self, motion: TrajectoryMotion) -> None:
-        if self._context.body.drive.motion is motion:  # else a newer one has replaced it
+        if self._context.body.drive.motion is motion:  # otherwise a newer motion has replaced it
             self._context.world.act(self._context.name, "cancel", "cancelled; the joints hold")
 
     def _finish(self, goal: ServerGoalHandle) -> None:

@@ -1,4 +1,4 @@
-"""The topic and service of a follower of trajectories, and requests read from messages."""
+"""The command topic and the state service of a robot's trajectory follower, and conversions from messages."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,12 +15,12 @@ from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
-    """Returns the owner of the topics and services of a robot that follows trajectories."""
+    """Returns the owner of the trajectory topics and services: the body's name if it has a trajectory follower."""
     return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
 
 
 def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
-    """Returns the request of a message; efforts are ignored."""
+    """Converts a message to a trajectory request; efforts are ignored."""
     points = tuple(
         TrajectoryPoint(
             point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
@@ -31,14 +31,14 @@ def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
 
 
 def goal_tolerances(goal: Any) -> GoalTolerances:
-    """Returns the tolerances of a control_msgs/FollowJointTrajectoryGoal; accelerations are ignored."""
+    """Returns the tolerances of a control_msgs/FollowJointTrajectoryGoal; acceleration tolerances are ignored."""
     return GoalTolerances(
         _tolerances(goal.path_tolerance), _tolerances(goal.goal_tolerance), goal.goal_time_tolerance.to_sec()
     )
 
 
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
-    """Follows a trajectory without tolerances; a goal of the action is cancelled."""
+    """Makes the robot follow a trajectory without tolerances; a running goal of the action is cancelled."""
     follower, clock = context.body.follower, context.world.clock
     request = trajectory_request(message)
     checked = follower.check(request)
