@@ -1,4 +1,4 @@
-"""Playout times of the targets of a stream: a jitter buffer."""
+"""Jitter buffer: schedules when each target of a stream is played."""
 
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ from typing import NamedTuple
 from .sender_clock import DRIFT, Arrival, SenderClock
 
 BUFFER_S = 0.02
-"""Default delay in which late targets are still in time [s]."""
+"""Default buffer delay [s]. A target that arrives late by less than the delay is still played on time."""
 LONGEST_PERIOD_S = 0.2
-"""Targets that are farther apart than this [s] are no stream: each acts at once."""
+"""Longest interval between the targets of a stream [s]. Targets with longer intervals act at once."""
 EVERY_TICK = 1.5
-"""Targets that are no farther apart than this many ticks act at once, too."""
+"""Largest interval [ticks] of targets that come at every tick. These targets act at once, too."""
 WINDOW = 64
 """Number of arrivals from which period, rate and delay are estimated."""
 SETTLING_S = 0.8
-"""Time constant of changes of the delay [s], shorter for the first targets."""
+"""Time constant with which the delay changes [s]; shorter for the first targets of a stream."""
 SHORTEST = 0.8
-"""A target is played no sooner after the one before than this share of the time between them."""
+"""Smallest ratio of the interval with which two targets are played to the interval with which they were sent."""
 REPLACED = 0.25
-"""A target that was sent sooner than this share of the period after another one replaces it."""
+"""A target replaces the previous target if it was sent within this share of the period after the previous one."""
 MIN_MISFIT_RATIO = 2.0
-"""Ratio of excess squared misfits above which a regular period replaces stamps, or the reverse."""
+"""Ratio of accumulated squared misfits above which a regular period replaces the stamps, or the reverse."""
 MIN_MISFIT = 1e-10
-"""Squared misfit below which candidates count as equal [rad^2 or m^2]."""
+"""Difference of squared misfits below which both kinds of send times count as equal [rad^2 or m^2]."""
 MIN_LOSS_RATIO = 16.0
-"""Ratio of squared misfits above which a gap counts as lost targets rather than as a late one."""
+"""Ratio of squared misfits above which a gap is explained by lost targets rather than by a late target."""
 MAX_LOST = 4
-"""Longest gap that can count as lost targets [periods]."""
+"""Longest gap that can be explained by lost targets [periods]."""
 PERSISTENT = 16
-"""Number of targets out of step in a row after which only these count."""
+"""Number of consecutive targets that deviate from the estimates after which older targets are forgotten."""
 SAME_PERIOD = (0.6, 1.6)
-"""Range of the mean of the last `PERSISTENT` intervals within which the period has not changed [periods]."""
+"""Range of the mean of the last `PERSISTENT` intervals for which the period counts as unchanged [periods]."""
 SHORTEST_WAY = 0.05
-"""Least time from one target to the next as they are played [ticks]."""
+"""Smallest interval with which two targets are played [ticks]."""
 LEAST_AHEAD = 0.25
 """Smallest delay between arrival and playing of a target [ticks]."""
 
 
 class Playout(NamedTuple):
-    """When to play a target.
+    """Schedule of one target; times are in ticks of the world.
 
     Attributes:
-        start: When to leave the target before [ticks].
-        end: When to be at this one [ticks].
-        period: Period of the stream [ticks], 0 if the target is not part of a stream.
-        speed: Time between this target and the one before as they were sent, over that as they are played.
-        pace: Mean time between the last targets as they came [ticks].
-        gap: Time by which the target came later than set points continue without it [ticks].
-        apart: Time between this target and the one before by their stamps or arrivals [ticks], 0 if it is unknown.
+        start: Time at which set points leave the previous target [ticks].
+        end: Time at which set points reach this target [ticks].
+        period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
+        speed: Ratio of the interval since the previous target as sent to the same interval as played.
+        pace: Mean interval between the arrivals of recent targets [ticks].
+        gap: Time between the end of extrapolation and the arrival of this target [ticks]; 0 if it arrived earlier.
+        apart: Interval since the previous target by stamps or arrivals [ticks]; 0 if unknown.
     """
 
     start: float
@@ -69,17 +69,19 @@ class Playout(NamedTuple):
 
 
 class JitterBuffer:
-    """Delays the targets of a stream such that they are played at the intervals at which they were meant.
+    """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
 
-    Two kinds of send times compete. Stamps are those of irregular samples; without valid stamps, arrivals replace them.
-    A regular period, fitted to them, is that of samples which a busy machine sends late. Those on which positions lie
-    more smoothly are used. Delays are one-sided, so the promptest of the last arrivals counts as undelayed; the buffer
-    comes on top. The delay follows changes slowly, except where a target is too late for it.
+    Send times are estimated in two ways. The first way takes the stamps, or the arrivals if stamps are not valid; this
+    suits samples at irregular intervals. The second way fits a regular period to the times of the first; this suits
+    regular samples that a busy machine sends late. The way for which positions over time are smoother is used.
+
+    Delays are never negative, so the arrival with the smallest delay in the window is the reference without delay. The
+    buffer delay is added to the reference. The total delay changes slowly, except if a target comes too late for it.
 
     Args:
         dt_s: Length of a tick [s].
-        buffer_s: Delay in which late targets are still in time [s], one and a half ticks of waiting included; with 0,
-            targets are played as they come.
+        buffer_s: Buffer delay [s], which includes one and a half ticks of waiting. A target that arrives late by less
+            than the delay is still played on time. 0 plays targets as they come.
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
@@ -87,13 +89,13 @@ class JitterBuffer:
         self._buffer = max(buffer_s / dt_s - 1.5, 0.0)
         self._settling = SETTLING_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
-        """Time for which a stream continues at its last velocity when the next target is too late [ticks]."""
+        """Time for which set points continue at their last velocity if the next target is late [ticks]."""
         self._longest = LONGEST_PERIOD_S / dt_s
         self._sender = SenderClock(dt_s)
         self._seen: deque[Arrival] = deque(maxlen=WINDOW)
         self._start = self._end = 0.0
         self._pace = 0.0
-        """Mean time between targets as they came [ticks]; 0 if all of them came before the same tick."""
+        """Mean interval between arrivals [ticks]; 0 if all targets came before the same tick."""
         self._restart()
 
     def _restart(self) -> None:
@@ -107,11 +109,12 @@ class JitterBuffer:
         self._out_of_step = 0
 
     def add(self, tick: int, stamp_ns: int, goal: Mapping[int, float]) -> Playout:
-        """Adds a target that comes before a tick.
+        """Adds a target, and returns its schedule.
 
         Args:
-            stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
-            goal: Positions by joint index [rad or m].
+            tick: Number of the tick before which the target came.
+            stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+            goal: Target positions [rad or m], keyed by joint index.
         """
         if self._seen and self._is_apart(tick, stamp_ns):
             self._restart()
@@ -144,13 +147,16 @@ class JitterBuffer:
         return playout._replace(apart=times[-1] - times[-2])
 
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
-        """Returns whether a target comes, or was sent by a right clock, too long after the last one for a stream."""
+        """Returns whether the interval since the last target is too long for a stream, by arrivals or valid stamps."""
         last = self._seen[-1]
         sent_ticks = self._sender.ticks_between(last.stamp_ns, stamp_ns) if self._sender.is_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
 
     def _at_every_tick(self, tick: int, interval: float) -> Playout:
-        """Returns when to play a target that comes alone, or at every tick: at once, or after the rest of a stream."""
+        """Schedules a target that comes alone or at every tick.
+
+        The target acts at once, or after the targets that are still to be played.
+        """
         self._interval = 0.0
         if self._end - tick <= EVERY_TICK or not self._pace:
             self._end = float(tick)
@@ -160,15 +166,22 @@ class JitterBuffer:
         return Playout(self._start, self._end, 2.0 * EVERY_TICK, pace=self._pace)
 
     def _least_way(self, tick: int) -> float:
-        """Returns the least time from the target before to the newest as they are played [ticks].
+        """Returns the smallest interval with which the newest target may follow the previous one when played [ticks].
 
-        While the rest of a stream is still to be played, a burst takes at least half of the time that so many targets
-        usually take.
+        While earlier targets are still to be played, the interval is 0.4 of the mean interval or longer. This limits
+        the speed of a burst.
         """
         return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
-        """Returns when to play the newest target, which is as near to the planned time as the delay may change."""
+        """Schedules the newest target as near to its planned time as the delay may change.
+
+        Args:
+            tick: Number of the tick before which the target came.
+            planned: Time to play the target by the present estimates [ticks].
+            interval: Estimated interval since the previous target was sent [ticks].
+            period: Estimated period of the stream [ticks].
+        """
         before = self._end
         if self._count == 2:
             way = max(SHORTEST * interval, self._least_way(tick))
@@ -189,9 +202,9 @@ class JitterBuffer:
         return Playout(before, end, period, interval / (end - before), self._pace, gap)
 
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
-        """Returns when the newest target would have come without a delay, from its arrival [ticks].
+        """Estimates when the newest target would have come without delay, relative to its arrival [ticks].
 
-        Even the promptest is a little late: the bound of uniform delays is estimated without bias.
+        The smallest delay in the window is not quite zero; an unbiased estimate for uniform delays corrects this.
         """
         tick, scale, sent = self._seen[-1].tick, self._rate, times
         if regular:
@@ -203,14 +216,14 @@ class JitterBuffer:
         return undelayed
 
     def _steps(self) -> list[int]:
-        """Returns the number of periods from the newest target to each."""
+        """Returns each target's number of periods relative to the newest target, 0 or negative."""
         steps = [0]
         for each in list(self._seen)[:0:-1]:
             steps.append(steps[-1] - each.step)
         return steps[::-1]
 
     def _fit(self, times: Sequence[float], steps: Sequence[int], is_stamped: bool) -> None:
-        """Estimates the period, and how fast the world runs by stamps."""
+        """Updates the estimates of the period, and of the world's rate relative to the sender's clock."""
         is_full = len(times) == WINDOW
         share = 1.0 / WINDOW if is_full and self._interval else 1.0
         self._interval += share * (_slope(steps, times) - self._interval)
@@ -222,7 +235,7 @@ class JitterBuffer:
             self._rate += share * (min(max(rate, 1.0 - DRIFT), 1.0 + DRIFT) - self._rate)
 
     def _is_out_of_step(self, times: Sequence[float]) -> bool:
-        """Returns whether the period has changed, or targets have become later for good."""
+        """Returns whether the period has changed, or the delay has grown permanently."""
         if self._out_of_step >= PERSISTENT:
             return True
         lowest, highest = SAME_PERIOD
@@ -231,7 +244,7 @@ class JitterBuffer:
         return min(steps) > 1 or not lowest < mean_interval / self._interval < highest
 
     def _forget(self) -> None:
-        """Forgets all but the newest targets."""
+        """Forgets all targets except the newest `PERSISTENT`."""
         newest = list(self._seen)[-PERSISTENT:]
         self._seen.clear()
         self._seen.extend(each._replace(step=1) for each in newest)
@@ -239,7 +252,10 @@ class JitterBuffer:
         self._out_of_step = 0
 
     def _count_lost(self, times: Sequence[float]) -> None:
-        """Counts targets lost before the newest one, judged by its positions; otherwise it is late."""
+        """Decides from positions whether targets were lost before the newest one, and if so, counts them.
+
+        If no targets were lost, the newest target is late.
+        """
         periods = round((times[-1] - times[-2]) / self._interval)
         if not 1 < periods <= MAX_LOST:
             return
@@ -249,7 +265,7 @@ class JitterBuffer:
             self._seen[-1] = last[-1]._replace(step=periods)
 
     def _compare(self, times: Sequence[float], steps: Sequence[int]) -> None:
-        """Chooses between stamps (or arrivals) and a regular period."""
+        """Chooses between stamps (or arrivals) and a regular period, by the smoothness of positions over time."""
         last = list(self._seen)[-4:]
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):
@@ -264,10 +280,11 @@ class JitterBuffer:
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Returns the slope of the line that lies under all points and nearest to them on average.
+    """Returns the slope of the line below all points that has the smallest mean distance to the points.
 
-    That is the best estimate if delays are one-sided (Moon, Skelly, Towsley: Estimation and removal of clock skew from
-    network delay measurements, INFOCOM 1999). The line runs along the lower convex hull, below the mean of x.
+    This line is the best estimate if delays are never negative (Moon, Skelly, Towsley: Estimation and removal of clock
+    skew from network delay measurements, INFOCOM 1999). The line contains the edge of the lower convex hull at the mean
+    of x.
     """
     hull: list[tuple[float, float]] = []
     for point in zip(x, y):
@@ -284,7 +301,10 @@ def _rise(first: tuple[float, float], last: tuple[float, float]) -> float:
 
 
 def _misfit(times: Sequence[float], arrivals: Sequence[Arrival]) -> float:
-    """Returns how far the last of four targets is from the parabola through those before, squared; inf without one."""
+    """Returns the squared distance of the fourth target from the parabola through the first three, over time.
+
+    Returns infinity if the times of the first three targets do not increase.
+    """
     a, b, c, d = times
     if not a < b < c:
         return math.inf

@@ -1,4 +1,4 @@
-"""Send times of the targets of a stream: by their stamps, if these run as fast as the world's time."""
+"""Estimates when streamed targets were sent: by their stamps if the stamps are plausible, else by their arrivals."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 MAX_OFFSET_S = 0.1
-"""Largest difference between the times of the last targets by stamps and by arrivals [s]; `DRIFT` comes on top."""
+"""Largest difference between the window's durations by stamps and by arrivals [s], in addition to `DRIFT`."""
 DRIFT = 0.1
-"""Largest relative difference of rate between stamps and the world's time."""
+"""Largest relative difference between the rate of stamps and the rate of the world's time."""
 STALL_S = 1.0
-"""Longest stall of world or sender [s] after which the stamps of what comes at once are still used."""
+"""Longest stall of world or sender [s] after which the stamps of targets that arrive in a burst are still used."""
 
 
 class Arrival(NamedTuple):
-    """A target that came.
+    """A received target.
 
     Attributes:
-        tick: The tick before which it came.
-        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
-        goal: Positions by joint index [rad or m].
-        step: Number of periods since the target before.
+        tick: Number of the tick before which the target came.
+        stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
+        goal: Target positions [rad or m], keyed by joint index.
+        step: Number of periods since the previous target.
     """
 
     tick: int
@@ -31,14 +31,14 @@ class Arrival(NamedTuple):
 
 
 class SenderClock:
-    """Decides whether the stamps of targets are used.
+    """Decides whether the stamps of targets are used as send times.
 
     Args:
         dt_s: Length of a tick [s].
 
     Attributes:
-        is_right: Whether stamps run as fast as the world's time; None while that is not known. Once they did not, it
-            is False until they do for as many targets as are kept.
+        is_right: Whether stamps run as fast as the world's time; None if unknown. After a deviation, the value is False
+            until the stamps of a full window agree with the world's time again.
     """
 
     def __init__(self, dt_s: float) -> None:
@@ -46,10 +46,10 @@ class SenderClock:
         self._max_offset = MAX_OFFSET_S / dt_s
         self.is_right: bool | None = None
         self._in_step_ns = 0
-        """The last stamp of a full window that ran as fast as the world's time [ns]."""
+        """Newest stamp of the last full window whose stamps ran as fast as the world's time [ns]."""
 
     def restart(self) -> None:
-        """Allows stamps again, since a new stream begins."""
+        """Allows stamps again, for a new stream."""
         self.is_right = self.is_right or None
 
     def ticks_between(self, first_ns: int, last_ns: int) -> float:
@@ -57,12 +57,13 @@ class SenderClock:
         return (last_ns - first_ns) / self._dt_ns
 
     def times(self, seen: deque[Arrival]) -> tuple[list[float], bool]:
-        """Returns when targets were sent by their stamps if these are used, else when they came, and which of both.
+        """Estimates the send times of targets, and returns also whether the times come from stamps.
 
-        Times are counted from the newest target [ticks].
+        Times are relative to the newest target [ticks], so they are 0 or negative. Without usable stamps, they are the
+        times of arrival.
 
         Args:
-            seen: The last targets, in a deque of limited length: a window.
+            seen: Window of the newest targets, a deque with a maximum length.
         """
         newest = seen[-1]
         arrivals = [float(each.tick - newest.tick) for each in seen]
@@ -71,7 +72,7 @@ class SenderClock:
         return (stamps, True) if rises and self._uses(stamps, arrivals, seen) else (arrivals, False)
 
     def _uses(self, stamps: Sequence[float], arrivals: Sequence[float], seen: deque[Arrival]) -> bool:
-        """Returns whether stamps run as fast as the world's time, apart from stalls."""
+        """Returns whether stamps run as fast as the world's time, or deviate because of a stall."""
         is_full = len(seen) == seen.maxlen
         is_in_step = abs(stamps[0] - arrivals[0]) <= self._max_offset - DRIFT * arrivals[0]
         if is_in_step and (is_full or self.is_right is not False):
@@ -83,8 +84,12 @@ class SenderClock:
         return bool(self.is_right)
 
     def _may_have_waited(self, first_ns: int, last_ns: int) -> bool:
-        """Returns whether targets that come too fast for their stamps may have waited for the world or the sender.
+        """Returns whether a stall of the world or the sender explains why stamps and arrivals disagree.
 
-        That is so until they have left the window.
+        A stall is accepted as the explanation until the targets that came after it have left the window.
+
+        Args:
+            first_ns: Oldest stamp in the window [ns].
+            last_ns: Newest stamp in the window [ns].
         """
         return 0 < last_ns - self._in_step_ns <= last_ns - first_ns + STALL_S * 1e9

@@ -1,4 +1,4 @@
-"""Motion between the targets of a stream: segments of a plan, and set points of bounded acceleration."""
+"""Motion between streamed targets: planned segments, and set points with bounded acceleration that follow the plan."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from .jitter_buffer import EVERY_TICK, LONGEST_PERIOD_S, SHORTEST, WINDOW
 from .sender_clock import STALL_S
 
 BRAKE_S = 0.15
-"""Time in which a motion comes to a stop when targets are late [s]."""
+"""Time in which a motion comes to a stop if targets are late [s]."""
 HEADROOM = 1.5
-"""Ratio of the largest acceleration of set points to that of the targets."""
+"""Ratio of the set points' largest acceleration to the targets' largest acceleration."""
 LAST = 6
-"""Number of targets whose accelerations count."""
+"""Number of recent targets from whose accelerations the bound is computed."""
 FADING = 0.97
-"""Share of the bound that is left at the next target while set points are off the plan, though targets hardly move."""
+"""Factor by which the acceleration bound falls at most per target, while set points deviate from the plan."""
 ROUNDING = 1e-9
-"""Difference of positions that is an error of rounding [rad or m]."""
+"""Difference of positions that counts as a rounding error [rad or m]."""
 
 
 class StreamSegment(NamedTuple):
-    """The motion of some joints from one target to the next: a cubic Hermite spline, or a line.
+    """Planned motion of some joints from one target to the next: a cubic Hermite polynomial or a line.
 
     Attributes:
-        start: Time of its beginning [ticks].
+        start: Start time [ticks].
         length: Duration [ticks].
-        goal: Positions at its end by joint index [rad or m].
-        way: Distances from its beginning by joint index [rad or m].
-        slopes: Velocities at both ends by joint index [rad or m per tick], None if it is a line.
-        is_beyond: Whether it goes beyond the last target because the next one is late.
+        goal: Positions at the end of the segment [rad or m], keyed by joint index.
+        way: Displacements from start to end [rad or m], keyed by joint index.
+        slopes: Velocities at start and end [rad or m per tick], keyed by joint index; None for a line.
+        is_beyond: Whether the segment extrapolates beyond the last target because the next target is late.
     """
 
     start: float
@@ -43,11 +43,11 @@ class StreamSegment(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Time of its goal [ticks]."""
+        """End time of the segment [ticks]."""
         return self.start + self.length
 
     def cut(self, tick: float) -> StreamSegment:
-        """Returns its part before a time; of length 0 if that is empty."""
+        """Returns the part of the segment before a time [ticks]; the part has length 0 if the time is too early."""
         length = max(tick - self.start, 0.0)
         basis = _hermite(length / self.length)
         way = {index: self.covered(index, basis) for index in self.way}
@@ -56,14 +56,24 @@ class StreamSegment(NamedTuple):
         return self._replace(length=length, goal=goal, way=way, slopes=slopes)
 
     def covered(self, index: int, basis: tuple[float, float, float]) -> float:
-        """Returns the displacement of a joint for the values, or averages, of the basis functions."""
+        """Returns the displacement of a joint from the segment's start [rad or m].
+
+        Args:
+            index: Joint index.
+            basis: Values that `basis` returned, plain or averaged.
+        """
         if self.slopes is None:
             return self.way[index] * (basis[0] + basis[1] + basis[2])
         first, last = self.slopes
         return self.way[index] * basis[0] + self.length * (first[index] * basis[1] + last[index] * basis[2])
 
     def basis(self, tick: float, window: float) -> tuple[float, float, float]:
-        """Returns the basis functions at a time, averaged over the window before it [ticks]."""
+        """Returns the values of the three Hermite basis functions, averaged over a window of time.
+
+        Args:
+            tick: End of the window [ticks].
+            window: Length of the window [ticks]; 0 for values at `tick` without averaging.
+        """
         share = (tick - self.start) / self.length
         if window <= 0.0:
             return _hermite(share)
@@ -72,7 +82,13 @@ class StreamSegment(NamedTuple):
         return (after[0] - before[0]) / width, (after[1] - before[1]) / width, (after[2] - before[2]) / width
 
     def velocity(self, tick: float) -> Mapping[int, float]:
-        """Returns the velocities by joint index at a time [rad or m per tick], outside of it those at its ends."""
+        """Returns velocities at a time [rad or m per tick], keyed by joint index.
+
+        Before the segment these are the velocities at its start, after the segment the velocities at its end.
+
+        Args:
+            tick: The time [ticks].
+        """
         if self.slopes is None:
             return {index: way / self.length for index, way in self.way.items()}
         u = min(max((tick - self.start) / self.length, 0.0), 1.0) if self.length else 0.0
@@ -82,7 +98,7 @@ class StreamSegment(NamedTuple):
         return {index: between * way + ends[index] for index, way in self.way.items()}
 
     def acceleration_at_end(self) -> Mapping[int, float]:
-        """Returns the accelerations at its end by joint index [rad or m per tick squared]."""
+        """Returns accelerations at the segment's end [rad or m per tick squared], keyed by joint index."""
         first, last = self.slopes or (self.velocity(self.end),) * 2
         return {
             index: (2.0 * first[index] + 4.0 * last[index] - 6.0 * way / self.length) / self.length
@@ -91,14 +107,18 @@ class StreamSegment(NamedTuple):
 
 
 def _hermite(share: float) -> tuple[float, float, float]:
-    """Returns the cubic Hermite basis of the way and of the slopes at both ends, constant before 0 and after 1."""
+    """Returns the cubic Hermite basis functions of the displacement, the start velocity and the end velocity.
+
+    Args:
+        share: Time as a share of the segment's duration, clipped to 0 ... 1.
+    """
     u = min(max(share, 0.0), 1.0)
     rest = 1.0 - u
     return u * u * (3.0 - 2.0 * u), u * rest * rest, -u * u * rest
 
 
 def _hermite_integral(share: float) -> tuple[float, float, float]:
-    """Returns the integrals of the Hermite basis from 0."""
+    """Returns the integrals of the three Hermite basis functions from 0 to `share`."""
     u = min(max(share, 0.0), 1.0)
     square = u * u
     beyond = max(share - 1.0, 0.0)
@@ -110,7 +130,16 @@ def _hermite_integral(share: float) -> tuple[float, float, float]:
 
 
 def agree(way: Mapping[int, float], length: float, first: Mapping[int, float], last: Mapping[int, float]) -> bool:
-    """Returns whether velocities fit the displacement; many senders fill them with zeros."""
+    """Returns whether the velocities of targets are consistent with the displacement between the targets.
+
+    Many senders fill velocities with zeros.
+
+    Args:
+        way: Displacements [rad or m], keyed by joint index.
+        length: Time between the targets [ticks].
+        first: Velocities at the first target [rad or m per tick], keyed by joint index.
+        last: Velocities at the last target [rad or m per tick], keyed by joint index.
+    """
     return all(
         abs(distance - length * (first[index] + last[index]) / 2.0)
         <= length * max(abs(first[index]), abs(last[index])) / 2.0 + 1e-9
@@ -119,17 +148,17 @@ def agree(way: Mapping[int, float], length: float, first: Mapping[int, float], l
 
 
 class BoundedMotion:
-    """Follows a planned motion, exactly where it accelerates no more than its targets.
+    """Computes set points that follow a plan with bounded acceleration.
 
-    A plan changes its velocity at once when late targets come. Set points then leave it, and join it again by bounded
-    accelerations. The bound comes from the targets and their mean period, which no delay changes much; a motion may
-    always brake within `BRAKE_S`.
+    The plan's velocity jumps if targets come late. The set points then leave the plan and rejoin it with bounded
+    accelerations. Elsewhere they follow the plan exactly. The bound is computed from the targets and their mean period,
+    which delays hardly change. A larger deceleration is allowed if the motion needs it to stop within `BRAKE_S`.
 
     Args:
-        held: Positions by joint index [rad or m].
+        held: Initial positions [rad or m], keyed by joint index.
         dt_s: Length of a tick [s].
-        is_bounded: Whether accelerations are bounded; if not, the plan is followed exactly.
-        limited: Returns a position of a joint by index within its limits.
+        is_bounded: Whether accelerations are bounded. If not, set points equal the plan.
+        limited: Function from a joint index and a position to the position clipped to the joint's limits.
 
     Attributes:
         brake: Time in which a motion comes to a stop [ticks].
@@ -143,29 +172,38 @@ class BoundedMotion:
         self._longest_period, self._longest_stall = LONGEST_PERIOD_S / dt_s, STALL_S / dt_s
         self._arrivals: deque[int] = deque(maxlen=WINDOW)
         self._period = self._elapsed = 0.0
-        """Mean time between the last targets, and time between the last two [ticks]."""
+        """Mean interval between recent targets, and interval between the last two targets [ticks]."""
         self._last: deque[Mapping[int, float]] = deque(maxlen=LAST)
-        """Bounds of acceleration by the last targets by joint index [rad or m per tick squared]."""
+        """One mapping per recent target: acceleration bounds [rad or m per tick squared], keyed by joint index."""
         self.restart(held, {})
 
     def restart(self, positions: Mapping[int, float], velocities: Mapping[int, float]) -> None:
-        """Starts again at positions, with velocities [rad or m per tick] if there are any."""
+        """Restarts plan and set points.
+
+        Args:
+            positions: Positions [rad or m], keyed by joint index.
+            velocities: Velocities [rad or m per tick], keyed by joint index; empty for rest.
+        """
         self._planned = self._positions = positions
         self._ways: Mapping[int, float] = dict.fromkeys(positions, 0.0)
         self._velocities = velocities or self._ways
         self._apart = 1.0
-        """Time in which the last target was reached from the one before [ticks]."""
+        """Interval between the last two targets [ticks]."""
         self._last.clear()
         self._bounds: Mapping[int, float] = dict.fromkeys(positions, ROUNDING)
 
     def jump(self, planned: Mapping[int, float]) -> None:
-        """Lets the plan continue at other positions; set points follow with bounded acceleration."""
+        """Moves the plan to new positions without moving the set points, which follow with bounded acceleration."""
         self._planned = planned
 
     def is_under_way(self, tick: int) -> bool:
-        """Returns whether a target that comes before a tick continues a motion, and notes its arrival.
+        """Records the arrival of a target, and returns whether the target continues a motion.
 
-        That is so within a stream, and after a stall in its midst. Targets at every tick are no such stream.
+        A target continues a motion within a stream, also after a stall of the stream. Targets that come at every tick
+        do not count as a stream.
+
+        Args:
+            tick: Number of the tick before which the target came.
         """
         longest = self._longest_stall if any(self._ways.values()) else self._longest_period
         if self._arrivals and tick - self._arrivals[-1] > longest:
@@ -176,14 +214,15 @@ class BoundedMotion:
         return self._is_bounded and self._period > EVERY_TICK
 
     def add(self, ways: Mapping[int, float], apart: float, corner: float) -> None:
-        """Adds a target.
+        """Adds a target, and updates the acceleration bounds.
 
-        Its acceleration is the smaller one of two: by the time from the target before, and by the mean period.
+        Each target's acceleration is estimated from the interval since the previous target, and again from the mean
+        period. The smaller estimate counts.
 
         Args:
-            ways: Distances from the target before by joint index [rad or m].
-            apart: Time from the target before by their stamps [ticks], 0 for the time between their arrivals.
-            corner: Time in which the velocity before changes to that after it [ticks], 0 for the period.
+            ways: Displacements from the previous target [rad or m], keyed by joint index.
+            apart: Interval since the previous target by stamps [ticks]; 0 to use the interval between arrivals.
+            corner: Time in which the plan changes its velocity at the previous target [ticks]; 0 for the period.
         """
         period = max(self._period, EVERY_TICK)
         apart = apart or max(self._elapsed, EVERY_TICK)
@@ -199,13 +238,24 @@ class BoundedMotion:
         self._bounds = {index: self._bound(index) for index in bounds}
 
     def _bound(self, index: int) -> float:
-        """Returns the bound of a joint, which fades slowly while the joint is off its plan, and stays at rest."""
+        """Returns the new acceleration bound of a joint [rad or m per tick squared].
+
+        While the joint deviates from the plan, the bound falls slowly at most. Otherwise the recent targets determine
+        the bound, or the bound remains unchanged if these targets are equal.
+        """
         latest, before = max(each[index] for each in self._last), self._bounds[index]
         is_off = self._positions[index] != self._planned[index]
         return max(latest, FADING * before) if is_off else latest or before
 
     def advance(self, planned: Mapping[int, float]) -> Mapping[int, float]:
-        """Advances by a tick, after which the plan is at positions, and returns those of the motion by joint index."""
+        """Advances the set points by one tick, and returns them.
+
+        Args:
+            planned: Positions of the plan at the end of the tick [rad or m], keyed by joint index.
+
+        Returns:
+            Set points at the end of the tick [rad or m], keyed by joint index.
+        """
         if not self._is_bounded:
             return planned
         positions = {}
@@ -227,5 +277,10 @@ class BoundedMotion:
 
 
 def _stoppable(distance: float, bound: float) -> float:
-    """Returns the largest way in a tick after which a motion can still stop at a distance."""
+    """Returns the largest displacement in one tick after which a motion can still stop within a distance.
+
+    Args:
+        distance: The distance [rad or m].
+        bound: Largest deceleration [rad or m per tick squared].
+    """
     return math.sqrt(bound * bound / 4.0 + bound * distance) - bound / 2.0

@@ -1,14 +1,14 @@
-"""Streams of position targets as smooth motions.
+"""Turns streams of position targets into smooth motions.
 
-Targets come at a lower rate than ticks. A motor would follow each step within a few ticks, with its full effort.
-Targets in quick succession are therefore knots: set points move along lines, each as long as the time between two
-targets, and a moving average over one period rounds the corners. For a regular stream that is a quadratic B-spline,
-which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period. The delay
-of the jitter buffer comes on top.
+Targets come at a lower rate than ticks. Without interpolation, a motor would follow each step of the targets within a
+few ticks, with full effort. Set points therefore move along a line from target to target, in the time between the two
+targets. A moving average over one period rounds the corners. For a regular stream, the result is a quadratic B-spline,
+which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period. The jitter
+buffer adds its delay.
 
-A target that is too late even for the buffer must not stop the robot from full speed. The set points continue at the
-last velocity for a while, then slow down and come back to the last target. Where that plan changes its velocity at
-once, as when late targets come, the set points follow it with the accelerations of a `BoundedMotion`.
+If a target is too late even for the buffer, the robot must not stop abruptly. The set points continue at their last
+velocity for a while, then slow down and return to the last target. When the late target comes, the velocity of this
+plan jumps. A `BoundedMotion` then limits the accelerations of the set points.
 """
 
 from __future__ import annotations
@@ -24,22 +24,24 @@ from .stream_motion import BoundedMotion, StreamSegment, agree
 log = logging.getLogger(__name__)
 
 ADAPTATION_PERIODS = 4.0
-"""Time constant with which the window of the moving average follows the period [periods]."""
+"""Time constant with which the length of the moving average follows the period [periods]."""
 SHORT_SEGMENT = 0.5
-"""Length of a segment, as a share of the time between targets, below which its velocity is not extrapolated."""
+"""Duration of a segment, as a share of the period, below which the segment's velocity is not extrapolated."""
 SAME_TIME = 1e-9
-"""Difference of times that is an error of rounding [ticks]."""
+"""Difference of times that counts as a rounding error [ticks]."""
 QUIET_S = 60.0
-"""Time after a warning of late targets without another [s] of the world's time."""
+"""Shortest interval between two warnings about late targets [s] of the world's time."""
 
 
 class TargetStream:
-    """The targets of some joints that always come together.
+    """Computes set points for a group of joints whose targets always come together.
 
     Args:
-        held: Where the joints are held now by index [rad or m].
-        smooth: Whether lines are averaged.
-        limited: Returns a position of a joint by index within its limits; None without limits.
+        buffer: Jitter buffer of the stream.
+        held: Initial set points [rad or m], keyed by joint index.
+        smooth: Whether a moving average rounds the corners between lines.
+        limited: Function from a joint index and a position to the position clipped to the joint's limits. None does not
+            clip.
     """
 
     def __init__(
@@ -55,24 +57,28 @@ class TargetStream:
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
         self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
-        """Velocities at the last targets by joint index [rad or m per tick]; none after a shortened segment."""
+        """Velocities at up to three recent targets [rad or m per tick], keyed by joint index.
+
+        Emptied after a shortened segment.
+        """
         self._period = 0.0
         self._window = self._lagging_window = self._wanted_window = 0.0
         self._motion = BoundedMotion(held, buffer.dt_s, buffer.has_delay, self._limited)
         self.set_points = held
-        """Present set points by joint index [rad or m]."""
+        """Present set points [rad or m], keyed by joint index."""
         self.gap = 0.0
-        """Time for which the motion had stopped before the newest target, which came too late [ticks]."""
+        """Time between the end of extrapolation and the newest target [ticks]; 0 if the target came earlier."""
         self.rests = True
-        """Whether there is nothing to do until the next target."""
+        """Whether set points do not move until the next target."""
 
     def push(self, tick: int, goal: Mapping[int, float], slopes: Mapping[int, float], stamp_ns: int) -> None:
-        """Adds a target that comes before a tick.
+        """Adds a target.
 
         Args:
-            goal: Positions by joint index [rad or m].
-            slopes: Velocities by joint index [rad or m per tick]; may be empty.
-            stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
+            tick: Number of the tick before which the target came.
+            goal: Target positions [rad or m], keyed by joint index.
+            slopes: Velocities at the target positions [rad or m per tick], keyed by joint index; may be empty.
+            stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
         """
         playout = self.buffer.add(tick, stamp_ns, goal)
         self.gap = playout.gap
@@ -110,7 +116,7 @@ class TargetStream:
     def _append(
         self, start: float, end: float, goal: Mapping[int, float], slopes: Mapping[int, float]
     ) -> StreamSegment:
-        """Appends the segment to a target, and drops all segments beyond its start."""
+        """Appends and returns the segment to a target; cuts earlier segments off at the new segment's start."""
         segments = self._segments
         leaving, before = self._goal, self._slopes or None
         while segments and segments[-1].end > start + SAME_TIME:
@@ -126,7 +132,11 @@ class TargetStream:
         return segments[-1]
 
     def advance(self, tick: float) -> Mapping[int, float]:
-        """Advances to a time, and returns the positions then by joint index [rad or m]."""
+        """Advances the set points to a time [ticks], and returns them [rad or m], keyed by joint index.
+
+        Set points are clipped to the joints' limits if targets have velocities or accelerations are bounded. Otherwise
+        they lie between targets.
+        """
         segments = self._segments
         if segments and segments[-1].end <= tick and not segments[-1].is_beyond:
             self._go_beyond()
@@ -140,7 +150,7 @@ class TargetStream:
             basis = segment.basis(tick, self._window)
             for index in positions:
                 positions[index] += segment.covered(index, basis)
-        if any(segment.slopes is not None for segment in segments):  # cubics may leave the hull of their targets
+        if any(segment.slopes is not None for segment in segments):  # a cubic may overshoot its targets
             positions = {index: self._limited(index, value) for index, value in positions.items()}
         self.set_points = self._motion.advance(positions)
         return self.set_points
@@ -149,7 +159,7 @@ class TargetStream:
         return value if self._limits is None else self._limits(index, value)
 
     def _adapt_window(self) -> None:
-        """Changes the window slowly, since its changes move the set points: a low-pass of second order."""
+        """Changes the length of the moving average by a second-order low-pass, since each change moves set points."""
         share = 1.0 / max(ADAPTATION_PERIODS * self._period, 1.0)
         self._lagging_window += share * (self._wanted_window - self._lagging_window)
         self._window += share * (self._lagging_window - self._window)
@@ -157,7 +167,7 @@ class TargetStream:
             self._window = self._lagging_window = self._wanted_window
 
     def _go_beyond(self) -> None:
-        """Extrapolates from the last target at its velocity, slows down and returns to it."""
+        """Appends segments that continue beyond the last target, slow down and return to the last target."""
         last, length = self._segments[-1], self.buffer.extrapolation
         if last.slopes is None:
             first = then = {index: self._next_velocity(index) for index in last.way}
@@ -177,7 +187,14 @@ class TargetStream:
     def _extend(
         self, length: float, way: Mapping[int, float], first: Mapping[int, float], last: Mapping[int, float]
     ) -> None:
-        """Appends a cubic beyond the last target; joints stop at their limits."""
+        """Appends a cubic segment beyond the last target; joints stop at their limits.
+
+        Args:
+            length: Duration of the segment [ticks].
+            way: Displacements [rad or m], keyed by joint index.
+            first: Velocities at the start [rad or m per tick], keyed by joint index.
+            last: Velocities at the end [rad or m per tick], keyed by joint index.
+        """
         before = self._segments[-1]
         goal = {index: self._limited(index, value + way[index]) for index, value in before.goal.items()}
         stopped = {index for index, value in before.goal.items() if goal[index] != value + way[index]}
@@ -186,7 +203,7 @@ class TargetStream:
         self._segments.append(StreamSegment(before.end, length, goal, within, (slopes[0], slopes[1]), True))
 
     def _next_velocity(self, index: int) -> float:
-        """Returns the velocity of a line to the next target as far as the last three ways agree on it, else 0."""
+        """Predicts the velocity to the next target from the last three velocities; 0 if these are inconsistent."""
         if len(self._velocities) < 3:
             return 0.0
         first, second, third = (each[index] for each in self._velocities)
@@ -195,25 +212,26 @@ class TargetStream:
 
 
 def _lesser(a: float, b: float) -> float:
-    """Returns the smaller one of two numbers of the same sign, else 0."""
+    """Returns the number with the smaller magnitude if both have the same sign, else 0."""
     return 0.0 if a * b <= 0.0 else min(a, b, key=abs)
 
 
 class TargetStreams:
-    """Follows the position targets of one robot; joints whose targets come together are a stream.
+    """Follows the position targets of one robot. Joints whose targets come together share a stream.
 
     Args:
-        name: The robot, for messages.
+        motors: The robot's motors.
+        name: Name of the robot, for messages.
         dt_s: Length of a tick [s].
-        smooth: Whether corners are rounded.
-        buffer_s: Delay in which late targets are still in time [s].
+        smooth: Whether a moving average rounds the corners between targets.
+        buffer_s: Delay of the jitter buffer [s]; 0 plays targets as they come.
     """
 
     def __init__(self, motors: Motors, name: str, dt_s: float, smooth: bool, buffer_s: float) -> None:
         self._motors, self._name, self._dt_s = motors, name, dt_s
         self._smooth, self._buffer_s = smooth, buffer_s
         self._quiet_until = 0
-        """Tick from which late targets are reported again."""
+        """Tick from which the next late target is reported."""
         self._waiting: tuple[ResolvedCommand, ...] = ()
         self._streams: dict[frozenset[int], TargetStream] = {}
 
@@ -231,30 +249,35 @@ class TargetStreams:
 
     @property
     def rest(self) -> bool:
-        """Whether there is nothing to do until the next target."""
+        """Whether no target waits, and no stream moves its set points."""
         return not self._waiting and all(stream.rests for stream in self._streams.values())
 
     def follow(self, commands: Iterable[ResolvedCommand]) -> None:
-        """Follows targets from the coming tick on."""
+        """Queues targets for the next tick."""
         for command in commands:
             self._waiting = coalesce(self._waiting, (command,))
 
     def drop(self, joints: Iterable[int]) -> None:
-        """Drops the streams of joints that get another driver; other joints of these streams hold."""
+        """Drops the streams that contain given joints; the other joints of these streams hold.
+
+        Args:
+            joints: Indices of joints that are driven from elsewhere now.
+        """
         dropped = set(joints)
         for key in [key for key in self._streams if key & dropped]:
             self._motors.release(self._streams.pop(key).joints - dropped)
 
     def clear(self) -> None:
-        """Drops all targets; the joints hold."""
+        """Drops all streams and waiting targets; the joints hold."""
         self._waiting = ()
         self.drop(frozenset().union(*self._streams))
 
     def advance(self, tick: int, driven: frozenset[int]) -> None:
-        """Sets the motors for a tick.
+        """Advances all streams by a tick, and commands the motors.
 
         Args:
-            driven: Joints that a motion drives; targets for them are dropped.
+            tick: Number of the coming tick.
+            driven: Indices of joints that a motion drives; targets of these joints are dropped.
         """
         if self._waiting:
             for command in self._waiting:

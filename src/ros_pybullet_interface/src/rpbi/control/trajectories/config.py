@@ -1,4 +1,4 @@
-"""Keys of a robot's trajectory controller; names as in ros_controllers' JointTrajectoryController."""
+"""Configuration of a robot's trajectory controller, with key names as in ros_controllers' JointTrajectoryController."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any
@@ -34,7 +34,7 @@ class TrajectoryConstraints(ConfigModel):
     @model_validator(mode="before")
     @classmethod
     def _joints_have_mappings(cls, data: Any) -> Any:
-        """Refuses a number under an unknown key as a misspelt key, rather than as a joint without its mapping."""
+        """Reports an unknown key with a plain value as a misspelt key, rather than as a joint's invalid constraints."""
         for key, value in data.items() if isinstance(data, dict) else ():
             if key not in cls.model_fields and not isinstance(value, (dict, JointConstraints)):
                 raise KeyedError(key, f"unknown key '{key}'{hint(key, cls.model_fields)}; joints have mappings")
@@ -42,7 +42,7 @@ class TrajectoryConstraints(ConfigModel):
 
     @property
     def by_joint(self) -> dict[str, JointConstraints]:
-        """The constraints of single joints by name."""
+        """The constraints of single joints, keyed by joint name."""
         return self.__pydantic_extra__
 
 
@@ -64,7 +64,13 @@ class JointTrajectoryControllerConfig(ConfigModel):
 def trajectory_problems(
     name: str, config: JointTrajectoryControllerConfig | None, driven: Iterable[str]
 ) -> list[Problem]:
-    """Returns what in the configuration does not fit a robot; `driven` names the joints that can be driven."""
+    """Returns the problems of a configuration for a robot.
+
+    Args:
+        name: Name of the robot.
+        config: The configuration; None has no problems.
+        driven: Names of the robot's joints that motors can drive.
+    """
     if config is None:
         return []
     known = set(driven)

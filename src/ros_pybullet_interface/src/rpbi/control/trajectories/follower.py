@@ -1,4 +1,4 @@
-"""The follower of a robot's trajectories."""
+"""Makes a robot follow joint trajectories."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
@@ -24,12 +24,12 @@ from .trajectory import DesiredState, Knot, Trajectory, TrajectoryStateSample
 
 
 class CheckedRequest(NamedTuple):
-    """A trajectory that can be followed, unless the robot's state forbids it.
+    """A trajectory that passed all checks that do not need the robot's state.
 
     Attributes:
-        joint_trajectories: Trajectories of the joints that it names; none to stop and hold.
-        stamp_ns: Stamp of its start [ns]; 0 is now.
-        tolerances: Tolerances; None checks nothing.
+        joint_trajectories: One trajectory for each named joint; empty to stop and hold.
+        stamp_ns: Start time, in the world's stamps [ns]; 0 to start at once.
+        tolerances: Tolerances; None to check no tolerances.
     """
 
     joint_trajectories: tuple[JointTrajectory, ...]
@@ -38,10 +38,10 @@ class CheckedRequest(NamedTuple):
 
 
 class TrajectoryFollower:
-    """Makes a robot follow trajectories, one after another or spliced into each other.
+    """Makes a robot follow trajectories. A new trajectory is spliced onto the present one at its start time.
 
     Attributes:
-        joint_names: The joints that it drives.
+        joint_names: Names of the joints that the follower drives.
     """
 
     def __init__(self, drive: JointDrive, config: JointTrajectoryControllerConfig) -> None:
@@ -53,13 +53,14 @@ class TrajectoryFollower:
         self.joint_names = tuple(self._joints)
 
     def check(self, request: TrajectoryRequest, tolerances: GoalTolerances | None = None) -> CheckedRequest:
-        """Checks a trajectory as far as possible without the state of the robot; any thread may call it.
+        """Checks a trajectory as far as possible without the robot's state. Any thread may call this method.
 
         Args:
-            tolerances: Tolerances; without them nothing is checked.
+            request: The trajectory.
+            tolerances: Tolerances for `follow`; None to follow without tolerances.
 
         Raises:
-            TrajectoryRefusedError: If it cannot be followed.
+            TrajectoryRefusedError: If the trajectory or a tolerance is invalid.
         """
         joint_trajectories = validate_trajectory(request, self._joints, self.config.allow_partial_joints_goal)
         resolved = None
@@ -70,16 +71,19 @@ class TrajectoryFollower:
     def follow(
         self, request: CheckedRequest, clock: Clock, feedback: Callable[[TrajectoryStateSample], None] | None = None
     ) -> TrajectoryMotion:
-        """Starts to follow a trajectory, at once or at its start time; the one before is preempted.
+        """Starts a motion that follows a trajectory, and returns the motion. The present motion is preempted.
 
-        Joints that it leaves out continue theirs.
+        Until the start time, the joints continue their present trajectories. Joints that the request leaves out
+        continue theirs to the end.
 
         Args:
             request: Result of `check`.
-            feedback: Called with the state at `action_monitor_rate` while the motion lasts.
+            clock: The world's clock.
+            feedback: Called with the follower's state at `action_monitor_rate` while the motion lasts.
 
         Raises:
-            TrajectoryRefusedError: If its time has passed, the joints cannot get to it, or the control mode forbids it.
+            TrajectoryRefusedError: If the trajectory's time has passed, a joint cannot reach the trajectory's next
+                point in time, the control mode is torque control, or a controller drives a joint.
         """
         now_s = clock.time_s
         start_s = now_s + (request.stamp_ns - clock.stamp_ns) / NS_PER_S if request.stamp_ns else now_s
@@ -101,11 +105,12 @@ class TrajectoryFollower:
         return motion
 
     def cancel(self, reason: str, clock: Clock, motion: TrajectoryMotion | None = None) -> None:
-        """Stops following; the joints stop and hold where they are.
+        """Ends the present motion: the joints stop within `stop_trajectory_duration` and hold.
 
         Args:
-            reason: Reason for the message of the result.
-            motion: Motion to stop, if it is still followed; without it, the present one.
+            reason: Reason for the message of the motion's result.
+            clock: The world's clock.
+            motion: Motion to end. If another motion is present, the call has no effect. None ends any present motion.
         """
         running = self._running
         if running is None or motion not in (None, running):
@@ -114,7 +119,12 @@ class TrajectoryFollower:
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
     def state(self, time_s: float, measured: JointMotion | None = None) -> TrajectoryStateSample:
-        """Returns desired and measured joint states at the present time of the world [s]."""
+        """Returns the follower's desired and measured joint states.
+
+        Args:
+            time_s: The world's present time [s].
+            measured: Measured state of all driven joints; None to measure now.
+        """
         running, measured = self._running, measured or self._drive.measured()
         return TrajectoryStateSample(
             self._drive.name,
@@ -126,7 +136,10 @@ class TrajectoryFollower:
         )
 
     def desired(self, time_s: float) -> DesiredState:
-        """Returns the desired state at a time of the world [s], by the present trajectories."""
+        """Returns the desired state of the follower's joints at a time of the world [s].
+
+        For joints without a trajectory, this is the motors' target under position control, else the measured position.
+        """
         running = self._running
         trajectories = {} if running is None else running.trajectories
         held: Mapping[int, float] = self._drive.motors.targets
@@ -160,10 +173,10 @@ class TrajectoryFollower:
         return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
-        """Starts a motion; `reason` is the message for the one before.
+        """Starts a motion, and preempts the present trajectory motion with a reason for its result.
 
         Raises:
-            TrajectoryRefusedError: If the control mode forbids it.
+            TrajectoryRefusedError: If the control mode is torque control, or a controller drives a joint.
         """
         running = self._running
         if running is not None:

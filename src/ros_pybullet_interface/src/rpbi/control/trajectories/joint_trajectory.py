@@ -1,4 +1,4 @@
-"""Trajectories of single joints: checked against the robot, and spliced onto the present motion."""
+"""Checks trajectories of single joints against the robot's limits, and splices them onto the present motion."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,24 +14,24 @@ from .request import ErrorCode, TrajectoryPoint, TrajectoryRefusedError, Traject
 from .trajectory import Knot, Trajectory
 
 CURVE_SPEED_SLACK = 1.05
-"""Largest speed of a curve between two points, as a multiple of the joint's limit; beyond it, it is refused.
+"""Largest accepted speed of a curve between two points, as a multiple of the joint's velocity limit.
 
-A curve through points that a planner has sampled, a tenth of a second apart, from a motion at the limit swings beyond
-it by 1 or 2 %. The motors hold the limit in any case.
+A planner may sample a motion at the velocity limit every tenth of a second. A curve through these points exceeds the
+limit by 1 or 2 %. The motors keep the limit in any case.
 """
 CURVE_POSITION_SLACK = 1e-3
-"""Largest swing of a curve beyond a joint's limits, between points within [rad or m]; beyond it, it is refused."""
+"""Largest accepted overshoot of a curve beyond a joint's limits, if the curve's points are within [rad or m]."""
 ROUNDING = 1.0 + 1e-6
 TURN = 2.0 * math.pi
 
 
 class JointTrajectory(NamedTuple):
-    """Trajectory of one joint, in times from its start.
+    """Trajectory of one joint; times are relative to the start of the trajectory.
 
     Attributes:
         joint: The joint.
-        knots: Its points.
-        trajectory: The trajectory through them.
+        knots: Points of the trajectory.
+        trajectory: Interpolation of the points.
     """
 
     joint: Joint
@@ -39,17 +39,18 @@ class JointTrajectory(NamedTuple):
     trajectory: Trajectory
 
     def spliced_onto(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
-        """Returns the present trajectory until a time, and this one from then on.
+        """Returns a trajectory that equals `current` until a transition time and continues with this trajectory.
 
-        Points up to that time are left out: the joint moves straight to the next one. A continuous joint takes the
-        shorter rotation.
+        Points up to the transition are left out: the joint moves from its state at the transition to the next point. A
+        continuous joint takes the shorter rotation.
 
         Args:
-            start_s: The world's time at which the trajectory's times begin [s].
-            from_s: Time of the transition [s]; there is a point after it.
+            current: The present trajectory, in the world's time.
+            start_s: The world's time at which this trajectory's times are 0 [s].
+            from_s: The world's time of the transition [s], before this trajectory's last point.
 
         Raises:
-            TrajectoryRefusedError: If the next point cannot be reached in time.
+            TrajectoryRefusedError: If the joint cannot reach the next point in time within its limits.
         """
         before = current.sample(from_s)
         number = next(i for i, knot in enumerate(self.knots) if start_s + knot.time_s > from_s)
@@ -79,10 +80,17 @@ class JointTrajectory(NamedTuple):
 def validate_trajectory(
     request: TrajectoryRequest, joints: Mapping[str, Joint], may_be_partial: bool
 ) -> tuple[JointTrajectory, ...]:
-    """Checks a trajectory as far as possible without the joint positions; any thread may call it.
+    """Checks a trajectory as far as possible without the robot's state, and splits it into one trajectory per joint.
+
+    Any thread may call this function.
+
+    Args:
+        request: The trajectory.
+        joints: Joints that the follower drives, keyed by name.
+        may_be_partial: Whether the trajectory may leave joints out.
 
     Raises:
-        TrajectoryRefusedError: If it cannot be followed.
+        TrajectoryRefusedError: If a name, a number, or a limit is violated.
     """
     _check_names(request, joints, may_be_partial)
     _check_points(request)
@@ -149,7 +157,7 @@ def _check_limits(joint: Joint, number: int, point: TrajectoryPoint, column: int
 
 
 def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
-    """Checks what happens between the points."""
+    """Checks speeds and positions between the points against the joint's limits."""
     positions = [segment.polynomials[0] for segment in trajectory.segments]
     velocities = [derivative(polynomial) for polynomial in positions]
     durations_s = np.diff([*(segment.start_s for segment in trajectory.segments), trajectory.end_s]).tolist()
@@ -166,7 +174,7 @@ def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
 
 
 def _beyond(polynomials: Sequence[Polynomial], durations_s: Sequence[float], lower: float, upper: float) -> list[int]:
-    """Returns which of many polynomials may leave a range; each of these needs an exact check."""
+    """Returns the indices of polynomials that may leave a range, and so need an exact check."""
     low, high = value_bounds(polynomials, durations_s)
     return [int(number) for number in ((low < lower) | (high > upper)).nonzero()[0]]
 

@@ -1,4 +1,4 @@
-"""Following trajectories tick by tick."""
+"""A motion that follows joint trajectories tick by tick."""
 
 from collections.abc import Callable, Mapping
 
@@ -10,22 +10,23 @@ from .trajectory import DesiredState, Knot, Trajectory
 
 
 class TrajectoryMotion(Motion):
-    """Follows a trajectory of each of some joints.
+    """Makes joints follow one trajectory each.
 
-    With tolerances it succeeds when the joints are at their goals; if a joint is too far off, it is aborted and the
-    joints stop. Without tolerances it ends without a verdict.
+    With tolerances, the motion succeeds when all joints are at their goals. If a joint exceeds a tolerance, the motion
+    fails and the joints stop. Without tolerances, the motion succeeds when the trajectories end.
 
     Args:
-        trajectories: The joints' trajectories, each of one joint, by joint index, in the world's time.
-        from_s: Time from which tolerances hold [s].
-        tolerances: Tolerances of the joints.
-        stop_s: Duration of the stop after an abort [s].
+        joints: The follower's joints, keyed by joint index.
+        trajectories: One trajectory per joint in the world's time, keyed by joint index.
+        from_s: The world's time from which path tolerances are checked [s].
+        tolerances: Tolerances; None to check no tolerances.
+        stop_s: Duration of the stop after a tolerance was exceeded [s]; 0 stops at once.
 
     Attributes:
-        code: Outcome.
-        preempted: Whether another request ended it.
-        desired: Set points at the end of the last tick, by joint index.
-        on_advance: Called at each tick with the world's time [s] and the state of the joints then.
+        code: Error code of the outcome, as of control_msgs/FollowJointTrajectoryResult.
+        preempted: Whether another request ended the motion.
+        desired: Desired states at the end of the last tick, keyed by joint index.
+        on_advance: Called at each tick with the world's time [s] and the measured joint states; None for no call.
     """
 
     can_wait = True
@@ -54,11 +55,11 @@ class TrajectoryMotion(Motion):
         self._fault = ""
 
     def begin(self, time_s: float, measured: JointMotion) -> None:
-        """Notes when it begins; the trajectories are in the world's time already."""
+        """Samples the trajectories at the world's present time [s]."""
         self._sample(time_s)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Checks the tolerances, and advances if they hold."""
+        """Checks the tolerances, and returns the set points of the tick; stops the joints if a check fails."""
         if self.on_advance is not None:
             self.on_advance(self._time_s, measured)
         if fault := self._path_problem(measured):
@@ -72,13 +73,13 @@ class TrajectoryMotion(Motion):
         return self._go_on(time_s)
 
     def preempt(self, reason: str) -> None:
-        """Ends because of another request; the joints are left unchanged."""
+        """Ends the motion because another request replaces it; the joints get no command."""
         if not self._fault:
             self.preempted, self.code = True, ErrorCode.SUCCESSFUL  # as in ros_controllers: no error
         self.end(False, self._fault or reason)
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends for a reason from outside; the result includes it and the errors of the joints."""
+        """Ends the motion as a failure. The result contains the reason and the measured joint positions."""
         state = ", ".join(f"{self._joints[i].name}={measured[i][0]:.6g}" for i in sorted(self.joints))
         self.end(False, self._fault or f"{reason}; state reached: {state}")
 
@@ -103,7 +104,7 @@ class TrajectoryMotion(Motion):
             self.end(True, "reached the end" if self._tolerances is None else "reached the goal within its tolerances")
 
     def _break_off(self, code: ErrorCode, fault: str, time_s: float, measured: JointMotion) -> JointMotion:
-        """Stops the joints where they are; with no time to stop in, it ends at once."""
+        """Replaces the trajectories by stops. If the duration of the stop is 0, ends the motion at once."""
         self.code, self._fault = code, f"{fault}; the joints stop and hold where they are"
         self.trajectories = {i: stopping(self._joints[i], measured[i], self._time_s, self._stop_s) for i in self.joints}
         self.end_s, self._tolerances = self._time_s + self._stop_s, None
@@ -115,13 +116,14 @@ class TrajectoryMotion(Motion):
     def _is_out_of_time(self, time_s: float) -> bool:
         """Returns whether the time to reach the goal is over.
 
-        It is one tick at least: a trajectory of positions alone arrives with a velocity, and stops only then.
+        This time is at least one tick. A trajectory without velocities still moves at its end, and needs the tick to
+        stop.
         """
         tick_s = time_s - self._time_s
         return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
 
     def _path_problem(self, measured: JointMotion) -> str:
-        """Returns the violation of a path tolerance, or an empty text."""
+        """Returns a description of the first violated path tolerance, or an empty string."""
         if self._tolerances is None or not self.from_s <= self._time_s < self.end_s:
             return ""
         return self._fault_in(self._tolerances.path, measured, "its trajectory")
@@ -141,12 +143,15 @@ class TrajectoryMotion(Motion):
 
 
 def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duration_s: float) -> Trajectory:
-    """Returns the stop of a joint with constant deceleration, within its limits.
+    """Returns a trajectory on which a joint stops, with constant deceleration unless a limit is in the way.
+
+    The end position is clipped to the joint's limits.
 
     Args:
-        measured: Its position [rad or m] and velocity [rad/s or m/s].
-        time_s: Now [s].
-        duration_s: Longest duration [s]; 0 is at once.
+        joint: The joint.
+        measured: Measured position [rad or m] and velocity [rad/s or m/s] of the joint.
+        time_s: The world's present time [s].
+        duration_s: Duration of the stop [s]; 0 to hold the measured position at once.
     """
     position, velocity = measured
     if not duration_s:

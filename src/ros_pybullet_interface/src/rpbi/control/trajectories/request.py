@@ -1,4 +1,4 @@
-"""Requests to follow trajectories: their points and tolerances, and reasons to refuse them."""
+"""Requests to follow trajectories, with points, tolerances and error codes."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from .config import JointConstraints, TrajectoryConstraints
 
 
 class ErrorCode(IntEnum):
-    """Outcome of a trajectory; numbers of control_msgs/FollowJointTrajectoryResult."""
+    """Outcome of a trajectory, with the numbers of control_msgs/FollowJointTrajectoryResult."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -23,7 +23,7 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryRefusedError(InterfaceError):
-    """A trajectory cannot be followed; nothing has moved."""
+    """A trajectory request was refused before any joint moved."""
 
     def __init__(self, message: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         self.code = code
@@ -36,8 +36,8 @@ class TrajectoryPoint(NamedTuple):
     Attributes:
         time_s: Time from the start of the trajectory [s].
         positions: n positions [rad or m].
-        velocities: n velocities [rad/s or m/s], or none.
-        accelerations: n accelerations [rad/s^2 or m/s^2], or none.
+        velocities: n velocities [rad/s or m/s], or empty.
+        accelerations: n accelerations [rad/s^2 or m/s^2], or empty.
     """
 
     time_s: float
@@ -47,11 +47,11 @@ class TrajectoryPoint(NamedTuple):
 
 
 class JointTolerance(NamedTuple):
-    """Tolerance of one joint; 0 is the configured one, less than 0 is no limit.
+    """Tolerances of one joint. In a request, 0 selects the configured tolerance, and a negative number sets no limit.
 
     Attributes:
-        position: Distance [rad or m].
-        velocity: Difference of velocities [rad/s or m/s].
+        position: Largest position error [rad or m].
+        velocity: Largest velocity error [rad/s or m/s].
     """
 
     position: float = 0.0
@@ -62,9 +62,9 @@ class TrajectoryRequest(NamedTuple):
     """A trajectory to follow.
 
     Attributes:
-        joint_names: n names, in any order.
-        points: Its points, with increasing times; without any, the joints stop and hold.
-        stamp_ns: Stamp of its start in the world's stamps [ns]; 0 is now.
+        joint_names: n joint names, in any order.
+        points: Points with increasing times; empty to stop the joints and hold.
+        stamp_ns: Start time, in the world's stamps [ns]; 0 to start at once.
     """
 
     joint_names: tuple[str, ...]
@@ -73,12 +73,13 @@ class TrajectoryRequest(NamedTuple):
 
 
 class GoalTolerances(NamedTuple):
-    """Tolerances of a goal.
+    """Tolerances of an action goal, as requested.
 
     Attributes:
-        path: Tolerances on the way, by name of joint.
-        goal: Tolerances at the end, by name of joint.
-        goal_time_s: Longest time after the end to reach the goal [s]; 0 is the configured one, less than 0 is no limit.
+        path: Tolerances before the end of the trajectory, keyed by joint name.
+        goal: Tolerances at the end, keyed by joint name.
+        goal_time_s: Time to reach the goal after the end [s]. 0 selects the configured time, a negative number sets no
+            limit.
     """
 
     path: Mapping[str, JointTolerance] = {}
@@ -87,12 +88,12 @@ class GoalTolerances(NamedTuple):
 
 
 class Tolerances(NamedTuple):
-    """Tolerances of joints; infinity is no limit.
+    """Tolerances of joints, with configured values filled in; infinity means no limit.
 
     Attributes:
-        path: On the way, by joint index.
-        goal: At the end, by joint index.
-        goal_time_s: Longest time after the end to reach the goal [s].
+        path: Tolerances before the end of the trajectory, keyed by joint index.
+        goal: Tolerances at the end, keyed by joint index.
+        goal_time_s: Time to reach the goal after the end [s].
     """
 
     path: Mapping[int, JointTolerance]
@@ -103,10 +104,15 @@ class Tolerances(NamedTuple):
 def resolved_tolerances(
     given: GoalTolerances, constraints: TrajectoryConstraints, joints: Mapping[str, Joint]
 ) -> Tolerances:
-    """Returns the tolerances of a goal, with those of the configuration where it has none of its own.
+    """Completes the tolerances of a goal with configured tolerances, and resolves joint names to indices.
+
+    Args:
+        given: Tolerances as requested.
+        constraints: Configured tolerances.
+        joints: Joints that the follower drives, keyed by name.
 
     Raises:
-        TrajectoryRefusedError: If it names an unknown joint, or a number is not finite.
+        TrajectoryRefusedError: If `given` names an unknown joint, or a number is not finite.
     """
     _check(given, joints)
     path, goal = {}, {}
@@ -123,7 +129,7 @@ def _resolved(given: JointTolerance | None, position: float, velocity: float) ->
 
 
 def _limit(given: float, configured: float, default: float) -> float:
-    """Returns the first limit that is not 0: given, configured, default; below 0 is none."""
+    """Returns the first limit of `given`, `configured`, `default` that is not 0; infinity if `given` is negative."""
     return math.inf if given < 0.0 else given or configured or default
 
 

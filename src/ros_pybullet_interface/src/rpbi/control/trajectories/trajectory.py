@@ -1,6 +1,6 @@
-"""Trajectories of joints: piecewise polynomials through knots.
+"""Joint trajectories: piecewise polynomials through knots.
 
-In plain Python: for the few joints of a robot at one time that is faster than NumPy, and it happens at every tick.
+Trajectories are sampled at every tick in plain Python, which is faster than NumPy for the few joints of a robot.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ class Knot(NamedTuple):
     Attributes:
         time_s: Time [s].
         position: n positions [rad or m].
-        velocity: n velocities [rad/s or m/s], None if they are left open.
-        acceleration: n accelerations [rad/s^2 or m/s^2], None if they are left open; they need velocities.
+        velocity: n velocities [rad/s or m/s]; None if not prescribed.
+        acceleration: n accelerations [rad/s^2 or m/s^2]; None if not prescribed. Accelerations need velocities.
     """
 
     time_s: float
@@ -44,12 +44,12 @@ class DesiredState(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """The stretch between two knots.
+    """The part of a trajectory between two knots.
 
     Attributes:
-        start_s: Where it begins [s].
-        origin_s: Time at which the argument of its polynomials is 0 [s], at or before `start_s`.
-        polynomials: One for each of n joints.
+        start_s: Start time [s].
+        origin_s: Time at which the argument of the polynomials is 0 [s], at or before `start_s`.
+        polynomials: One polynomial for each of n joints.
     """
 
     start_s: float
@@ -60,11 +60,11 @@ class Segment(NamedTuple):
 class Trajectory:
     """The motion of n joints through knots; immutable.
 
-    Two neighbouring knots are joined by a line if one of them has positions alone, by a cubic if both have velocities,
-    by a quintic if both have accelerations as well. Before the first knot and after the last the joints stand still.
+    A segment between two knots is a quintic if both knots have accelerations, else a cubic if both have velocities,
+    else a line. Before the first knot and after the last knot the joints are at rest.
 
     Attributes:
-        segments: In the order of time; one that stands still if there is only one knot.
+        segments: Segments in the order of time; a single segment at rest if there is only one knot.
         start_s: Time of the first knot [s].
         end_s: Time of the last knot [s].
         goal: The last knot's positions [rad or m].
@@ -82,13 +82,14 @@ class Trajectory:
 
     @classmethod
     def through(cls, knots: Sequence[Knot]) -> Trajectory:
-        """Returns the trajectory through knots.
+        """Creates the trajectory through knots.
 
         Args:
-            knots: At least one, with strictly increasing times, all for the same number of joints, all finite.
+            knots: At least one knot. Times increase strictly, all numbers are finite, and all knots have the same
+                number of joints.
 
         Raises:
-            ValueError: If they are not.
+            ValueError: If the knots violate these conditions.
         """
         _check(knots)
         segments = [_segment(before, after) for before, after in zip(knots, knots[1:])]
@@ -98,7 +99,7 @@ class Trajectory:
     def sample(self, time_s: float) -> DesiredState:
         """Returns the desired state of the joints at a time [s].
 
-        Before the start that is the first knot's position, from the end on exactly the last one's, both at rest.
+        Before the start, this is rest at the first knot. From the end on, it is rest exactly at the last knot.
         """
         if time_s >= self.end_s:
             return self._end
@@ -107,10 +108,10 @@ class Trajectory:
         return _evaluated(self.segments[bisect_right(self._starts, time_s) - 1], time_s)
 
     def spliced(self, new: Trajectory, at_s: float) -> Trajectory:
-        """Returns this one until a time, and another from then on.
+        """Returns a trajectory that equals this one until a time and another one from then on.
 
         Args:
-            new: The later trajectory, of the same joints: from `at_s` on it is sampled unchanged.
+            new: The other trajectory, of the same joints.
             at_s: Time of the transition [s].
         """
         if at_s <= self.start_s:
@@ -126,7 +127,12 @@ class Trajectory:
         return Trajectory(kept + taken, max(at_s, new.end_s), new.goal)
 
     def shifted(self, by_s: float, by_position: Sequence[float]) -> Trajectory:
-        """Returns the same motion at another time [s], from other positions [rad or m], n of them."""
+        """Returns the trajectory shifted in time and position.
+
+        Args:
+            by_s: Time to add [s].
+            by_position: n positions to add [rad or m].
+        """
         segments = [
             Segment(
                 segment.start_s + by_s,
@@ -139,25 +145,25 @@ class Trajectory:
         return Trajectory(segments, self.end_s + by_s, goal)
 
     def since(self, time_s: float) -> Trajectory:
-        """Returns the same trajectory without the segments that are over at a time [s]."""
+        """Returns the trajectory without the segments that end before a time [s]."""
         first = max(bisect_right(self._starts, time_s) - 1, 0)
         return self if first == 0 else Trajectory(self.segments[first:], self.end_s, self.goal)
 
 
 def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float) -> Trajectory:
-    """Returns the motion from rest to rest with the least jerk.
+    """Returns the minimum-jerk motion from rest to rest (Flash and Hogan, 1985).
 
-    It is the quintic whose velocity and acceleration vanish at both ends (Flash and Hogan 1985). Its highest speed is
-    15/8 of the mean one.
+    The motion is the quintic with zero velocity and acceleration at both ends. Its highest speed is 15/8 of its mean
+    speed.
 
     Args:
-        start: n positions [rad or m].
-        goal: n positions [rad or m].
+        start: n start positions [rad or m].
+        goal: n goal positions [rad or m].
         start_s: Start time [s].
         duration_s: Duration [s], more than 0.
 
     Raises:
-        ValueError: If the numbers of positions differ, or something is not finite or not positive.
+        ValueError: If the numbers of positions differ, a number is not finite, or the duration is not positive.
     """
     still = (0.0,) * len(start)
     return Trajectory.through(
@@ -194,7 +200,7 @@ def _segment(before: Knot, after: Knot) -> Segment:
 
 
 def _check(knots: Sequence[Knot]) -> None:
-    """Raises a ValueError that names the first invalid knot."""
+    """Checks knots; raises a ValueError that names the first invalid knot."""
     if not knots:
         raise ValueError("a trajectory needs at least one knot")
     width = len(knots[0].position)
@@ -216,12 +222,12 @@ class TrajectoryStateSample(NamedTuple):
     """Desired and measured state of the joints of a trajectory follower.
 
     Attributes:
-        name: The robot.
-        joint_names: n names.
-        desired: Desired state; without a trajectory, the positions that motors hold.
-        position: n positions [rad or m], measured.
-        velocity: n velocities [rad/s or m/s], measured.
-        time_from_start_s: Time since the trajectory began [s], 0 while there is none.
+        name: Name of the robot.
+        joint_names: n joint names.
+        desired: Desired state of the n joints; without a trajectory, the positions at which the motors hold.
+        position: n measured positions [rad or m].
+        velocity: n measured velocities [rad/s or m/s].
+        time_from_start_s: Time since the start of the trajectory [s]; 0 without a trajectory.
     """
 
     name: str
