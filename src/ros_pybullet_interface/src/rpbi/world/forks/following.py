@@ -1,4 +1,4 @@
-"""The process that follows a world: it repeats the world's commands, and forks itself for forks and predictions."""
+"""The side of the shadow process: repeats the commands of a world, and forks itself for forks and predictions."""
 
 from __future__ import annotations
 
@@ -20,24 +20,28 @@ from .prediction import Candidate, Prediction, PredictionJob, predict
 
 PIPE_BYTES = 1 << 20
 _PR_SET_PDEATHSIG = 1
-"""prctl(2): the signal when the thread that has forked ends, which is the only one here."""
+"""Option of prctl(2): signal that a process gets when the thread that forked it ends; this process has one thread."""
 
 
 def end_with(parent: int) -> None:
-    """Makes this process, a fork, end as soon as its parent ends."""
+    """Makes this process, which was just forked, end as soon as its parent ends.
+
+    Args:
+        parent: Process id of the parent.
+    """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it ended before
+    if os.getppid() != parent:  # the parent has ended already
         os._exit(0)
 
 
 def serve(connection: Connection, build: Callable[[], Any]) -> None:
-    """Answers requests of a `Shadow` until the other end is closed.
+    """Answers requests of a `Shadow` until it closes the connection.
 
     Args:
-        connection: Connection to it.
-        build: Returns the `World`; the first request gets its errors.
+        connection: Connection to the `Shadow`.
+        build: Returns the `World`. An error of this function is the answer to requests to follow and restore.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that it follows
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process whose world is followed
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that forks leave no zombies
     world: Any = None
     fault: Exception | None = None
@@ -62,7 +66,7 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
 
     def fork() -> None:
         with Connection(recv_handle(connection)) as own:
-            os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
+            os.set_blocking(connection.fileno(), True)  # non-blocking by now if sockets have a default timeout
             if os.fork():
                 return
             try:
@@ -81,14 +85,14 @@ def _advance(world: Any, commands: Sequence[RecordedCommand], tick: int) -> None
     waiting = list(commands)
     while True:
         while waiting and waiting[0].tick <= world.clock.tick:
-            apply_command(world, waiting.pop(0), trust=None)  # the followed world has applied it
+            apply_command(world, waiting.pop(0), trust=None)  # trusted, since the followed world has applied it
         if world.clock.tick >= tick:
             return
         world.step()
 
 
 def _requests_of(world: Any) -> dict[str, Callable[..., Any]]:
-    """Returns the requests that a fork answers, by name."""
+    """Returns the functions that answer the requests to a fork, indexed by name of the request."""
     return {
         "put": world.put,
         "act": lambda *arguments: world.act(*arguments) and None,
@@ -105,7 +109,7 @@ def _answer(connection: Connection, requests: dict[str, Callable[..., Any]]) -> 
         except (EOFError, OSError):
             return
         try:
-            name, arguments = pickle.loads(request)  # which may name a function that is not known here
+            name, arguments = pickle.loads(request)  # fails if an argument is a function that is not known here
             answer = pickle.dumps((True, requests[name](*arguments)))
         except Exception as error:
             answer = pickle.dumps((False, _words(error)))
@@ -120,7 +124,7 @@ def _words(error: Exception) -> str:
 
 
 def _predict_all(world: Any, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> Iterator[Prediction]:
-    """Yields the predictions of candidates, each from a fork of its own, `jobs` at a time."""
+    """Yields the prediction of each candidate, made in a fork of its own; at most `jobs` forks run at a time."""
     waiting = list(enumerate(candidates))
     answers: dict[int, list[bytes]] = {}
     running: dict[int, int] = {}
@@ -144,10 +148,10 @@ def _predict_all(world: Any, candidates: Sequence[Candidate], job: PredictionJob
 
 
 def _start(world: Any, candidate: Candidate, job: PredictionJob) -> int:
-    """Forks, and returns the pipe from which the prediction can be read.
+    """Starts a prediction in a fork, and returns the file descriptor from which the result can be read.
 
     Raises:
-        OSError: If there is no memory, or no process, for the fork.
+        OSError: If the process cannot be forked, for instance for lack of memory.
     """
     reading, writing = os.pipe()
     parent = os.getpid()
@@ -160,7 +164,7 @@ def _start(world: Any, candidate: Candidate, job: PredictionJob) -> int:
     if is_here:
         os.close(writing)
         return reading
-    try:  # whatever fails here ends the fork, which must not serve in place of this process
+    try:  # after any error the fork ends, since it must not go on to answer requests like its parent
         end_with(parent)
         os.close(reading)
         prediction = _predicted(world, candidate, job)
@@ -178,9 +182,9 @@ def _predicted(world: Any, candidate: Candidate, job: PredictionJob) -> Predicti
 
 
 def _read(text: bytes) -> Prediction:
-    """Returns a prediction; text that is missing or cut short is a fault."""
+    """Returns the prediction that a fork sent; if the text is incomplete, returns a prediction with a fault."""
     try:
         prediction: Prediction = pickle.loads(text)
-    except Exception:  # text that ends anywhere
+    except Exception:  # unpickling an incomplete text may fail in any way
         return Prediction(float("inf"), fault="its process ended early: its memory may have run out")
     return prediction

@@ -1,4 +1,4 @@
-"""Predictions: sequences of inputs, and the motion to which they lead."""
+"""Predictions: simulates a sequence of inputs, and samples the resulting motion."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from custom_ros_tools.transforms import Array
 
 
 class PlannedInput(NamedTuple):
-    """An input at a later tick.
+    """An input at a given tick of a prediction.
 
     Attributes:
-        tick: Ticks from now on; 0 is before the next step.
+        tick: Number of ticks after the start of the prediction; 0 means before the first step.
         slot: The input, such as `kuka_lwr/target`, see `World.put`.
-        value: Its value.
+        value: Value for the input.
     """
 
     tick: int
@@ -28,19 +28,19 @@ class PlannedInput(NamedTuple):
 
 
 Candidate = Sequence[PlannedInput]
-"""Inputs by tick."""
+"""Inputs whose effect is predicted; inputs at the same tick are applied in the given order."""
 Cost = Callable[[Any], float]
-"""Cost of the state of a `World`, which counts at every tick."""
+"""A function that returns the cost of a `World`'s present state; it is called after every tick."""
 
 
 class PredictionJob(NamedTuple):
-    """Extent of a prediction, and the motion to note.
+    """Options of a prediction.
 
     Attributes:
-        ticks: Number of ticks.
-        watch: Names of the bodies whose motion is noted.
-        every: Ticks between two notes.
-        cost: The cost, or `module:name` of it; None is 0.
+        ticks: Number of ticks to simulate.
+        watch: Names of the bodies whose motion is sampled.
+        every: Number of ticks between two samples.
+        cost: Cost function, a class whose objects are cost functions, or `module:name` of either. None means cost 0.
     """
 
     ticks: int
@@ -50,16 +50,17 @@ class PredictionJob(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """The predicted result of a candidate.
+    """Result of a prediction, with n samples of the motion.
 
     Attributes:
-        cost: Sum of the cost over all ticks; inf if it could not be predicted.
+        cost: Sum of the costs after all ticks; inf if the prediction failed.
         state_hash: Hash of the state at the end, see `World.state_hash`.
-        ticks: n ticks of the notes, from now on.
-        poses: By body, positions [m] and orientations (x, y, z, w) of its base, shape (n, 7).
-        joints: By robot, positions of its moving joints [rad or m], shape (n, joints), in the order of its model.
-        contacts: By body, sum of the normal forces of all its contacts [N], shape (n,).
-        fault: Reason why it could not be predicted.
+        ticks: Ticks of the samples, counted from the start of the prediction, shape (n,).
+        poses: For each body, position [m] and quaternion (x, y, z, w) of the base in the world, shape (n, 7).
+        joints: For each robot, positions of the moving joints [rad or m] in the order of the joint model, shape
+            (n, number of joints).
+        contacts: For each body, sum of the normal forces of all contacts [N], shape (n,).
+        fault: Reason why the prediction failed; empty if it succeeded.
     """
 
     cost: float
@@ -72,11 +73,11 @@ class Prediction(NamedTuple):
 
 
 def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
-    """Steps a `World` with the inputs of a candidate, and returns the result.
+    """Steps a `World` with the inputs of a candidate, and returns the cost and the sampled motion.
 
     Raises:
-        InterfaceError: If an input is refused, or its tick is not one of the job's.
-        ValueError: If the cost is not finite.
+        InterfaceError: If an input is unknown, or its tick is not within the prediction.
+        ValueError: If the value of an input is refused, or the cost is not finite.
     """
     cost: Cost | None = find(job.cost) if isinstance(job.cost, str) else job.cost
     if isinstance(cost, type):
@@ -103,7 +104,7 @@ def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
 
 
 class _Notes:
-    """The motion of some bodies of a world."""
+    """Samples of the motion of given bodies."""
 
     def __init__(self, world: Any, watch: Sequence[str]) -> None:
         self._world, self._bodies = world, [world.bodies[name] for name in watch]
@@ -115,7 +116,11 @@ class _Notes:
         self._forces: dict[str, list[float]] = {body.name: [] for body in self._bodies}
 
     def take(self, tick: int) -> None:
-        """Takes notes of the present state."""
+        """Samples the present state.
+
+        Args:
+            tick: Number of ticks since the start of the prediction.
+        """
         self._ticks.append(tick)
         for body in self._bodies:
             pose = body.base_pose()
@@ -126,7 +131,7 @@ class _Notes:
             self._forces[body.name].append(sum(point.normal_force for point in touching))
 
     def prediction(self, cost: float, state_hash: str) -> Prediction:
-        """Returns the notes as arrays."""
+        """Returns all samples as arrays, together with the given cost and hash."""
         poses, joints, forces = (
             {name: np.array(rows) for name, rows in each.items()} for each in (self._poses, self._joints, self._forces)
         )

@@ -1,4 +1,4 @@
-"""The world's side of the process that follows it, and of forks."""
+"""The side of the world's process: starts the shadow process, and sends requests to the shadow and to forks."""
 
 from __future__ import annotations
 
@@ -25,11 +25,16 @@ from .prediction import Candidate, Prediction, PredictionJob
 
 _STDERR = 2
 MAX_COPIED_MB = 200.0
-"""Largest memory of a process that is copied [MB]: forking a copy takes 0.04 ms per MB, and a new program has 60 MB."""
+"""Largest memory of a process that is copied [MB]; forking takes 0.04 ms per MB, and a new program needs 60 MB."""
 
 
 class Remote:
-    """The other end of a connection, which answers each request with its result or an error."""
+    """A process at the other end of a connection, which answers each request with a result or an error.
+
+    Args:
+        connection: Connection to the process.
+        subject: Name of the process, for messages.
+    """
 
     def __init__(self, connection: Connection, subject: str) -> None:
         self._connection, self._subject = connection, subject
@@ -37,10 +42,12 @@ class Remote:
         """Number of requests that were sent by `begin`."""
 
     def begin(self, name: str, *arguments: Any) -> None:
-        """Sends a request without waiting; the next `ask` waits for its answer first, and raises if that is an error.
+        """Sends a request without waiting for the answer.
+
+        The next call of `ask` first waits for this answer, and raises an InterfaceError if the answer is an error.
 
         Raises:
-            InterfaceError: If the other end has ended.
+            InterfaceError: If the other process has ended.
         """
         try:
             self._connection.send((name, arguments))
@@ -49,10 +56,15 @@ class Remote:
         self._unanswered += 1
 
     def ask(self, name: str, *arguments: Any, handle: int | None = None) -> Any:
-        """Returns the answer to a request, which may come with a file handle.
+        """Sends a request, waits for the answer, and returns the result.
+
+        Args:
+            name: Name of the request.
+            arguments: Arguments of the request; they must be picklable.
+            handle: File descriptor to be sent with the request; by default none is sent.
 
         Raises:
-            InterfaceError: If the other end refuses, or has ended.
+            InterfaceError: If the answer is an error, or the other process has ended.
         """
         while self._unanswered:
             self._unanswered -= 1
@@ -61,16 +73,18 @@ class Remote:
             self._connection.send((name, arguments))
             if handle is not None:
                 send_handle(self._connection, handle, 0)
-                os.set_blocking(self._connection.fileno(), True)  # a default timeout of sockets may have changed it
+                os.set_blocking(
+                    self._connection.fileno(), True
+                )  # non-blocking by now if sockets have a default timeout
         except OSError as error:
             raise self._ended(error) from None
         return self.answer()
 
     def answer(self) -> Any:
-        """Returns the answer to a request that was sent.
+        """Waits for the answer to the oldest unanswered request, and returns the result.
 
         Raises:
-            InterfaceError: If the other end refuses, or has ended.
+            InterfaceError: If the answer is an error, or the other process has ended.
         """
         try:
             is_good, answer = self._connection.recv()
@@ -84,31 +98,36 @@ class Remote:
         return InterfaceError(f"{self._subject} has ended: {error or 'its memory may have run out'}")
 
     def close(self) -> None:
-        """Ends the other end."""
+        """Closes the connection, which makes the other process end."""
         self._connection.close()
 
 
 class Fork(Remote):
-    """A world in a process of its own, which continues from the state of another one; `with` ends it."""
+    """A copy of a world in its own process, which started from the world's state; a `with` block ends the process."""
 
     def put(self, slot: str, value: Any) -> None:
-        """Passes a value to a body before its next tick, see `World.put`."""
+        """Sends a value to an input of the fork's world, see `World.put`."""
         self.ask("put", slot, value)
 
     def act(self, name: str, what: str, value: Any) -> None:
-        """Applies an action to a body, see `World.act`."""
+        """Applies an action to a body of the fork's world, see `World.act`; the action's result is not returned."""
         self.ask("act", name, what, value)
 
     def step(self, ticks: int = 1) -> list[Any]:
-        """Advances by ticks, and returns all samples."""
+        """Advances the fork's world by a number of ticks, and returns the sensor samples of all these ticks."""
         return list(self.ask("step", ticks))
 
     def state_hash(self) -> str:
-        """Returns the hash of its state, see `World.state_hash`."""
+        """Returns the hash of the fork's present state, see `World.state_hash`."""
         return str(self.ask("state_hash"))
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Returns what a function of a module returns for the `World` of the fork, and further arguments."""
+        """Calls a function in the fork with the fork's `World` and further arguments, and returns the result.
+
+        Args:
+            function: Module-level function.
+            arguments: Further arguments; they and the result must be picklable.
+        """
         return self.ask("call", function, *arguments)
 
     def __enter__(self) -> Fork:
@@ -119,12 +138,12 @@ class Fork(Remote):
 
 
 class _Copy:
-    """A copy of this process in which a function is called, and which ends when that returns or this process ends.
+    """A fork of this process that calls a function; the fork ends when the function returns or this process ends.
 
     Args:
-        call: The function.
-        keep: File descriptor that the copy keeps. All others lead to /dev/null there, so that a reader of a pipe that
-            this process closes does not wait for the copy, too.
+        call: Function to call in the fork.
+        keep: File descriptor that stays open in the fork, besides standard error. All others are redirected to
+            /dev/null in the fork; otherwise a pipe closed by this process would stay open in the fork.
     """
 
     stdin = None
@@ -135,37 +154,38 @@ class _Copy:
         if self._pid:
             return
         try:
-            gc.freeze()  # garbage of this process is not the copy's to finish, such as folders that would be removed
+            gc.freeze()  # the fork must not finalize garbage of this process, such as temporary folders
             end_with(parent)
             nowhere = os.open(os.devnull, os.O_RDWR)
             for file in map(int, os.listdir("/proc/self/fd")):
                 if file not in (keep, _STDERR):
-                    with suppress(OSError):  # the folder itself
+                    with suppress(OSError):  # raised for the descriptor of the listed folder, which is closed already
                         os.dup2(nowhere, file)
             call()
         finally:
             os._exit(0)
 
     def kill(self) -> None:
-        """Ends the copy."""
+        """Kills the fork."""
         with suppress(ProcessLookupError):
             os.kill(self._pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        """Waits until it has ended."""
+        """Waits until the fork has ended."""
         with suppress(ChildProcessError):
             os.waitpid(self._pid, 0)
 
 
 class Shadow:
-    """The process that follows a world; it has neither ROS nor a window nor a second thread, and may therefore fork.
+    """A process that follows a world: it repeats the world's commands, and is forked for forks and predictions.
 
-    It starts while this process continues; the first call waits until it has reached the state.
+    The shadow has no ROS node, no window and a single thread, so it can be forked safely. It starts while this process
+    continues; the first request waits until the shadow has reached the world's state.
 
     Args:
-        connection: Connection to it.
-        process: The process.
-        commands: Number of commands that it knows.
+        connection: Connection to the shadow.
+        process: Process of the shadow.
+        commands: Number of the world's commands that the shadow has.
     """
 
     def __init__(self, connection: Connection, process: subprocess.Popen[bytes] | _Copy, commands: int) -> None:
@@ -175,21 +195,22 @@ class Shadow:
 
     @classmethod
     def of(cls, world: Any, state: WorldState) -> Shadow:
-        """Returns one for a `World` at its present state: a copy of this process if possible, else a new program."""
+        """Starts a shadow of a `World` in its present state: a fork of this process if possible, else a new program."""
         return cls.copied(world) or cls.started(state, world.commands.count)
 
     @classmethod
     def copied(cls, world: Any) -> Shadow | None:
-        """Returns one that is a copy of this process; None if this process is large, has other threads or a window.
+        """Starts a shadow that is a fork of this process.
 
-        A copy has none of the threads, and would wait for ever for the locks that they held.
+        Returns None instead if this process has more than MAX_COPIED_MB of memory, a window, or several threads. A fork
+        does not have the other threads, and would wait forever for locks that these threads held.
         """
         if world.pb.has_window or threading.active_count() > 1 or _memory_mb() > MAX_COPIED_MB:
             return None
         ours, theirs = Pipe()
         with theirs:
             process = _Copy(lambda: serve(theirs, lambda: world), theirs.fileno())
-        if len(os.listdir("/proc/self/task")) > 1:  # those of OpenBLAS have ended: it ends them before a fork
+        if len(os.listdir("/proc/self/task")) > 1:  # not threads of OpenBLAS, which ends its threads before a fork
             process.kill()
             process.wait()
             ours.close()
@@ -198,12 +219,12 @@ class Shadow:
 
     @classmethod
     def started(cls, state: WorldState, commands: int, niceness: int = 0) -> Shadow:
-        """Returns one that is a new program, which simulates again until it reaches the state.
+        """Starts a shadow that is a new program, which simulates until it reaches the state.
 
         Args:
             state: Present state of the world.
             commands: Number of commands of the world so far.
-            niceness: Niceness above that of this process, from 0 to 19; more means less processor time.
+            niceness: Increment of niceness over this process, from 0 to 19; a higher value means less processor time.
         """
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -215,40 +236,47 @@ class Shadow:
             stdout=subprocess.DEVNULL,
         )
         theirs.close()
-        with suppress(OSError):  # the first call reports that it has ended
+        with suppress(OSError):  # if the shadow has ended, its first request reports this
             ours.send(state)
         return cls(ours, process, commands)
 
     def restore(self, state: WorldState, commands: int) -> None:
-        """Sends it to a later keyframe and on to the state, since commands on the way were dropped; does not wait.
+        """Makes the shadow restore a state, without waiting for the result.
+
+        This is needed after a keyframe, which drops earlier commands that the shadow may not have.
 
         Args:
             state: Present state of the world.
             commands: Number of commands of the world so far.
 
         Raises:
-            InterfaceError: If it has ended.
+            InterfaceError: If the shadow has ended.
         """
         self._remote.begin("restore", state)
         self.commands = commands
 
     @property
     def is_copy(self) -> bool:
-        """Whether it is a copy of this process; another copy is made faster than it restores a state."""
+        """Whether the shadow is a fork of this process; making a new one is faster than restoring a state."""
         return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
-        """Brings it to the present tick of the world, before it forks or predicts.
+        """Brings the shadow to the world's present state, before it forks or predicts.
+
+        Args:
+            commands: Commands of the world that the shadow does not have yet.
+            tick: Present tick of the world.
+            state_hash: Hash of the world's present state.
 
         Raises:
-            InterfaceError: If its state then has another hash.
+            InterfaceError: If the state that the shadow reaches has another hash.
         """
         new = tuple(commands)
         self._remote.ask("follow", new, tick, state_hash)
         self.commands += len(new)
 
     def fork(self, count: int) -> list[Fork]:
-        """Returns forks of it."""
+        """Forks the shadow `count` times, and returns the forks."""
         forks = []
         for index in range(count):
             ours, theirs = Pipe()
@@ -258,15 +286,15 @@ class Shadow:
         return forks
 
     def predict(self, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
-        """Returns the prediction of each candidate."""
+        """Makes a prediction for each candidate; at most `jobs` processes run at a time."""
         return list(self._remote.ask("predict", [list(each) for each in candidates], job, jobs))
 
     def kill(self) -> None:
-        """Ends it and its predictions; a call that waits in another thread raises an InterfaceError."""
+        """Kills the shadow and its predictions; a request that waits in another thread raises an InterfaceError."""
         self._process.kill()
 
     def close(self) -> None:
-        """Ends it; forks continue until they are closed."""
+        """Ends the shadow and its predictions; its forks continue until they are closed."""
         self._remote.close()
         self._process.kill()
         self._process.wait()
@@ -275,6 +303,6 @@ class Shadow:
 
 
 def _memory_mb() -> float:
-    """Returns the memory of this process that is in no file [MB]; see proc_pid_statm(5)."""
+    """Returns the resident memory of this process without file-backed pages [MB], see proc_pid_statm(5)."""
     _, resident, shared, *_ = map(int, Path("/proc/self/statm").read_text().split())
     return (resident - shared) * os.sysconf("SC_PAGE_SIZE") / 1e6

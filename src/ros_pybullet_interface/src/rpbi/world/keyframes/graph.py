@@ -1,9 +1,10 @@
-"""Objects as plain values, and plain values put back into objects of the same structure.
+"""Writes Python objects as plain values for JSON, and reads them back into objects of the same structure.
 
-The state of a world in Python is the attributes of its bodies, sensors, controllers and streams. They are written as a
-graph: an object that occurs again is a reference, and anchors, such as bodies, have names. Reading fills the objects
-that exist already and makes those that were created later. The text contains no code: classes are named, and only
-those of trusted packages are made.
+The Python part of a world's state consists of the attributes of bodies, sensors, controllers and target streams. They
+are written as a graph: repeated occurrences of an object are written as references to the first occurrence. Objects
+that exist in every world of the same build, such as bodies, are called anchors and referred to by name. Reading sets
+the attributes of existing objects, and creates the objects that a freshly built world does not have yet. The text
+contains class names, but no code, and only classes of trusted packages are instantiated.
 """
 
 from __future__ import annotations
@@ -28,23 +29,23 @@ from rpbi.plugins import is_foreign
 from rpbi.samples import ContactsSample
 
 _MADE = ("rpbi.bodies.", "rpbi.control.", "rpbi.engine.clock", "rpbi.samples", "rpbi.sensors.", "rpbi.world.")
-"""Beginnings of the names of modules whose objects are created and removed while a world runs."""
+"""Prefixes of the names of modules in `rpbi` from which reading may instantiate classes."""
 _CALLED = ("rpbi.bodies.", "rpbi.control.", "rpbi.sensors.")
-"""Beginnings of the names of modules whose objects have methods to which a state may refer."""
+"""Prefixes of the names of modules in `rpbi` whose classes' methods a state may refer to."""
 _KEPT = (FunctionType, BuiltinFunctionType, partial, type)
-"""Types of code that objects hold; reading leaves it as it is."""
+"""Types of attribute values that are code; they are not written, and reading leaves existing values unchanged."""
 _NUMBERS = "fiub"
-"""Kinds of arrays."""
+"""Kinds of NumPy data types (`dtype.kind`) that are allowed in arrays."""
 NOTHING: Any = object()
-"""Stands for a missing object."""
+"""Represents a missing object, since None is a valid value."""
 
 
 class GraphWriter:
-    """Writes objects as values that JSON has.
+    """Converts objects to plain values for JSON.
 
     Args:
-        fixed: Types of objects that are only referred to: those of a world built in the same way take their place.
-        anchors: Objects that have a name in all worlds of the same build.
+        fixed: Types whose objects are not written. The reader uses the objects that its own world has in their place.
+        anchors: Objects that are written as their names only, indexed by name.
     """
 
     def __init__(self, fixed: tuple[type, ...], anchors: Mapping[str, Any]) -> None:
@@ -55,13 +56,14 @@ class GraphWriter:
         """All objects with a number; kept, so that no other one has the same `id`."""
 
     def plain(self, value: Any, where: str = "") -> Any:
-        """Returns a value, or a reference to one that was written before.
+        """Returns the plain form of a value, or a reference if the same object was written before.
 
         Args:
-            where: Its place, for messages.
+            value: Value to write.
+            where: Attribute path of the value, for messages.
 
         Raises:
-            InterfaceError: If it cannot be written.
+            InterfaceError: If the value cannot be written.
         """
         if value is None or type(value) in (bool, int, float, str):
             return value
@@ -84,7 +86,7 @@ class GraphWriter:
         return [*self._content(value, where), number]
 
     def _content(self, value: Any, where: str) -> list[Any]:
-        """Returns the kind and the content of a value."""
+        """Returns the kind of a value and its content in plain form."""
         if isinstance(value, self._fixed):
             return ["fixed"]
         if isinstance(value, ConfigModel):
@@ -113,17 +115,21 @@ class GraphWriter:
         return ["object", full_name(type(value)), self.attributes(value, where)]
 
     def attributes(self, value: Any, where: str) -> list[list[Any]]:
-        """Returns names and values of the attributes of an object.
+        """Returns name and plain value of each attribute of an object, except those in `not_in_keyframes` of its class.
+
+        Args:
+            value: The object.
+            where: Attribute path of the object, for messages.
 
         Raises:
-            InterfaceError: If one cannot be written.
+            InterfaceError: If an attribute cannot be written.
         """
         return [list(each) for each in self._attributes(value, where)]
 
     def _attributes(self, value: Any, where: str) -> Iterator[tuple[str, Any]]:
         left_out = getattr(type(value), "not_in_keyframes", ())
         if isinstance(value, ContactsSample):
-            _ = value.points  # made from what is left out
+            _ = value.points  # computes the cached points, since the data they are computed from is not written
         for name, attribute in _attributes_of(value):
             if name not in left_out:
                 if isinstance(attribute, _KEPT) and is_foreign(value):
@@ -137,7 +143,10 @@ class GraphWriter:
 
 
 def _has_attributes(value: Any) -> bool:
-    """Returns whether an object is its attributes: its class is written in Python, in no standard module."""
+    """Returns whether the attributes of an object are its whole state.
+
+    This is assumed if its class is written in Python and not from the standard library.
+    """
     kind = type(value)
     is_written = hasattr(value, "__dict__") or any("__slots__" in vars(each) for each in kind.__mro__)
     return is_written and kind.__module__.split(".")[0] not in sys.stdlib_module_names
@@ -153,11 +162,11 @@ def _attributes_of(value: Any) -> Iterator[tuple[str, Any]]:
 
 
 class GraphReader:
-    """Reads what a GraphWriter wrote, where possible into existing objects.
+    """Converts the plain values of a GraphWriter back to objects, and fills existing objects where possible.
 
     Args:
-        fixed: As that of the writer.
-        anchors: The objects that take the place of the writer's.
+        fixed: Types whose objects were not written; same as the writer's.
+        anchors: Objects of the reading world that replace the writer's anchors, indexed by name.
     """
 
     def __init__(self, fixed: tuple[type, ...], anchors: Mapping[str, Any]) -> None:
@@ -180,24 +189,29 @@ class GraphReader:
         }
 
     def value(self, plain: Any, here: Any = NOTHING) -> Any:
-        """Returns a value.
+        """Returns the value for a plain form.
 
         Args:
-            here: The object in its place.
+            plain: Plain form from `GraphWriter.plain`.
+            here: Existing object to be filled or replaced by the value; NOTHING if there is none.
 
         Raises:
-            ValueError: If a GraphWriter does not write such a text, or a class is missing or not trusted.
-            ConfigError: If a configuration in it is not valid here.
+            ValueError: If a GraphWriter does not write such a plain form, or a class is missing or not trusted.
+            ConfigError: If a configuration in the plain form is not valid on this machine.
         """
         with _one_error():
             return self._value(plain, here)
 
     def fill(self, owner: Any, attributes: list[Any]) -> None:
-        """Sets the attributes of an object.
+        """Sets attributes of an object.
+
+        Args:
+            owner: The object.
+            attributes: Pairs of name and plain value, from `GraphWriter.attributes`.
 
         Raises:
-            ValueError: As `value` does.
-            ConfigError: As `value` does.
+            ValueError: See `value`; also if a name is not a settable attribute.
+            ConfigError: See `value`.
         """
         with _one_error():
             for attribute, plain in attributes:
@@ -302,7 +316,7 @@ def _one_error() -> Iterator[None]:
 
 
 def _attribute(owner: Any, name: str) -> Any:
-    """Returns an attribute of an object's own, or NOTHING."""
+    """Returns an attribute that is stored in the object itself, not in its class; otherwise returns NOTHING."""
     if name in getattr(owner, "__dict__", ()):
         return vars(owner)[name]
     slots = (name in vars(kind).get("__slots__", ()) for kind in type(owner).__mro__)
@@ -310,10 +324,14 @@ def _attribute(owner: Any, name: str) -> Any:
 
 
 def _class_of(name: str, base: type) -> Any:
-    """Returns a class of a trusted package.
+    """Returns the class with a given name.
+
+    Args:
+        name: Name as `module:Class`.
+        base: Required base class.
 
     Raises:
-        ValueError: If it is missing, not trusted, or of another kind.
+        ValueError: If the class is missing, not from a trusted package, or not a subclass of `base`.
     """
     check_trusted(name)
     kind = find(name)

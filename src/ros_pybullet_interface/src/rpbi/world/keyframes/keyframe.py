@@ -1,4 +1,4 @@
-"""Keyframes: states of a world as text, from which it continues in a fresh client."""
+"""Keyframes: texts with the complete state of a world, from which the world continues in a fresh PyBullet client."""
 
 from __future__ import annotations
 
@@ -28,33 +28,33 @@ from .graph import GraphReader, GraphWriter
 from .motion import BodyMotion, asleep, put_to_sleep
 
 FORMAT = 2
-"""Version of the text's layout."""
+"""Version of the layout of keyframe texts."""
 MAX_BYTES = 1 << 26
 """Largest size of an unpacked keyframe [bytes]."""
 MAX_VALUES = 5_000_000
-"""Largest number of values in it."""
+"""Largest number of values in a keyframe."""
 _FIXED = (Client, Clock, ContactReader, Joint, JointModel, Kinematics, RobotDynamics)
-"""Types of objects that are the same whenever a world is built."""
+"""Types whose objects are not written to keyframes, since building the world creates equal objects."""
 _SENSORS = "sensors"
 _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
-"""A text in JSON."""
+"""Pattern of a string in JSON."""
 
 
 class Keyframe:
-    """A state of a world.
+    """A keyframe that was read from its text.
 
     Attributes:
-        tick: The tick.
-        recipe: How its bodies are built.
-        changed: Names of objects that were added or removed since the world was built or reset.
+        tick: Tick of the keyframe.
+        recipe: Recipe for building the world's bodies.
+        changed: Names of bodies that had been added or removed since the world was built or reset.
     """
 
     def __init__(self, text: str) -> None:
-        """Reads a text.
+        """Reads the text of a keyframe.
 
         Raises:
-            ValueError: If the text is no keyframe, or is one of another version of this package.
-            ConfigError: If it is no JSON or too large, or a configuration in it is not valid here.
+            ValueError: If the text is not a keyframe, or was written by an incompatible version of this package.
+            ConfigError: If the unpacked text is not JSON or is too large, or a configuration is not valid here.
         """
         try:
             self._content = load_foreign_json(_unpacked(text), "keyframe", MAX_BYTES, MAX_VALUES)
@@ -68,14 +68,14 @@ class Keyframe:
             raise ValueError(f"expected a keyframe: {shortened(repr(error))}") from None
 
     def enter(self, world: Any, contents: WorldContents) -> dict[str, Body]:
-        """Brings a `World` that was just built by the recipe to this state.
+        """Sets a `World`, which was just built from the recipe, to the state of the keyframe.
 
         Returns:
-            The bodies that external wrenches act on.
+            The bodies on which external wrenches act, indexed by name.
 
         Raises:
-            ValueError: If the text does not fit the world.
-            InterfaceError: If the world has a state that is not in the text: it would not continue as the saved one.
+            ValueError: If the keyframe does not fit the world.
+            InterfaceError: If the world's state then differs from the keyframe, so that it would continue differently.
         """
         for name, body in contents.bodies.items():
             self._motions[name].check(body)
@@ -90,7 +90,10 @@ class Keyframe:
 
 
 def _anchors(contents: WorldContents) -> dict[str, Any]:
-    """Returns the objects with names; sensors, whose state influences no motion, come after bodies."""
+    """Returns bodies, attachments and sensors, indexed by their names in keyframes.
+
+    Sensors come last, since they do not influence the motion.
+    """
     return {
         "bodies": contents.bodies,
         **{f"bodies/{name}": body for name, body in contents.bodies.items()},
@@ -105,10 +108,10 @@ def _anchors(contents: WorldContents) -> dict[str, Any]:
 
 
 def _objects(world: Any, contents: WorldContents) -> dict[str, Any]:
-    """Returns the state of all objects of a `World` as plain values.
+    """Returns the attributes of all anchors of a `World` as plain values, indexed by the anchors' names.
 
     Raises:
-        InterfaceError: If one cannot be written.
+        InterfaceError: If an attribute cannot be written.
     """
     anchors = _anchors(contents)
     writer = GraphWriter((*_FIXED, type(world)), anchors)
@@ -117,20 +120,24 @@ def _objects(world: Any, contents: WorldContents) -> dict[str, Any]:
 
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
-    """Returns the text of a keyframe with other names of files.
+    """Replaces file names in the text of a keyframe, and returns the new text.
 
     Args:
-        names: New names by present names.
+        text: Text of the keyframe.
+        names: New file names, indexed by present file name.
 
     Raises:
-        ValueError: If the text is no keyframe.
+        ValueError: If the text is not a keyframe.
     """
     written = {json.dumps(before): json.dumps(after) for before, after in names.items()}
     return _packed(_JSON_TEXT.sub(lambda match: written.get(match[0], match[0]), _unpacked(text)))
 
 
 def difference(first: str, second: str) -> str:
-    """Returns the first part that differs between two keyframes, empty if none; sensors depend on their receivers."""
+    """Returns the name of the first part in which two keyframes differ; empty if they are equal.
+
+    Sensors are not compared, since their state depends on whether their samples have receivers.
+    """
     contents = (load_foreign_json(_unpacked(text), "keyframe", MAX_BYTES, MAX_VALUES) for text in (first, second))
     one, other = ({**each["objects"], "bodies": each["bodies"], "tick": each["tick"]} for each in contents)
     names = (name for name in {**one, **other} if not name.startswith(_SENSORS))
@@ -138,7 +145,7 @@ def difference(first: str, second: str) -> str:
 
 
 def _enter(motions: Mapping[str, BodyMotion], sleepers: tuple[str, ...], contents: WorldContents) -> None:
-    """Restores the motion of bodies in a fresh client, and their attachments, motors and sleep."""
+    """Restores motion, attachments, motor settings and sleep of the bodies in a fresh client."""
     for name, body in contents.bodies.items():
         motions[name].put(body)
     contents.attachments.resume()
@@ -149,15 +156,16 @@ def _enter(motions: Mapping[str, BodyMotion], sleepers: tuple[str, ...], content
 
 
 def move(world: Any, contents: WorldContents, pushed: Iterable[str], fresh: FreshClient) -> str:
-    """Moves a running `World` into a fresh client with its bodies, and returns the keyframe.
-
-    When it raises, nothing has changed.
+    """Moves a running `World` into a fresh client, and returns the text of the keyframe.
 
     Args:
-        pushed: Names of the bodies that external wrenches act on.
+        world: The world.
+        contents: Contents of the world.
+        pushed: Names of the bodies on which external wrenches act.
+        fresh: The fresh client, in which the bodies of the world have been built.
 
     Raises:
-        InterfaceError: If an object has a state that cannot be written.
+        InterfaceError: If an object has a state that cannot be written. The world is then unchanged.
     """
     motions = {name: BodyMotion.of(body) for name, body in contents.bodies.items()}
     changed = tuple(sorted(contents.changed_names()))
@@ -175,10 +183,10 @@ def move(world: Any, contents: WorldContents, pushed: Iterable[str], fresh: Fres
 
 
 def refuse(world: Any) -> None:
-    """Refuses a world in which PyBullet may have a state that keyframes do not contain.
+    """Checks that keyframes can contain the complete state of a world.
 
     Raises:
-        InterfaceError: If there is a window, a soft body, or a body of another package.
+        InterfaceError: If the world has a window, a soft body, or a body of another package.
     """
     if world.pb.has_window:
         raise InterfaceError(
@@ -199,7 +207,11 @@ def _packed(text: str) -> str:
 
 
 def _unpacked(text: str) -> str:
-    """Returns the JSON of a keyframe, with the present names of its classes."""
+    """Returns the JSON of a keyframe's text, with former class names replaced by present names.
+
+    Raises:
+        ValueError: If the text is not a keyframe or is too large.
+    """
     try:
         unpacking = zlib.decompressobj()
         data = unpacking.decompress(base64.b64decode(text, validate=True), MAX_BYTES)

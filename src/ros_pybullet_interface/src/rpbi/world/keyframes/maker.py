@@ -1,4 +1,4 @@
-"""Makes keyframes of a running world, in parts between its ticks."""
+"""Makes keyframes of a running world in small parts, between ticks."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ log = logging.getLogger(__name__)
 
 
 class KeyframeMaker:
-    """Makes keyframes of a running `World`, periodically and on request, one part at each call of `poll`.
+    """Makes keyframes of a running `World`, periodically and on request; each call of `poll` makes one part.
 
-    If a periodic keyframe is refused, that is reported once, and no other is tried until the world is reset.
+    If a periodic keyframe fails, a warning is logged, and periodic keyframes stop until the world is reset.
 
     Args:
         world: The world.
-        every_s: Period [s] of the world's time; 0 is none.
+        every_s: Period of keyframes in simulated time [s]; 0 means no periodic keyframes.
 
     Attributes:
-        longest_s: Longest time that a part of the last keyframe took [s].
+        longest_s: Longest wall time that a part of the last keyframe took [s].
     """
 
     def __init__(self, world: Any, every_s: float) -> None:
@@ -38,16 +38,16 @@ class KeyframeMaker:
         self._resets, self._last = world.resets, world.clock.tick
 
     def save(self) -> Future[WorldState]:
-        """Returns the state at the next keyframe, which is made in the coming calls of `poll`.
+        """Requests a keyframe, and returns a future of the saved state.
 
-        It fails with an InterfaceError if the keyframe is refused.
+        The next calls of `poll` make the keyframe. If the keyframe fails, the future raises an InterfaceError.
         """
         asked: Future[WorldState] = Future()
         self._asked.append(asked)
         return asked
 
     def poll(self) -> None:
-        """Makes the next part, if a keyframe is due, asked for or under way, and the world is not being restored."""
+        """Makes the next part of a keyframe that is due, requested or begun; does nothing while the world is busy."""
         world = self._world
         if world.mailbox.is_held:
             return
@@ -82,7 +82,7 @@ class KeyframeMaker:
         self._finish(fail)
 
     def _finish(self, state: Callable[[], WorldState]) -> None:
-        """Ends a keyframe, and answers those who have asked for one."""
+        """Ends a keyframe, and completes the futures of all requests with the state or its InterfaceError."""
         asked, self._asked, self._parts = self._asked, [], None
         for each in asked:
             if each.set_running_or_notify_cancel():

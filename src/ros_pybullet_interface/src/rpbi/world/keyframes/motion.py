@@ -1,4 +1,4 @@
-"""The state of motion of bodies, read from one client and put into another."""
+"""The motion and sleep of bodies, which are read from one PyBullet client and set in another."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from rpbi.bodies import Body
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 
 _UNUSUAL_GRAVITY = (1.0, 2.0, 30.0)
-"""Gravity that moves all bodies that do not sleep [m/s^2]."""
+"""Gravity that visibly moves every body that does not sleep [m/s^2]."""
 
 
 class BodyMotion(NamedTuple):
-    """Pose, joint positions and velocities of a body.
+    """Pose, joint positions and velocities of a body, in the world frame.
 
     Attributes:
-        position: Position of its centre of mass [m].
-        quat_xyzw: Orientation of its principal axes.
-        linear: Velocity [m/s].
-        angular: Angular velocity [rad/s].
-        joints: PyBullet's indices of the joints that move.
-        positions: Their positions [rad or m], of a joint about three axes its quaternion.
-        velocities: Their velocities [rad/s or m/s].
+        position: Position of the base's centre of mass [m].
+        quat_xyzw: Orientation of the base's principal axes of inertia.
+        linear: Linear velocity of the base [m/s].
+        angular: Angular velocity of the base [rad/s].
+        joints: PyBullet's indices of all joints that are not fixed.
+        positions: For each of these joints, its position [rad or m]; for a spherical joint, its quaternion.
+        velocities: For each of these joints, its velocity [rad/s or m/s].
     """
 
     position: Vector
@@ -40,7 +40,7 @@ class BodyMotion(NamedTuple):
 
     @classmethod
     def of(cls, body: Body) -> BodyMotion:
-        """Returns the motion of a body."""
+        """Reads the present motion of a body from PyBullet."""
         pb, body_id = body.pb, body.body_id
         joints = tuple(i for i in body.joint_indices if pb.getJointInfo(body_id, i)[2] != pybullet.JOINT_FIXED)
         states = pb.getJointStatesMultiDof(body_id, joints) if joints else ()
@@ -50,10 +50,10 @@ class BodyMotion(NamedTuple):
         return cls(position, quat_xyzw, linear, angular, joints, positions, velocities)
 
     def check(self, body: Body) -> None:
-        """Checks that it fits a body; PyBullet ends the process for some motions that do not.
+        """Checks that the motion fits a body, since PyBullet may crash if it does not.
 
         Raises:
-            ValueError: If it does not, or a number is not finite.
+            ValueError: If the joints differ from the body's joints, or a number is not finite.
         """
         own = BodyMotion.of(body)
         numbers = [*chain(*self[:4], *self.positions, *self.velocities)]
@@ -69,7 +69,7 @@ class BodyMotion(NamedTuple):
         pb.resetBaseVelocity(body_id, self.linear, self.angular)
         if self.joints:
             positions, velocities = (list(map(list, each)) for each in (self.positions, self.velocities))
-            pb.resetJointStatesMultiDof(body_id, list(self.joints), positions, velocities)  # tuples end the process
+            pb.resetJointStatesMultiDof(body_id, list(self.joints), positions, velocities)  # tuples crash PyBullet
 
 
 def _shape(values: Any) -> Any:
@@ -77,7 +77,10 @@ def _shape(values: Any) -> Any:
 
 
 def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
-    """Returns the bodies that sleep: another gravity does not move them. The client cannot be used afterwards."""
+    """Returns the names of the sleeping bodies: those that do not move in a step with unusual gravity.
+
+    The client must not be used afterwards, since it has made this step.
+    """
     movable = {name: body for name, body in bodies.items() if _can_move(body)}
     before = {name: body.motion_state() for name, body in movable.items()}
     pb.setGravity(*_UNUSUAL_GRAVITY)
@@ -86,7 +89,7 @@ def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
 
 
 def put_to_sleep(bodies: Mapping[str, Body], names: tuple[str, ...]) -> None:
-    """Puts some bodies to sleep, and wakes others that were loaded asleep."""
+    """Puts the named bodies to sleep, and wakes all other bodies that were loaded asleep."""
     for name, body in bodies.items():
         if name in names:
             body.pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_SLEEP)

@@ -76,8 +76,15 @@ class CommandLog:
         self.count += 1
 
     def since(self, index: int, most: int = MAX_KEPT) -> tuple[int, tuple[WorldCommand, ...]]:
-        """Returns the commands from an index on that are not compressed yet, at most `most`, after the index of the
-        first.
+        """Returns commands that are not compressed yet.
+
+        Args:
+            index: Index of the first command, counted since the world was built or reset. If this command is compressed
+                already, the oldest command that is not compressed is the first.
+            most: Largest number of commands.
+
+        Returns:
+            The index of the first returned command, and the commands.
         """
         first = max(index, self.count - len(self._kept))
         end = min(first + most, self.count)
@@ -159,8 +166,10 @@ def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] |
         trust: Packages that the command's value may import, see `trusting`.
 
     Raises:
-        InterfaceError: If the world refuses the command.
-        ValueError: If the command cannot be read, is unknown, or does not fit the world.
+        InterfaceError: If the world refuses the command, or the command's value contains a configuration that is not
+            valid on this machine.
+        ValueError: If the command's value cannot be read or has a class that is not trusted, or if applying the command
+            fails with any other error.
     """
     name, what = command.name, command.what
     with trusting(trust):

@@ -1,4 +1,4 @@
-"""Descriptions: all that a world was built from, as text from which another process can build the same world."""
+"""Descriptions of worlds: texts from which another process can build the same world."""
 
 import hashlib
 import json
@@ -24,17 +24,21 @@ from rpbi.world.loading import CameraConfig, LoadedWorld, ObjectConfig, WorldCon
 from .values import from_text, to_text, trusting
 
 FORMAT = 1
-"""Version of the text's layout."""
+"""Version of the layout of descriptions."""
 MAX_COMPARED_BYTES = 1 << 30
-"""Size of the files of a description that are compared with those of the recording [bytes]; others are not."""
+"""Total size of the files that are compared with the recorded hashes [bytes]; files beyond this size are skipped."""
 _WRITTEN = re.compile(r'(?<=")/[^"\\]*/robot_description-[0-9a-f]{12}\.urdf(?=")')
-"""Path of a file of `write_description` in JSON."""
+"""Pattern of a path in JSON to a file that `write_description` wrote."""
 
 
 def describe(loaded: LoadedWorld, start_hash: str) -> str:
-    """Returns what a world was built from, and the hash of its state at its start, as JSON.
+    """Returns the description of a world as JSON: its configuration, and the hashes of its files and its start state.
 
-    Files are named with the hashes of their contents; robot descriptions that have no file of their own are in it.
+    Files are not included, except robot descriptions that `write_description` wrote to temporary files.
+
+    Args:
+        loaded: Configuration of the world.
+        start_hash: Hash of the state after the world was built, see `World.state_hash`.
     """
     named = _files([item.config.model_dump(mode="json") for item in loaded.objects])
     files = sorted({*named, *(item.path for item in loaded.objects if item.path)})
@@ -55,7 +59,7 @@ def describe(loaded: LoadedWorld, start_hash: str) -> str:
 
 
 class _Object(ConfigModel):
-    """An object of a description, with its configuration as text."""
+    """An object in a description; `config` is the configuration as text of `to_text`."""
 
     type: str
     file: str
@@ -63,14 +67,14 @@ class _Object(ConfigModel):
 
 
 class _Camera(ConfigModel):
-    """A camera of a description, with its configuration as text."""
+    """A camera in a description; `config` is the configuration as text of `to_text`."""
 
     file: str
     config: str
 
 
 class _Description(ConfigModel):
-    """Content that `describe` writes, without the format. Older recordings have no cameras."""
+    """Content of a description, without the key `format`. Older recordings do not have the key `cameras`."""
 
     pybullet: str
     file: str
@@ -83,17 +87,16 @@ class _Description(ConfigModel):
 
 
 class WorldDescription:
-    """A description that was read.
+    """A description of a world, which was read from its text.
 
     Args:
         text: Result of `describe`.
 
     Attributes:
-        start_hash: Hash of the state at the start.
-        warnings: Differences of this machine from the recording one.
+        start_hash: Hash of the world's state after it was built.
 
     Raises:
-        ValueError: If the text is no description, or one of another version of this package.
+        ValueError: If the text is not a description, or was written by an incompatible version of this package.
     """
 
     def __init__(self, text: str) -> None:
@@ -115,14 +118,14 @@ class WorldDescription:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """Differences of this machine from the recording one."""
+        """Messages about files, or a PyBullet version, that differ between this machine and the recording."""
         read, left, differences = self._read, MAX_COMPARED_BYTES, []
         for path, digest in read.files.items():
             if path in read.descriptions:
                 continue
             try:
                 data = read_file(path, left)
-            except OSError:  # building the world reports what is wrong with it
+            except OSError:  # building the world reports a missing file
                 continue
             left -= len(data)
             if hashlib.sha256(data).hexdigest() != digest:
@@ -137,10 +140,10 @@ class WorldDescription:
         """Returns the configuration of the world.
 
         Args:
-            trust: Packages that it may import, see `trusting`.
+            trust: Packages from which the description may import classes, see `trusting`.
 
         Raises:
-            ConfigError: If it is not valid here, for instance because a file is missing.
+            ConfigError: If the configuration is not valid on this machine, for instance because a file is missing.
         """
         read = self._read
         with trusting(trust):
@@ -171,7 +174,7 @@ class WorldDescription:
 
 
 def _files(data: Any) -> Iterator[str]:
-    """Yields all names of files in a configuration; validation has made them absolute."""
+    """Yields the paths of existing files in a configuration; validation has made all paths absolute."""
     if isinstance(data, dict):
         data = list(data.values())
     if isinstance(data, list):

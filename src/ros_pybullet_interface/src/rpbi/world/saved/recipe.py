@@ -1,4 +1,4 @@
-"""Recipes, by which the bodies of a world are built again in a fresh client, always in the same way."""
+"""Recipes, from which the bodies of a world are built again in a fresh PyBullet client, always in the same way."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from rpbi.engine.client import Client
 from rpbi.world.load_log import LogEntry, apply
 
 MAX_BODY_ID = 100_000
-"""Largest body id; unused ids below the largest one are taken and freed while bodies are made."""
+"""Largest allowed body id. It limits the work of `_reserve_ids`, which makes a temporary body for each id."""
 _MOMENTARY = pybullet.ACTIVATION_STATE_WAKE_UP | pybullet.ACTIVATION_STATE_SLEEP
-"""Flags of `activationState` that act once; others last."""
+"""Flags of `activationState` that have a momentary effect; all other flags stay in effect."""
 _PAIRS = (
     (pybullet.ACTIVATION_STATE_ENABLE_SLEEPING, pybullet.ACTIVATION_STATE_DISABLE_SLEEPING),
     (pybullet.ACTIVATION_STATE_ENABLE_WAKEUP, pybullet.ACTIVATION_STATE_DISABLE_WAKEUP),
 )
-"""Lasting flags that replace each other."""
+"""Pairs of lasting flags that replace each other."""
 
 
 class BodyRecipe(NamedTuple):
     """A body as it was loaded.
 
     Attributes:
-        name: Its name.
-        kind: Its type, a key of BODY_TYPES or `module:Class`.
-        config: Its configuration.
-        body_id: PyBullet's id of it.
+        name: Name of the body.
+        kind: Type of the body: a key of BODY_TYPES, or `module:Class`.
+        config: Configuration of the body.
+        body_id: PyBullet's id of the body.
     """
 
     name: str
@@ -45,13 +45,14 @@ class BodyRecipe(NamedTuple):
 
 
 class Recipe(NamedTuple):
-    """Bodies of a world in the order of loading, later changes, and cameras.
+    """The bodies of a world, changes since they were loaded, and cameras.
 
     Attributes:
-        bodies: The bodies.
-        dynamics: Changes of their dynamics: body, link (empty for the root) and change, one for each link.
-        physics: Changes of gravity and the engine's parameters.
-        cameras: Configurations of the cameras, the first one first.
+        bodies: The bodies in the order of loading.
+        dynamics: For each link with changed dynamics: name of the body, name of the link (empty for the root link), and
+            new values.
+        physics: Changes of gravity and of the engine's parameters.
+        cameras: Configurations of the cameras in the order of adding.
     """
 
     bodies: tuple[BodyRecipe, ...]
@@ -61,7 +62,7 @@ class Recipe(NamedTuple):
 
     @classmethod
     def of(cls, contents: Any) -> Recipe:
-        """Returns the shortest recipe for the present `WorldContents`."""
+        """Returns a recipe for the present state of `WorldContents`, in which successive changes are merged."""
         bodies: Mapping[str, Body] = contents.bodies
         added: dict[str, LogEntry] = {}
         changed: dict[tuple[str, str], dict[str, Any]] = {}
@@ -91,10 +92,14 @@ class Recipe(NamedTuple):
         )
 
     def entries(self, pb: Client, config: WorldConfig) -> Iterator[LogEntry]:
-        """Yields the entries that build the world in a fresh client; each must be applied before the next is taken.
+        """Yields the load log entries that build the world; each must be applied before the next one is requested.
+
+        Args:
+            pb: Fresh client, in which the entries are applied.
+            config: Configuration of the world.
 
         Raises:
-            InterfaceError: If PyBullet cannot give the bodies these ids.
+            InterfaceError: If the body ids of the recipe are not valid.
         """
         yield LogEntry("", "world", config)
         self._reserve_ids(pb)
@@ -106,17 +111,20 @@ class Recipe(NamedTuple):
             yield LogEntry("", "physics", physics)
 
     def check_ids(self, bodies: Mapping[str, Body]) -> None:
-        """Checks that bodies have the ids that they had.
+        """Checks that the bodies that were built have the body ids in the recipe.
 
         Raises:
-            InterfaceError: If one has another id.
+            InterfaceError: If a body has another id.
         """
         for name, _, _, body_id in self.bodies:
             if bodies[name].body_id != body_id:
                 raise InterfaceError(f"'{name}': expected PyBullet's id {body_id}, got {bodies[name].body_id}")
 
     def _reserve_ids(self, pb: Client) -> None:
-        """Makes PyBullet give the next bodies the ids that they had: it reuses the id that was freed last."""
+        """Makes PyBullet give the next bodies the ids in the recipe.
+
+        Creates temporary bodies and removes them in a suitable order, since PyBullet reuses the last freed id first.
+        """
         ids = [body.body_id for body in self.bodies]
         if ids == list(range(len(ids))):
             return
@@ -128,10 +136,10 @@ class Recipe(NamedTuple):
 
 
 class FreshClient:
-    """A copy of the bodies of a world, in a client that has not stepped yet.
+    """A fresh PyBullet client, in which the bodies of a world are built from a recipe.
 
     Args:
-        recipe: How they are built.
+        recipe: Recipe of the bodies.
         config: Configuration of the world.
     """
 
@@ -142,11 +150,11 @@ class FreshClient:
         self._bodies: dict[str, Body] = {}
 
     def build(self) -> Iterator[None]:
-        """Builds body by body, one for each item.
+        """Builds the bodies; each item of the iterator is yielded after an entry of the recipe has been applied.
 
         Raises:
-            ConfigError: If one cannot be loaded any more.
-            InterfaceError: If PyBullet refuses.
+            ConfigError: If a body cannot be loaded again, for instance because its file is missing.
+            InterfaceError: If PyBullet refuses a body.
         """
         for entry in self.recipe.entries(self.pb, self._config):
             apply(self.pb, self._bodies, entry)
@@ -156,7 +164,7 @@ class FreshClient:
             body.close()
 
     def close(self) -> None:
-        """Discards the copy."""
+        """Closes the bodies and disconnects the client."""
         for body in self._bodies.values():
             body.close()
         self.pb.disconnect()
@@ -168,7 +176,7 @@ def _kind_and_config(added: LogEntry) -> tuple[str, BodyConfig]:
 
 
 def _merge(values: dict[str, Any], change: Mapping[str, Any]) -> None:
-    """Applies a change of dynamics on top of others."""
+    """Merges a change of dynamics into `values`, the merged earlier changes of the same link."""
     state = change.get("activationState", 0) & ~_MOMENTARY
     lasting = values.get("activationState", 0)
     for pair in _PAIRS:
@@ -180,7 +188,13 @@ def _merge(values: dict[str, Any], change: Mapping[str, Any]) -> None:
 
 
 def _change(body: Body, link: str, values: dict[str, Any]) -> ChangeDynamics:
-    """Returns the change by which a body that was just loaded gets the present dynamics of a link."""
+    """Returns the change that gives a link of a newly loaded body the present dynamics of this link of `body`.
+
+    Args:
+        body: The present body.
+        link: Name of the link; empty for the root link.
+        values: All changed values of the link so far.
+    """
     if values.keys() & {"mass", "localInertiaDiagonal"}:
         index = next((index for index in body.joint_indices if body.link_name(index) == link), -1)
         mass, _, inertia = body.dynamics_info(index)[:3]

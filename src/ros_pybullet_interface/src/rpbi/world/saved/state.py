@@ -1,4 +1,4 @@
-"""A state of a world, from which the same world can be built again, in any process."""
+"""Saved states, from which a world can be restored in any process."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from custom_ros_tools.foreign import load_foreign_json, printable
 from .command_log import RecordedCommand, apply_command
 
 FORMAT = 2
-"""Version of the file's layout: a header, a line for each command, and the SHA-256 of all lines before."""
+"""Version of the layout of files. A file has a header line, a line for each command, and the lines' SHA-256 hash."""
 MAX_BYTES = 1 << 28
-"""Largest size of a file, packed or unpacked [bytes]."""
+"""Largest size of a file, both compressed and uncompressed [bytes]."""
 MAX_COMMANDS = 2_000_000
-"""Largest number of commands in a file: 33 minutes of a target in each tick at 1 kHz."""
+"""Largest number of commands in a file, for instance one target at each tick of 1 kHz for 33 minutes."""
 MAX_TICKS = 20_000_000
-"""Age of a state beyond which it is refused without `max_ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+"""Default limit of the number of ticks that are simulated to reach a state: 5.5 hours of a world at 1 kHz."""
 _HASH = re.compile("[0-9a-f]{32}")
 _BEGINNING = b'{"format": '
 
 
 class WorldState(NamedTuple):
-    """A state of a world: what the world was built from, and all commands since.
+    """A state of a world, saved as the world's description and all commands that lead to the state.
 
     Attributes:
-        description: Text of `describe`.
-        commands: All commands since the world was built or reset, or since the keyframe, in their order.
-        tick: The tick.
-        state_hash: The hash at that tick, see `World.state_hash`.
-        keyframe: Keyframe that the commands begin at; empty for the start.
-        start: Its tick, 0 for the start.
+        description: Description of the world, text of `describe`.
+        commands: All commands, in order, since the keyframe or, without a keyframe, since the world was built or reset.
+        tick: Tick of the state.
+        state_hash: Hash of the state, see `World.state_hash`.
+        keyframe: Text of the keyframe after which the commands begin; empty without a keyframe.
+        start: Tick of the keyframe; 0 without a keyframe.
     """
 
     description: str
@@ -53,11 +53,11 @@ class WorldState(NamedTuple):
     start: int = 0
 
     def write(self, path: str | Path) -> None:
-        """Writes it to a file, `NAME.world` by custom.
+        """Writes the state to a file, conventionally named `NAME.world`. After an error, the file is unchanged.
 
         Raises:
-            InterfaceError: If it is larger than `read` allows.
-            OSError: If it cannot be written; then no file of that name is left half-written.
+            InterfaceError: If the state is larger than `read` allows.
+            OSError: If the file cannot be written.
         """
         if len(self.commands) > MAX_COMMANDS:
             raise InterfaceError(
@@ -80,10 +80,10 @@ class WorldState(NamedTuple):
 
     @classmethod
     def read(cls, path: str | Path) -> WorldState:
-        """Returns the state of a file.
+        """Reads a state from a file.
 
         Raises:
-            ConfigError: If there is no such file, or it is not one of `write`, too large or of another version.
+            ConfigError: If the file does not exist, is too large, or is not from `write` of a compatible version.
         """
         try:
             packed = read_file(path, MAX_BYTES)
@@ -98,7 +98,7 @@ class WorldState(NamedTuple):
 
     @classmethod
     def _of(cls, file: gzip.GzipFile) -> WorldState:
-        """Reads an unpacked file line by line, so that neither a large file nor a long line can exhaust the memory."""
+        """Reads a state from a file that is decompressed line by line, to limit the memory used for invalid files."""
         seal = hashlib.sha256()
 
         def next_line() -> Any:
@@ -131,16 +131,16 @@ class WorldState(NamedTuple):
 
     @classmethod
     def is_file(cls, path: str | Path) -> bool:
-        """Returns whether a file begins as those of `write` do."""
+        """Returns whether a file begins like a file that `write` wrote."""
         with suppress(OSError, EOFError, zlib.error), gzip.open(path) as file:
             return file.read(len(_BEGINNING)) == _BEGINNING
         return False
 
     def require_short(self, max_ticks: int) -> None:
-        """Checks the age of the state: a forged tick would be simulated for days.
+        """Checks how many ticks have to be simulated to reach the state, since a forged number could take days.
 
         Raises:
-            InterfaceError: If it is older than `max_ticks`.
+            InterfaceError: If the number of ticks exceeds `max_ticks`.
         """
         ticks = self.tick - self.start
         if ticks > max_ticks:
@@ -150,14 +150,14 @@ class WorldState(NamedTuple):
             )
 
     def run(self, world: Any, trust: Collection[str] | None = ()) -> Iterator[int]:
-        """Brings a `World` that was just built or reset to this state, and yields each tick on the way.
+        """Simulates a `World`, which was just built or reset, until it reaches this state; yields each tick on the way.
 
         Args:
             world: The world.
-            trust: Packages that commands may import, see `trusting`.
+            trust: Packages from which the keyframe and the commands may import classes, see `trusting`.
 
         Raises:
-            InterfaceError: If its state then has another hash, or a command is refused or makes no sense.
+            InterfaceError: If the keyframe or a command cannot be applied, or the reached state has another hash.
         """
         if self.keyframe:
             world.enter_keyframe(self.keyframe, trust)

@@ -1,4 +1,4 @@
-"""Values of recorded commands and configurations, as text that reads back exactly."""
+"""Converts values of recorded commands and configurations to text, and back without loss."""
 
 import json
 import re
@@ -12,16 +12,17 @@ from custom_ros_tools.plugins import UntrustedError, check_trusted, find, trusti
 from custom_ros_tools.schema import ConfigModel
 
 PAIRS = "pairs"
-"""Key for the content of a mapping, as a list of pairs, since its keys need not be texts."""
+"""JSON key for a mapping, which is written as a list of key-value pairs, since its keys need not be strings."""
 QUOTED = 60
-"""Number of characters that a message quotes from a text that cannot be read."""
+"""Largest number of characters that an error message quotes from an invalid text."""
 
 
 def trusting(packages: Collection[str] | None) -> AbstractContextManager[None]:
-    """Returns a context in which a recording may name only classes of `rpbi` and of these packages.
+    """Returns a context in which a recording may use only classes of `rpbi` and of given packages.
 
     Args:
-        packages: Further packages that it may import. None: any package, for a recording that this program made.
+        packages: Further packages whose classes are allowed. None allows all packages, for recordings made by this
+            program itself.
     """
     if packages is None:
         return nullcontext()
@@ -31,21 +32,21 @@ def trusting(packages: Collection[str] | None) -> AbstractContextManager[None]:
 def to_text(value: Any) -> str:
     """Returns a value as JSON.
 
-    Floats read back to the last bit (Python writes the shortest text that does). Named tuples and configurations become
+    Floats are written so that reading restores them exactly. Named tuples and configurations are written as
     `{"module:Class": fields}`.
 
     Raises:
-        TypeError: If it holds something that has no such text.
+        TypeError: If the value contains an object of a type that cannot be written.
     """
     return json.dumps(_plain(value), separators=(",", ":"))
 
 
 def from_text(text: str) -> Any:
-    """Returns the value of a text of `to_text`, with tuples for lists.
+    """Reads a value from a text that `to_text` wrote; lists become tuples.
 
     Raises:
-        ValueError: If `to_text` does not write such a text, or it names a class that is missing or not trusted.
-        ConfigError: If a configuration in it is not valid here, for instance because a file is missing.
+        ValueError: If the text was not written by `to_text`, or contains a class that is missing or not trusted.
+        ConfigError: If a configuration in the text is not valid here, for instance because a file is missing.
     """
     try:
         plain = load_foreign_json(text, "recorded value")
@@ -65,7 +66,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return float(value)
     if isinstance(value, ConfigModel):
-        # Only keys that were given, since only those are passed to PyBullet.
+        # Only keys that were set explicitly, since only these are passed to PyBullet
         return {_class_name(value): value.model_dump(mode="json", exclude_unset=True)}
     if isinstance(value, Mapping):
         return {PAIRS: [[_plain(key), _plain(item)] for key, item in value.items()]}
@@ -101,7 +102,7 @@ FORMER_MODULES = {
     "rpbi.control.streams.target_stream": "rpbi.control.target_stream",
     "rpbi.control.trajectories.tolerances": "rpbi.control.trajectories.request",
 }
-"""Modules in older recordings and keyframes, and the present modules of their classes."""
+"""Present module names, indexed by the module names in older recordings and keyframes."""
 FORMER_NAMES = {
     "rpbi.constraints.attachment_config:AttachmentConfig": "rpbi.config.world:AttachmentConfig",
     "rpbi.control.controllers.force:ForceConfig": "rpbi.control.controllers.force:ForceControllerConfig",
@@ -111,12 +112,12 @@ FORMER_NAMES = {
     "rpbi.engine.actions:TimedGoal": "rpbi.world.actions:TimedGoal",
     "rpbi.urdf.joints:JointTarget": "rpbi.control.joint_command:JointCommand",
 }
-"""Names of single classes in older recordings, and their present names."""
+"""Present names of single classes, indexed by their names in older recordings."""
 _NAME_IN_JSON = re.compile(r'(?<=")rpbi[\w.]+:[\w.]+(?=")')
 
 
 def with_present_names(text: str) -> str:
-    """Returns JSON in which former names of classes are replaced by their present names."""
+    """Replaces former class names in JSON by their present names, and returns the new JSON."""
     return _NAME_IN_JSON.sub(lambda match: _present_name(match[0]), text)
 
 
@@ -130,7 +131,13 @@ def _class_name(value: Any) -> str:
 
 
 def _class_of(name: str) -> type:
-    """Returns a class of values. Others are refused, so that a file cannot have arbitrary code called."""
+    """Returns the named tuple or configuration class with a given name.
+
+    Other classes are refused, so that a file cannot execute arbitrary code.
+
+    Raises:
+        ValueError: If the class is missing, not trusted, or of another kind.
+    """
     try:
         check_trusted(name)
         kind = find(_present_name(name))
