@@ -9,12 +9,12 @@ BEHIND_M = 0.09
 HEIGHT_M = 0.06
 """Height of the hand above the floor [m]."""
 PER_M2 = 10.0
-"""Weight of the box's squared distance; the hand's squared distance has the weight 1."""
+"""Weight of the box's squared distance from its goal. The hand's squared distance has the weight 1."""
 
 
 def box_to_goal(world: World) -> float:
-    """Returns the weighted sum of two squared distances [m^2]: from the box to its goal, and from the hand to its place
-    behind the box.
+    """Returns the weighted sum of two squared distances [m^2]: from the box to its goal, and from the hand to the
+    desired position behind the box.
     """
     box, arm = world.bodies["box"].base_pose().position, world.bodies["kuka_lwr"]
     hand = arm.link_pose(arm.link_indices[-1]).position

@@ -1,4 +1,4 @@
-"""Report of the demo's recording, in pictures and words."""
+"""Report of the demo's recording: rates, errors, pictures and a text summary."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -14,13 +14,18 @@ import numpy.typing as npt  # noqa: E402
 import pandas as pd  # noqa: E402
 
 ENOUGH = 0.95
-"""Share of the expected rate that a topic must reach."""
+"""Share of the expected rate that a topic's measured rate must reach."""
 MIN_SPAN_RAD = 0.2
-"""Smallest range of a joint's plot [rad or m], so that noise of a joint at rest is not magnified."""
+"""Smallest height of a joint's plot [rad or m], so that the noise of a joint at rest is not magnified."""
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
-    """Compares measured with expected message rates of topics over a duration of ROS time [s].
+    """Compares measured and expected message rates of topics.
+
+    Args:
+        messages: Number of received messages, indexed by topic.
+        expected_hz: Expected rate [Hz], indexed by topic.
+        duration_s: ROS time in which the messages were received [s].
 
     Returns:
         One row for each topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
@@ -35,11 +40,11 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
 
 
 def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
-    """Compares joint positions with the targets that were active at the same time.
+    """Computes the errors between joint positions and the latest targets at the same time.
 
     Args:
         states: Joint states with columns `position/JOINT`, indexed by time [s].
-        targets: Targets, in the same form.
+        targets: Joint targets with the same columns and index.
 
     Returns:
         One row for each joint with the columns `rms` and `max` [rad or m].
@@ -53,7 +58,7 @@ def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
 
 
 def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None:
-    """Draws positions and targets of the joints that have targets."""
+    """Writes a picture of positions and targets over time, for all joints that have targets."""
     columns = [column for column in targets.columns if column.startswith("position/")]
     start_s = states.index[0]
     figure, axes = plt.subplots(len(columns), sharex=True, figsize=(9, 1.3 * len(columns) + 1), squeeze=False)
@@ -71,7 +76,7 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
 
 
 def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
-    """Draws the motor efforts of the given joints."""
+    """Writes a picture of the motor efforts of the given joints over time."""
     figure, axis = plt.subplots(figsize=(9, 4))
     for joint in joints:
         axis.plot(states.index - states.index[0], states[f"effort/{joint}"], lw=1.0, label=joint)
@@ -83,11 +88,11 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
 
 
 def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
-    """Returns the sum of the normal forces of another body [N], indexed by time [s]; 0 where that body does not touch.
+    """Returns the sum of the normal forces of one other body [N], indexed by time [s]. Without contact, it is 0.
 
     Args:
-        contacts: One row for each contact with `other_body` and `normal_force`, and one for each time without a
-            contact.
+        contacts: Contacts of a body, indexed by time [s]. Each contact is a row with the columns `other_body` and
+            `normal_force`. A time without contact also has a row.
         other_body: Name of the other body.
     """
     if "other_body" not in contacts:  # no contact in the whole recording
@@ -97,7 +102,7 @@ def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
 
 
 def force_figures(push: pd.Series) -> dict[str, float]:
-    """Returns the mean force during contact and the largest force [N]; both are 0 without contact."""
+    """Returns the mean pushing force during contact and the largest pushing force [N]. Without contact, both are 0."""
     touching = push[push > 0.0]
     if touching.empty:
         return {"push_mean_n": 0.0, "push_max_n": 0.0}
@@ -105,13 +110,14 @@ def force_figures(push: pd.Series) -> dict[str, float]:
 
 
 def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
-    """Draws the arm's force on the box, the friction that it overcomes, and the force at the wrist [N].
+    """Writes a picture of three forces over time [N]: arm on box, limit of the floor's friction, and at the wrist.
 
     Args:
         push: Force of the arm on the box [N], indexed by time [s].
-        friction: Largest friction force of the floor, mu N [N], indexed by time [s].
+        friction: Largest possible friction force of the floor [N]: the coefficient times the normal force, indexed by
+            time [s].
         wrist: Samples of the force-torque sensor, indexed by time [s].
-        start_s: The time that is drawn as 0.
+        start_s: Time at the origin of the plot [s].
         path: Picture file to write.
     """
     figure, (above, below) = plt.subplots(2, sharex=True, figsize=(9, 5))
@@ -131,12 +137,18 @@ def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start
 
 
 def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
-    """Writes a colour image of shape (height, width, 3)."""
+    """Writes a colour image of shape (height, width, 3) to a picture file."""
     plt.imsave(path, pixels)
 
 
 def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> None:
-    """Draws a depth image of shape (height, width) [m]; pixels without depth are white."""
+    """Writes a picture of a depth image.
+
+    Args:
+        depth_m: Depth of each pixel, shape (height, width) [m].
+        far_m: Depth of the far plane [m]; pixels at this depth are white.
+        path: Picture file to write.
+    """
     figure, axis = plt.subplots(figsize=(7.2, 4.9))
     image = axis.imshow(np.where(depth_m < 0.999 * far_m, depth_m, np.nan), cmap="viridis_r")
     figure.colorbar(image, ax=axis, label="depth along the optical axis [m]")
@@ -146,15 +158,18 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
 
 
 def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
-    """Returns a line for each required topic that has no message."""
+    """Returns a line of text for each required topic without messages."""
     topics = summary["topics"].items()
     return [f"{topic} had no message" for topic, row in topics if topic in required and not row["messages"]]
 
 
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], world: str) -> list[str]:
-    """Returns a line for each rate that a slow or busy machine reduced, with cause and remedy.
+    """Returns lines of text with cause and remedy for each rate that is too low.
 
-    All image topics share one line. `world` is the main YAML file.
+    Args:
+        summary: The summary of the recording.
+        images: Topics of the camera, which share one line.
+        world: The world's main YAML file, which the remedy names.
     """
     topics, factor = summary["topics"], summary["figures"]["real_time_factor"]
     lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
@@ -187,7 +202,7 @@ def _load(summary: Mapping[str, Any]) -> str:
 
 
 def as_text(summary: Mapping[str, Any]) -> str:
-    """Returns the summary as a table for the terminal."""
+    """Formats the summary as a table for the terminal."""
     lines = [f"{'topic':<36}{'messages':>9}{'rate [Hz]':>11}{'expected':>10}"]
     for topic, row in summary["topics"].items():
         mark = "" if row["enough"] else "  TOO FEW"

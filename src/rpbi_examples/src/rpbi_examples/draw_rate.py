@@ -1,4 +1,4 @@
-"""Measures how fast this machine draws images of a world without physics and ROS; cameras cannot be faster."""
+"""Measures how fast this machine draws images of a world, without physics and ROS. Cameras cannot be faster."""
 
 import argparse
 import json
@@ -18,9 +18,9 @@ TIMEOUT_S = 120.0
 
 
 def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> float:
-    """Measures the rate at which the images of the world's camera are drawn, at normal process priority.
+    """Measures the rate at which images of the world's camera are drawn.
 
-    The measurement runs in a separate process, since some graphics drivers crash.
+    The measurement runs in a separate process with normal priority, since some graphics drivers crash.
 
     Args:
         world: Main YAML file.
@@ -48,7 +48,14 @@ def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> flo
 
 
 def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
-    """Draws in this process for a given time [s], and returns the number of images per second."""
+    """Draws images of the world's camera for a given time, and returns the number of images per second.
+
+    Args:
+        world: Main YAML file.
+        camera: Pose of the camera's optical frame in the world.
+        seconds: Duration of the measurement [s].
+        use_egl: Whether to draw with EGL; otherwise with TinyRenderer.
+    """
     loaded = World.from_file(world)
     config = loaded.config.rgbd_sensor
     assert config is not None
@@ -68,7 +75,7 @@ def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
 
 
 def main() -> None:
-    """Prints the number of images per second as JSON."""
+    """Runs `measure` with arguments of the command line, and prints the number of images per second as JSON."""
     parser = argparse.ArgumentParser(prog=__name__)
     parser.add_argument("world")
     parser.add_argument("seconds", type=float)

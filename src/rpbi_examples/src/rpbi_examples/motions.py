@@ -1,4 +1,4 @@
-"""Motions in the examples: a figure eight, circles, an orbit, a route, joints that swing, a wave, and a grasp."""
+"""Reference motions for the examples: a figure eight, circles, an orbit, a route, joint swings, a wave, and a grasp."""
 
 import math
 from collections.abc import Sequence
@@ -13,51 +13,51 @@ from robot_model.geometry import Quaternion, Vector
 from rpbi.control.trajectories.trajectory import minimum_jerk
 
 CIRCLE_RADIUS = 0.12
-"""Radius of the circles [m]."""
+"""Radius of the hands' circles [m]."""
 CIRCLE_PERIOD_S = 6.0
-"""Time of one round [s]."""
+"""Time for one turn of a circle [s]."""
 CIRCLE_CENTRE = (0.55, 0.30, 0.85)
-"""Lowest point of the left hand's circle in the world [m]; the right hand's has the opposite y."""
+"""Lowest point of the left hand's circle in the world [m]. The right hand's circle has the opposite y."""
 WIPED_M = 0.3
-"""Length of the line that is wiped [m]."""
+"""Length of the line along which a hand wipes [m]."""
 WIPING_PERIOD_S = 4.0
-"""Time to wipe it forth and back [s]."""
+"""Time for wiping the line forth and back [s]."""
 POINTING_DOWN = (0.0, 1.0, 0.0, 0.0)
-"""Orientation of the hands as x, y, z, w: their z axis down."""
+"""Orientation of the hands as quaternion x, y, z, w. The hands' z axis points down."""
 ORBIT_RADIUS = 2.0
 """Distance of the camera from the vertical axis of its orbit [m]."""
 ORBIT_HEIGHT = 1.5
-"""Height above the ground [m]."""
+"""Height of the camera above the ground [m]."""
 TARGET_HEIGHT = 0.4
-"""Height of the point on that axis at which the camera looks [m]."""
+"""Height of the point on the orbit's axis at which the camera points [m]."""
 ORBIT_SPEED = math.pi / 8.0
-"""Rate of turn [rad/s]."""
+"""Angular speed of the camera on its orbit [rad/s]."""
 ROUTE_GAIN = 1.5
-"""Speed for each metre or radian that is left [1/s]."""
+"""Speed towards the next waypoint, divided by the remaining distance or angle [1/s]."""
 REACHED_M = 0.03
-"""A waypoint counts as reached within this distance [m]..."""
+"""Distance from a waypoint at which the waypoint counts as reached [m]."""
 REACHED_RAD = 0.03
-"""... and this angle [rad]."""
+"""Angle from a waypoint at which the waypoint counts as reached [rad]."""
 TO_MIDDLE_S = 3.0
-"""Time in which all joints together reach the middle of their swings [s]."""
+"""Time in which all joints move from the start to the middle of their swings [s]."""
 SWING_PERIOD_S = 4.0
-"""Time that one joint swings [s]."""
+"""Duration of one joint's swing [s]. The joints swing one after the other."""
 SWING_RAMP_S = 0.6
-"""Time in which a swing reaches its full speed, and stops at its end [s]."""
+"""Time for the acceleration at the start of a swing, and for the deceleration at its end [s]."""
 SWING_AMPLITUDE = 1.0
-"""Amplitude of a swing [rad or m]; smaller where its limits require it."""
+"""Amplitude of a swing [rad or m]. The joint limits may reduce it."""
 SWING_MARGIN = 0.95
-"""Usable share of the distance to a limit."""
+"""Share of the distance to a joint limit that a swing may use."""
 RAISED_DEG = {"jRightShoulder_rotx": -10.0, "jRightShoulder_roty": -60.0, "jRightElbow_rotz": 75.0}
-"""Joints of a human model that raise the right hand."""
+"""Joint angles [deg] with which a human model raises its right hand."""
 RAISE_S = 2.0
 """Time to raise the hand [s]."""
 WAVE_JOINT, WAVE_AMPLITUDE, WAVE_PERIOD_S = "jRightElbow_rotz", math.radians(30.0), 1.5
-"""Joint that waves, its motion to either side [rad], and the time of one wave [s]."""
+"""Joint that waves, its amplitude [rad], and the duration of one wave [s]."""
 FINGERS_OPEN, FINGERS_CLOSED = 0.04, 0.0
-"""Position of a finger, open and closed [m]; the box stops it before it is closed."""
+"""Target positions of an open and of a closed finger [m]. A grasped box stops the finger before it is closed."""
 GRASP_HEIGHT, CARRY_HEIGHT = 0.025, 0.2
-"""Height of the point between the fingertips [m]: to grasp and release a box, and to carry it."""
+"""Height of the point between the fingertips [m] during grasp and release, and while the box is carried."""
 
 
 class FigureEight(StartParameters):
@@ -71,19 +71,21 @@ class FigureEight(StartParameters):
     period_s: Seconds = Field(10.0, description="Time of one round [s].")
 
     def position(self, time_s: float) -> Vector:
-        """Returns its position at a time [s], in its x-y plane [m]."""
+        """Returns the position on the figure at a time [s], in the figure's frame [m]."""
         angle = 2.0 * math.pi * time_s / self.period_s
         return self.height * math.sin(angle) * math.cos(angle), self.width / 2.0 * math.sin(angle), 0.0
 
     def frame(self, name: str) -> str:
-        """Returns the full name of one of its frames."""
+        """Returns a frame's name with the prefix `tf_ns`."""
         return "/".join(part for part in (self.tf_ns.strip("/"), name) if part)
 
 
 def hand_position(time_s: float, side: float, distance: float = 2.0 * CIRCLE_CENTRE[1]) -> Vector:
-    """Returns the target position of the left (`side` 1) or right hand (-1) [m] at a time since the start [s].
+    """Returns the target position of a hand on its circle, in the world [m].
 
     Args:
+        time_s: Time since the start [s].
+        side: 1 for the left hand, -1 for the right hand.
         distance: Distance between the centres of both circles [m].
     """
     angle = 2.0 * math.pi * time_s / CIRCLE_PERIOD_S
@@ -92,14 +94,17 @@ def hand_position(time_s: float, side: float, distance: float = 2.0 * CIRCLE_CEN
 
 
 def wiped(time_s: float) -> float:
-    """Returns the distance of a wiping hand from the middle of its line [m] at a time since the start [s]."""
+    """Returns the signed distance of a wiping hand from the middle of its line [m] at a time since the start [s]."""
     return WIPED_M / 2.0 * math.sin(2.0 * math.pi * time_s / WIPING_PERIOD_S)
 
 
 def camera_pose(time_s: float) -> tuple[Vector, Array]:
-    """Returns position [m] and orientation (x, y, z, w) of the optical frame at a time [s].
+    """Returns the pose of an orbiting camera's optical frame in the world at a time [s].
 
     The optical frame has x to the right, y down and z forward.
+
+    Returns:
+        Position [m], and orientation as quaternion x, y, z, w.
     """
     angle = ORBIT_SPEED * time_s
     position = ORBIT_RADIUS * math.cos(angle), ORBIT_RADIUS * math.sin(angle), ORBIT_HEIGHT
@@ -121,18 +126,27 @@ SQUARE = tuple(
     PlanarPose(0.8 * x, 0.8 * y, math.pi / 2.0 * turns)
     for x, y, turns in ((-1, -1, 0), (1, -1, 0), (1, 1, 1), (-1, 1, 1), (-1, 1, 2), (-1, -1, 3))
 )
-"""Forwards along the first side, turning along the second, sideways along the third, turning along the last."""
+"""Waypoints around a square. A base drives forwards along the first side, turns along the second, drives sideways along
+the third, and turns along the last.
+"""
 
 
 class Route:
-    """A route along waypoints that begins again at its end."""
+    """A closed route along waypoints. After the last waypoint, the route continues with the first."""
 
     def __init__(self, waypoints: Sequence[PlanarPose] = SQUARE) -> None:
         self._waypoints = tuple(waypoints)
         self._next = 0
 
     def velocity(self, pose: PlanarPose) -> PlanarPose:
-        """Returns the velocity [m/s, m/s, rad/s], in its own frame, with which a base continues from a pose."""
+        """Returns the velocity with which a base at a pose moves to the next waypoint.
+
+        Args:
+            pose: Present pose of the base.
+
+        Returns:
+            Velocity in the base's frame [m/s, m/s, rad/s].
+        """
         distance, angle = _left(pose, self._waypoints[self._next])
         if math.hypot(*distance) < REACHED_M and abs(angle) < REACHED_RAD:
             self._next = (self._next + 1) % len(self._waypoints)
@@ -143,12 +157,18 @@ class Route:
 
 
 def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
-    """Returns the distance [m] and the shorter turn [rad] from one pose to another."""
+    """Returns the vector x, y [m] and the shorter rotation [rad] from a pose to a goal."""
     return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
 
 
 class GraspStep(NamedTuple):
-    """Position of the point between the fingertips, on the floor and above it, and of each finger [m]."""
+    """Target of a hand with two fingers.
+
+    Attributes:
+        place: x, y and yaw of the point between the fingertips.
+        height: Height of the point between the fingertips above the floor [m].
+        finger: Position of each finger [m].
+    """
 
     place: PlanarPose
     height: float
@@ -156,21 +176,21 @@ class GraspStep(NamedTuple):
 
     @property
     def position(self) -> Vector:
-        """The point in the world [m]."""
+        """Position of the point between the fingertips in the world [m]."""
         return self.place.x, self.place.y, self.height
 
     @property
     def quat_xyzw(self) -> Quaternion:
-        """Orientation of the hand: it points down, its fingers close along the y axis of the place."""
+        """Orientation of the hand. The hand points down, and the fingers close along the y axis of `place`."""
         return math.cos(self.place.yaw / 2.0), math.sin(self.place.yaw / 2.0), 0.0, 0.0
 
 
 def pick_and_place(box: PlanarPose, goal: PlanarPose) -> tuple[GraspStep, ...]:
-    """Returns the steps that carry a box to a place; each step moves either the hand or the fingers.
+    """Returns the steps with which a hand carries a box to a goal. Each step moves either the hand or the fingers.
 
     Args:
-        box: Position of its centre; its orientation by multiples of 90 deg does not matter.
-        goal: Target position of its centre.
+        box: Pose of the box's centre. Yaw angles that differ by multiples of 90 deg are equivalent.
+        goal: Goal pose of the box's centre.
     """
     box = box._replace(yaw=math.remainder(box.yaw, math.pi / 2.0))
     return (
@@ -186,14 +206,14 @@ def pick_and_place(box: PlanarPose, goal: PlanarPose) -> tuple[GraspStep, ...]:
 
 
 class Swing:
-    """Positions of all joints over time.
+    """Motion in which n joints swing one after the other.
 
     Args:
         start: Positions of the n joints at time 0 [rad or m].
-        lower: Their lower limits; -inf where there is none.
-        upper: Their upper limits.
-        middle: Centres of the swings, clipped to the limits; 0 if left out.
-        amplitude: Motion to either side [rad or m]; less where limits require it.
+        lower: Lower limits of the joints [rad or m]; -inf without a limit.
+        upper: Upper limits of the joints [rad or m]; inf without a limit.
+        middle: Centres of the swings [rad or m], which are clipped to the limits. Default: 0.
+        amplitude: Amplitude of the swings [rad or m]. The limits may reduce it.
     """
 
     def __init__(
@@ -226,11 +246,11 @@ class Swing:
 
 
 class Wave:
-    """Positions of all joints of a human model that raises its right hand and waves.
+    """Motion in which a human model raises its right hand and waves.
 
     Args:
-        names: Names of the n joints.
-        start: Their positions at time 0 [rad].
+        names: Names of the model's n joints.
+        start: Positions of the joints at time 0 [rad].
     """
 
     def __init__(self, names: Sequence[str], start: Sequence[float]) -> None:
@@ -249,7 +269,10 @@ class Wave:
 
 
 def _swing_angle(phase_s: float) -> float:
-    """Returns the angle of the sine [rad] at a time since a swing began [s]: from 0 to a full turn, at rest at both."""
+    """Returns the phase angle of a swing [rad] at a time since its start [s].
+
+    The angle grows from 0 to 2 pi. Its rate is 0 at the start and at the end.
+    """
     if phase_s > SWING_PERIOD_S / 2.0:
         return 2.0 * math.pi - _swing_angle(SWING_PERIOD_S - phase_s)
     speed = 2.0 * math.pi / (SWING_PERIOD_S - SWING_RAMP_S)

@@ -1,4 +1,4 @@
-"""The page that lists the plug-ins of all tables."""
+"""Generates docs/plugins.md, the page that lists all plug-ins."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,19 +34,19 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
     ("Primitives", PRIMITIVES, "[learning](learning.md)"),
     ("Data set formats", FORMATS, "[data sets](datasets.md)"),
 )
-"""Heading, table and page of each kind of plug-in."""
+"""For each kind of plug-in: heading, table of the plug-ins, and link to a page about them."""
 HEAD = """\
 The names below are valid as a `type` in YAML, or as a parameter of a node. A class of your own package is valid in the
 same places, as `my_package.my_module:MyClass`; see [extending.md](extending.md)."""
 
 
 def plugins_page() -> str:
-    """Returns the page."""
+    """Returns the text of docs/plugins.md."""
     return page([WRITTEN_BY, "# Plug-ins", HEAD, *_sections()])
 
 
 def plugin_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the page, by its path in a workspace."""
+    """Returns the text of the page, indexed by the file's path in a workspace."""
     return {root / "docs/plugins.md": plugins_page()}
 
 

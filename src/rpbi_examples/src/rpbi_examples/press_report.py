@@ -1,4 +1,4 @@
-"""One press and release of an arm on a box: its figure, its table, and the error of its force."""
+"""Evaluates one press of an arm's tool on a box: the errors of the forces, a table, and a figure."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 TOUCHED_M = 0.001
-"""Least depth at which the tool counts as touching [m]."""
+"""Least depth of the tool in the box that counts as contact [m]."""
 RELEASED_S = 0.5
 """Time without contact after which a press is over [s]."""
 MIN_PRESS_S = 0.3
-"""Presses that are shorter are not judged [s]."""
+"""Least duration of a press that is evaluated [s]."""
 MAX_GAP_S = 0.05
-"""Longest time between samples [s]; a longer gap means that the simulator was paused, and does not count."""
+"""Longest time between two samples [s]. A longer gap is a pause of the simulator, and is left out of the means."""
 MIN_SHARE = 0.5
-"""Least share of the time of a press that has to count."""
+"""Least share of a press's duration that must be free of pauses."""
 
 
 class PressSample(NamedTuple):
-    """State at one moment.
+    """State of handle and tool at one time.
 
     Attributes:
-        time_s: Since the start [s].
-        handle_z: Height of the handle [m].
+        time_s: Time since the start [s].
+        handle_z: Height of the handle of the haptic device [m].
         target_z: Target height of the tool in the world [m].
-        tool_z: Height of the tool [m].
-        measured_n: Force on the tool along z, by its sensor [N].
+        tool_z: Height of the tool in the world [m].
+        measured_n: Force on the tool along z, measured by the sensor in the wrist [N].
         felt_n: Force on the handle along z [N].
     """
 
@@ -43,19 +43,19 @@ class PressSample(NamedTuple):
 
 
 class PressReport(NamedTuple):
-    """Result of a whole press, from first to last contact.
+    """Result of one press, from first to last contact.
 
-    Means are over time. The mean force equals the mean of stiffness times depth for any motion: the effects of damping
-    and inertia while pressing and releasing cancel out.
+    All means are over time. For any motion, the mean force on the tool equals stiffness times mean depth, since the
+    effects of damping and inertia cancel out between pressing and releasing.
 
     Attributes:
-        duration_s: Time in which the tool touched [s].
+        duration_s: Time from the first to the last contact [s].
         depth_m: Mean depth of the tool in the box [m].
         measured_n: Mean force on the tool [N].
         predicted_n: Stiffness times mean depth [N].
-        scatter_n: Force on the tool less stiffness times depth, as root of the mean square [N].
+        scatter_n: Root mean square of the difference between the force on the tool and stiffness times depth [N].
         felt_n: Mean force on the handle [N].
-        expected_n: Force on the tool times the scale [N].
+        expected_n: Mean force on the tool times the force scale [N].
         peak_n: Largest force on the handle [N].
     """
 
@@ -70,12 +70,12 @@ class PressReport(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Error of the mean force on the tool, as a share of the force predicted from stiffness and depth."""
+        """Relative error of the mean force on the tool. The reference is stiffness times mean depth."""
         return abs(self.measured_n - self.predicted_n) / self.predicted_n
 
     @property
     def felt_error(self) -> float:
-        """Error of the mean force on the handle, as a share of the force that tool and scale predict."""
+        """Relative error of the mean force on the handle. The reference is the scaled mean force on the tool."""
         return abs(self.felt_n - self.expected_n) / self.expected_n
 
     def __str__(self) -> str:
@@ -88,12 +88,12 @@ class PressReport(NamedTuple):
 
 
 class Press:
-    """Collects samples until the tool has been pressed and released.
+    """Collects the samples of one press, and evaluates the press.
 
     Args:
         stiffness: Stiffness of the box [N/m].
-        force_scale: Force on the handle for each newton on the tool.
-        touch_height: Height of the tool at which it touches the box [m].
+        force_scale: Ratio of the force on the handle to the force on the tool.
+        touch_height: Height of the tool at which the tool touches the box [m].
     """
 
     def __init__(self, stiffness: float, force_scale: float, touch_height: float) -> None:
@@ -103,18 +103,20 @@ class Press:
         self._released_s = 0.0
 
     def add(self, sample: PressSample) -> None:
-        """Adds the present state."""
+        """Adds a sample, which must be newer than all earlier samples."""
         if self._depth_m(sample) > TOUCHED_M:
             self._has_touched, self._released_s = True, sample.time_s
         self.samples.append(sample)
 
     @property
     def is_over(self) -> bool:
-        """Whether the tool has been pressed and released."""
+        """Whether the tool has touched the box and has been released for `RELEASED_S`."""
         return self._has_touched and self.samples[-1].time_s - self._released_s > RELEASED_S
 
     def report(self) -> PressReport | None:
-        """Returns the result; None if the press was shorter than 0.3 s, or the simulator was paused."""
+        """Evaluates the press. Returns None if the press was too short or was mostly a pause of the simulator; see
+        `MIN_PRESS_S` and `MIN_SHARE`.
+        """
         times_s, depths_m, measured_n, felt_n = np.array(
             [(each.time_s, self._depth_m(each), each.measured_n, each.felt_n) for each in self.samples]
         ).T
@@ -148,17 +150,17 @@ class Press:
         return self._touch_height - sample.tool_z
 
     def write_table(self, path: Path) -> None:
-        """Writes all samples as CSV."""
+        """Writes all samples to a CSV file."""
         with open(path, "w", newline="") as file:
             table = csv.writer(file)
             table.writerow(PressSample._fields)
             table.writerows([f"{value:.6f}" for value in sample] for sample in self.samples)
 
     def draw(self, figure: object) -> None:
-        """Draws force and heights over time.
+        """Draws forces and heights over time.
 
         Args:
-            figure: A `matplotlib.figure.Figure`; its content is replaced.
+            figure: A `matplotlib.figure.Figure`, whose content is replaced.
         """
         figure.clear()  # type: ignore[attr-defined]
         upper, lower = figure.subplots(2, 1, sharex=True)  # type: ignore[attr-defined]
@@ -178,7 +180,7 @@ class Press:
             axes.legend(loc="upper right")
 
     def write_figure(self, path: Path) -> None:
-        """Writes the figure as PNG."""
+        """Draws the press, and writes the figure to a PNG file."""
         from matplotlib.figure import Figure  # importing it takes half a second; other callers need not wait for it
 
         figure = Figure(figsize=(7.0, 5.0), dpi=120, layout="tight")

@@ -1,4 +1,4 @@
-"""Motion of an arm that pushes a box over the floor with the ball at its hand, from one place to another and back."""
+"""Plans the motion of an arm that pushes a box over the floor with a ball at its hand, between two goals."""
 
 import math
 from collections.abc import Sequence
@@ -20,77 +20,81 @@ URDF = "{rpbi_examples}/robots/kuka_lwr.urdf"
 BASE, BALL = "base", "end_effector_ball"
 BALL_RADIUS_M = 0.015
 PLACES = ((-0.6, 0.2), (-0.6, -0.2))
-"""Targets of the centre of the box, in turn: x and y in the frame of the arm's base [m]."""
+"""Goals of the box's centre, which alternate: x and y in the frame of the arm's base [m]."""
 HALF_SIDES_M = (0.10, 0.08)
-"""Half of the box's sides along its own x and y [m]."""
+"""Half of the box's side lengths along the box's own x and y [m]."""
 NEAR_M = 0.05
-"""Least improvement that justifies one more push [m]."""
+"""Least distance by which a push must bring the box nearer to its goal [m]."""
 CLEARANCE_M = 0.04
 """Distance of the ball from the box before and after a push [m]."""
 GAP_M = 0.001
-"""Distance of the ball from the box at the start of a push, from rest [m]."""
+"""Distance between ball and box where the ball stops before a push [m]."""
 PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
-"""Height of the ball [m] while it pushes, and above the box."""
+"""Height of the ball during a push, and while the ball moves above the box [m]."""
 PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
-"""Mean speed of the ball [m/s]."""
+"""Mean speed of the ball during a push, and in other straight lines [m/s]."""
 JOINT_SPEED = 0.8
-"""Mean speed of the joint with the largest motion [rad/s], of the motion from an arbitrary posture."""
+"""Mean speed of the joint with the largest motion, in the move from an arbitrary posture [rad/s]."""
 MIN_DURATION_S = 0.5
-"""Least time for a straight line [s]."""
+"""Least duration of a move [s]."""
 SPACING_M = 0.02
-"""Distance of the points of a line for which inverse kinematics are solved [m]."""
+"""Largest distance between two points of a straight line for which inverse kinematics are solved [m]."""
 POINTING_DOWN = (1.0, 0.0, 0.0, 0.0)
-"""Orientation of the hand as x, y, z, w."""
+"""Orientation of the hand as quaternion x, y, z, w."""
 POSTURE = np.radians((0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0))
-"""Start of the search for joint positions [rad]."""
+"""Joint positions from which inverse kinematics start [rad]."""
 ELBOW_LEAN = 1.5
-"""Rotation of the third joint in that start for each metre of the ball to the side [rad/m]."""
+"""Position of the third joint at the start of inverse kinematics, divided by the ball's y coordinate [rad/m]."""
 
 
 class Push(NamedTuple):
     """A push along a straight line, in the frame of the arm's base.
 
     Attributes:
-        start: Where the ball touches the box, x and y [m].
-        end: Where it stops.
+        start: Position x, y of the ball at the first contact with the box [m].
+        end: Position x, y of the ball at the end of the push [m].
     """
 
     start: tuple[float, float]
     end: tuple[float, float]
 
     def beside(self, way_m: float) -> tuple[float, float]:
-        """Returns the point at a distance before the start; a negative distance is along the push [m]."""
+        """Returns the point on the push's line at a distance before `start` [m], or after `start` if negative."""
         length = math.dist(self.start, self.end)
         x, y = ((begin - end) / length * way_m for begin, end in zip(self.start, self.end))
         return self.start[0] + x, self.start[1] + y
 
 
 class Move(NamedTuple):
-    """Joint positions over time, from rest to rest.
+    """Motion of the joints that starts and ends at rest.
 
     Attributes:
-        path: Positions of the joints [rad] along the path, whose parameter goes from 0 to 1.
-        duration_s: Duration [s].
+        path: Positions of the joints [rad] as a function of the path parameter, from 0 to 1.
+        duration_s: Duration of the motion [s].
     """
 
     path: CubicSpline
     duration_s: float
 
     def at(self, time_s: float) -> tuple[float, ...]:
-        """Returns the positions [rad] at a time since its start [s]."""
+        """Returns the positions of the joints [rad] at a time since the start of the move [s]."""
         (way,) = minimum_jerk((0.0,), (1.0,), 0.0, self.duration_s).sample(time_s).position
         return tuple(self.path(way).tolist())
 
     @property
     def end(self) -> tuple[float, ...]:
-        """The positions at its end [rad]."""
+        """Positions of the joints at the end of the move [rad]."""
         return self.at(self.duration_s)
 
 
 def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
-    """Returns the push that brings a box nearest to a goal, None if the box is there.
+    """Returns the push that brings a box nearest to a goal. None if every push gains less than `NEAR_M`.
 
-    The ball pushes the middle of one of the four sides, perpendicular to it, so that the box hardly turns.
+    The ball pushes perpendicularly against the middle of a side, so that the box hardly turns.
+
+    Args:
+        box: Pose of the box in the frame of the arm's base.
+        goal: Goal x, y of the box's centre in the same frame [m].
     """
     best, least = None, math.dist((box.x, box.y), goal) - NEAR_M
     for turns in range(4):
@@ -106,23 +110,27 @@ def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
 
 
 def ball_solver() -> ChainSolver:
-    """Returns the inverse kinematics of the ball at the hand of a KUKA LWR4+."""
+    """Returns a solver of inverse kinematics for the ball at the hand of a KUKA LWR4+."""
     options = {"urdf_filename": URDF, "base_link": BASE, "tip_link": BALL, "residualThreshold": 1e-4}
     return PybulletSolver(PybulletConfig.parse(options, "the arm that pushes"))
 
 
 class Pusher:
-    """Plans the moves of a push.
+    """Plans the arm's moves for a push.
 
     Args:
-        solver: Inverse kinematics of the ball, in the frame of the arm's base.
+        solver: Solver of inverse kinematics for the ball, in the frame of the arm's base.
     """
 
     def __init__(self, solver: ChainSolver) -> None:
         self._solver = solver
 
     def moves(self, positions: Sequence[float], push: Push) -> list[Move]:
-        """Returns the moves from some joint positions [rad]: up, over, down, to the box, the push, back and up.
+        """Returns all moves for a push: up, above the start, down, to the box, the push, back, and up.
+
+        Args:
+            positions: Joint positions before the first move [rad].
+            push: The push.
 
         Raises:
             ValueError: If a point of the path is out of reach.
@@ -146,12 +154,12 @@ class Pusher:
         return [self._approach(positions, corners[0]), *lines]
 
     def _approach(self, positions: Sequence[float], point: Vector) -> Move:
-        """Returns the move from any posture [rad] to the one with the ball at a point [m]."""
+        """Returns the move from joint positions [rad] to a point of the ball [m]. The ball's path is not straight."""
         ends = np.array((positions, self._solve(point)))
         return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, MIN_DURATION_S))
 
     def _line(self, start: Vector, end: Vector, speed: float) -> Move:
-        """Returns the move of the ball along a straight line [m] at a mean speed [m/s]."""
+        """Returns the move of the ball along a straight line between two points [m], at a mean speed [m/s]."""
         length = math.dist(start, end)
         ways = np.linspace(0.0, 1.0, max(2, math.ceil(length / SPACING_M) + 1))
         points = np.outer(1.0 - ways, start) + np.outer(ways, end)
@@ -160,7 +168,11 @@ class Pusher:
         )
 
     def _solve(self, point: Sequence[float]) -> tuple[float, ...]:
-        """Returns the joint positions [rad] with the ball at a point [m], always the same for the same point."""
+        """Returns joint positions [rad] with the ball at a point [m]. The result depends only on the point.
+
+        Raises:
+            ValueError: If the point is out of reach.
+        """
         x, y, z = point
         posture = POSTURE.tolist()
         posture[2] = ELBOW_LEAN * y

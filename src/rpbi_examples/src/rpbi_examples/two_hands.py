@@ -1,4 +1,4 @@
-"""Two arms whose hands draw mirrored circles."""
+"""Plans joint positions with which the hands of two arms draw mirrored circles."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from .motions import CIRCLE_CENTRE, POINTING_DOWN, hand_position
 
 LINK = "lbr_iiwa_link_7"
 APPROACH_S = 3.0
-"""Time of the motion to the circles [s]."""
+"""Duration of the motion to the circles [s]."""
 RAMP_S = 1.0
-"""Time in which the hands reach their speed on the circles [s]."""
+"""Time in which the hands reach full speed on the circles [s]."""
 
 
 class MirroredHands:
-    """Joint positions with which the hands of two arms draw mirrored circles, beginning at the present positions.
+    """Plans joint positions with which the hands of two arms move to mirrored circles and then draw the circles.
 
     Args:
-        urdf: File with both arms, whose links and joints begin with the name of the arm.
-        arms: Their names, the left one first.
-        start: Positions of the n joints of both arms at first [rad], by name.
+        urdf: URDF file with both arms. The names of an arm's links and joints begin with the arm's name.
+        arms: Names of the arms, the left arm first.
+        start: Initial positions of the n joints of both arms [rad], indexed by joint name.
         distance: Distance between the centres of the circles [m].
 
     Raises:
-        ConfigError: If the URDF has no such arms.
-        InterfaceError: If the circles are out of reach.
+        ConfigError: If the URDF does not contain both arms.
+        InterfaceError: If the start of a circle is out of reach.
     """
 
     def __init__(
@@ -48,10 +48,10 @@ class MirroredHands:
         self._approach = minimum_jerk(tuple(start.values()), tuple(self._posture.values()), 0.0, APPROACH_S)
 
     def at(self, time_s: float) -> tuple[float, ...]:
-        """Returns the n positions at a time since the start [s].
+        """Returns the positions of the n joints [rad] at a time since the start [s], in the order of `start`.
 
         Raises:
-            InterfaceError: If a target of a hand is out of reach.
+            InterfaceError: If the target of a hand is out of reach.
         """
         if time_s < APPROACH_S:
             return self._approach.sample(time_s).position
@@ -59,7 +59,10 @@ class MirroredHands:
         return self._on_circles(time_s - RAMP_S / 2.0 if time_s > RAMP_S else time_s**2 / (2.0 * RAMP_S))
 
     def _on_circles(self, time_s: float) -> tuple[float, ...]:
-        """Returns the n positions on the circles; near the same posture, so that all rounds are equal."""
+        """Returns the positions of the n joints [rad] at a time on the circles [s].
+
+        Inverse kinematics always start from the same posture, so that all rounds are equal.
+        """
         positions = dict(self._posture)
         for side, solver in self._solvers.items():
             position = hand_position(time_s, side, self._distance)

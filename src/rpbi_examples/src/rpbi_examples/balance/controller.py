@@ -1,4 +1,4 @@
-"""A controller with which a humanoid stands on both feet and reaches with a hand."""
+"""A whole-body controller: a humanoid stands on both feet and reaches for a target with a hand."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .tasks import AccelerationTask, Approach, Gain, capture, pull, spring
 
 LINEAR, ANGULAR, UP = slice(0, 3), slice(3, 6), slice(2, 3)
 CAPTURE_WEIGHT = 100.0
-"""Weight of the capture point; it is the largest weight, since balance matters most."""
+"""Weight of the capture point's task. It is the largest weight, since balance matters most."""
 HEIGHT, UPRIGHT, POSTURE = Gain(50.0, 20.0), Gain(60.0, 5.0), Gain(30.0, 0.02)
-"""Gains for the height of the centre of mass, the torso and the posture. The posture has a low weight: it only resolves
-redundancy.
+"""Gains for the height of the centre of mass, the torso's orientation, and the posture. The posture has a low weight,
+since it only resolves redundancy.
 """
 HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
-"""Weights of the hand's position and orientation."""
+"""Weights of the tasks for the hand's position and orientation."""
 
 
 class BalanceConfig(ControllerConfig):
@@ -56,12 +56,14 @@ class BalanceConfig(ControllerConfig):
 
 
 class Balance(Controller):
-    """Stands on both feet, and moves a hand to a target.
+    """Makes a humanoid stand on both feet and move a hand to a target.
 
-    Every few ticks a quadratic program finds joint efforts. They bring the capture point over the middle of the feet
-    and the hand to its target, and keep the height, the upright torso and the posture of the start. The feet do not
-    move: they neither slide nor tip. `target` is the pose of the hand's point in the world; until a target arrives, the
-    arm keeps its posture.
+    Every `period_ticks` ticks, a quadratic program computes joint efforts. The efforts bring the capture point over the
+    midpoint between the feet, and the hand to its target. They keep the torso upright, and keep the initial posture and
+    the initial height of the centre of mass. The feet must neither slide nor tip.
+
+    The input `target` is the desired pose of the hand's point in the world. Until the first target arrives, the arm
+    keeps its posture.
     """
 
     Config = BalanceConfig
@@ -76,11 +78,11 @@ class Balance(Controller):
         self._program = WholeBodyProgram(robot, cone, len(self._soles))
 
     def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> Pose:
-        """Returns the pose of a target, and refuses poses that are not finite."""
+        """Checks that a target's pose is finite, and returns the pose."""
         return check_pose(value.pose if isinstance(value, PoseTarget) else value)
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Takes the measured posture, height and yaw as the ones to keep."""
+        """Stores the measured posture, yaw, and height of the centre of mass as goals."""
         seed, period_s = self.config.noise_seed, self.config.period_ticks * self.arm.dt_s
         self._estimate = None if seed is None else BaseEstimate(state.base, period_s, seed)
         self._robot.update(state)
@@ -94,7 +96,7 @@ class Balance(Controller):
         self._errors: dict[str, float] = {}
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of all joints."""
+        """Returns the efforts of all joints [N m]. Computes new efforts every `period_ticks` ticks."""
         if self._ticks % self.config.period_ticks == 0:
             if self._estimate is not None:
                 position, quat_xyzw = self._estimate.update(state.base, *state.base_twist)
@@ -105,8 +107,8 @@ class Balance(Controller):
         return self._efforts
 
     def report(self) -> Mapping[str, float]:
-        """Returns the distances of the centre of mass and the hand from their goals [m], and the number of solutions
-        that failed.
+        """Returns the distances of the centre of mass and of the hand from their goals [m], and the number of times
+        that the quadratic program had no solution.
         """
         return {**self._errors, "unsolved": float(self._unsolved)}
 
@@ -149,7 +151,7 @@ class Balance(Controller):
 
 
 def _yaw_only(rotation: Array) -> Array:
-    """Returns the upright orientation, shape (3, 3), that has the same yaw as a given one."""
+    """Returns the rotation about the vertical with the same yaw as a given rotation; both have the shape (3, 3)."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))

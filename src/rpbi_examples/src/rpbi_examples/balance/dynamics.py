@@ -17,16 +17,19 @@ except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
 FREE = 6
-"""Number of velocities of the base: 3 linear and 3 angular ones, in the axes of the base."""
+"""Number of velocities of the floating base: 3 linear and 3 angular velocities, in the base's axes."""
 
 
 class FrameMotion(NamedTuple):
-    """Motion of a frame or of the centre of mass, in m and rad, for a robot with n velocities.
+    """Motion of a frame, or of the centre of mass, for a robot with n velocities.
+
+    The arrays have 6 rows for a frame: 3 linear rows [m] and then 3 angular rows [rad]. They have 3 rows for the centre
+    of mass.
 
     Attributes:
-        jacobian: Maps the robot's velocities to the frame's velocity, linear before angular, shape (6, n) or (3, n).
-        velocity: Velocity of the frame, shape (6,) or (3,).
-        drift: Acceleration of the frame while the robot's velocities are constant, in the shape of `velocity`.
+        jacobian: Maps the robot's velocities to `velocity`, shape (6, n) or (3, n).
+        velocity: Velocity, shape (6,) or (3,).
+        drift: Acceleration while the robot's velocities are constant, shape (6,) or (3,).
     """
 
     jacobian: Array
@@ -35,16 +38,18 @@ class FrameMotion(NamedTuple):
 
 
 class FloatingRobot:
-    """Mass matrix, bias and kinematics of a robot with a floating base; it has n velocities, 6 of the base and one for
-    each joint.
+    """Computes mass matrix, bias and kinematics of a robot with a floating base.
+
+    The robot has n velocities: 6 of the base and one for each joint. `update` sets the attributes that depend on the
+    state.
 
     Args:
         urdf_filename: The robot's URDF file.
-        joints: Names of all joints, in the order of the states that are given to `update`.
+        joints: Names of all movable joints, in the order of the joint values in the states for `update`.
 
     Attributes:
         mass_matrix: Shape (n, n).
-        bias: Gravity, Coriolis and centrifugal forces and the joints' damping, shape (n,) [N, N m].
+        bias: Sum of gravity, Coriolis and centrifugal forces, and joint damping, shape (n,) [N, N m].
         positions: Positions of the joints, shape (n - 6,) [rad].
         velocities: Velocities of base and joints, shape (n,) [m/s, rad/s].
         count: The number n of velocities.
@@ -73,7 +78,11 @@ class FloatingRobot:
         self.count: int = self._model.nv
 
     def frame(self, link: str, point: Sequence[float] = (0.0, 0.0, 0.0)) -> int:
-        """Adds a frame to a link, with its origin at a point in the link's frame [m], and returns its index.
+        """Adds a frame to a link, and returns the index of the new frame.
+
+        Args:
+            link: Name of the link.
+            point: Origin of the new frame, in the link's frame [m].
 
         Raises:
             UnknownNameError: If the robot does not have the link.
@@ -89,13 +98,13 @@ class FloatingRobot:
         return int(number)
 
     def in_given_order(self, of_joints: Array) -> Array:
-        """Reorders one value for each joint from Pinocchio's joint order to the order of `joints`."""
+        """Reorders an array with one value for each joint, from Pinocchio's joint order to the order of `joints`."""
         ordered = np.empty_like(of_joints)
         ordered[self._order] = of_joints
         return ordered
 
     def update(self, state: RobotState) -> None:
-        """Sets the attributes, and the motions of all frames, from a state."""
+        """Computes the attributes, and the poses and motions of all frames, for a state."""
         model, data = self._model, self._data
         turn = pin.Quaternion(np.array(state.base.quat_xyzw)).normalized()
         back = turn.matrix().T
@@ -117,11 +126,11 @@ class FloatingRobot:
         return self._data.oMf[frame]
 
     def motion_of_centre(self) -> FrameMotion:
-        """Returns the motion of the centre of mass in the axes of the world."""
+        """Returns the motion of the centre of mass, in the world's axes."""
         return FrameMotion(self._jacobian_of_centre, self._data.vcom[0], self._data.acom[0])
 
     def motion(self, frame: int, own_axes: bool = False) -> FrameMotion:
-        """Returns the motion of a frame, taken at its origin, in the axes of the world or in its own axes."""
+        """Returns the motion of a frame's origin, in the frame's axes if `own_axes`, otherwise in the world's axes."""
         axes = pin.LOCAL if own_axes else pin.LOCAL_WORLD_ALIGNED
         return FrameMotion(
             pin.getFrameJacobian(self._model, self._data, frame, axes),
@@ -137,12 +146,12 @@ def rotation_of(quat_xyzw: Quaternion) -> Array:
 
 
 def turn_between(start: Array, end: Array) -> Array:
-    """Returns the rotation vector [rad] between two orientations of shape (3, 3), in the axes of the world."""
+    """Returns the rotation vector [rad] from `start` to `end`, two rotation matrices, in the world's axes."""
     turn: Array = pin.log3(end @ start.T)
     return turn
 
 
 def turned(start: Array, turn: Array) -> Array:
-    """Turns an orientation of shape (3, 3) by a rotation vector [rad] in the axes of the world."""
+    """Rotates `start`, a rotation matrix, by a rotation vector [rad] in the world's axes, and returns the result."""
     end: Array = pin.exp3(turn) @ start
     return end

@@ -1,6 +1,7 @@
 """Finds the largest push that Talos withstands in each direction: `python -m rpbi_examples.balance.largest_push`.
 
-The scene `talos` defines success: the feet have not moved, the torso is upright, and the hand is at rest at its target.
+Talos withstands a push if the scene `talos` succeeds: the feet have not moved, the torso is upright, and the hand is at
+rest at its target.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ from rpbi_examples.scenes.talos import IMPULSE, Talos
 from rpbi_examples.scenes.task import EnvStage, SceneTask, make_env
 
 DIRECTIONS = ("forward", "forward left", "left", "back left", "back", "back right", "right", "forward right")
-"""Directions of pushes, in steps of 45 degrees to the left."""
+"""Directions of the pushes, counter-clockwise in steps of 45 degrees."""
 MOST, STEP = 80.0, 2.5
-"""Largest impulse that is tried, and resolution of the result [N s]."""
+"""Upper bound of the impulses that are tried, and resolution of the result [N s]."""
 
 
 def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
     """Runs an episode with a given push, and returns whether the scene succeeds.
 
     Args:
-        env: Environment of the scene.
-        seed: Seed of the episode, except for the push.
-        angle: Angle of the push from the robot's forward direction, counted to the left [rad].
+        env: Environment of the scene `talos`.
+        seed: Seed of the episode's random start and target; the seed does not affect the push.
+        angle: Angle of the push from the robot's forward direction, positive to the left [rad].
         impulse: Impulse of the push [N s].
     """
     assert isinstance(env.task, SceneTask)
@@ -43,8 +44,12 @@ def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
 
 
 def largest_push(env: WorldEnv, seed: int, angle: float) -> float:
-    """Finds the largest impulse that the robot withstands [N s], by bisection with the resolution `STEP`; see
-    `stands`.
+    """Finds the largest impulse [N s] that the robot withstands, by bisection with the resolution `STEP`.
+
+    Args:
+        env: Environment of the scene `talos`.
+        seed: Seed of all episodes.
+        angle: Angle of the push from the robot's forward direction, positive to the left [rad].
     """
     good, bad = 0, round(MOST / STEP)
     while bad - good > 1:
@@ -57,7 +62,7 @@ def largest_push(env: WorldEnv, seed: int, angle: float) -> float:
 
 
 def table(seed: int) -> Iterator[str]:
-    """Yields the lines of a Markdown table with the largest impulse for each direction."""
+    """Yields the lines of a Markdown table with the largest withstood impulse for each direction [N s]."""
     env = make_env("talos")
     yield "| push to | largest impulse [N s] |"
     yield "|---|---|"
@@ -67,7 +72,7 @@ def table(seed: int) -> Iterator[str]:
 
 
 def pushes_in(text: str) -> dict[str, float]:
-    """Reads the largest impulse for each direction [N s] from a text that contains the lines of `table`.
+    """Parses the output of `table`, and returns the largest impulse [N s] indexed by direction.
 
     Raises:
         ValueError: If a direction is missing.
@@ -79,7 +84,12 @@ def pushes_in(text: str) -> dict[str, float]:
 
 
 def draw(pushes: Mapping[str, float], path: Path) -> None:
-    """Draws the largest impulse for each direction [N s] in a polar plot: the robot is seen from above and faces up."""
+    """Writes a polar plot of the largest impulses [N s]. The robot is seen from above and faces up.
+
+    Args:
+        pushes: Largest impulse [N s], indexed by direction.
+        path: Picture file to write.
+    """
     figure = Figure(figsize=(4.8, 4.8), layout="constrained")
     axes = figure.add_subplot(projection="polar")
     axes.set_theta_zero_location("N")
@@ -98,7 +108,7 @@ def draw(pushes: Mapping[str, float], path: Path) -> None:
 
 
 def main() -> None:
-    """Prints the table, or reads a printed one from a file, and draws it if a picture is requested."""
+    """Computes and prints the table, or reads it from the file `--table`. With `--out`, also draws the table."""
     parser = argparse.ArgumentParser(description="Finds the largest push that Talos withstands, by direction.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the start and the target (default: 1)")
     parser.add_argument("--out", type=Path, help="picture of the table")

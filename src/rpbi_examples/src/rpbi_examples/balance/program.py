@@ -20,26 +20,31 @@ except ImportError as error:
 
 UNBOUNDED = 1e30
 EQUAL, SOFT = 5, 8
-"""Flags of daqp for an equality and for a soft bound, which may be violated if there is no other solution."""
+"""Flags of the solver daqp for an equality and for a soft bound. A soft bound may be violated."""
 LIMIT_RATE = 15.0
-"""Rate at which a joint may approach its limit [1/s]."""
+"""Natural frequency of the virtual springs at the joints' position limits [1/s]."""
 WRENCH_COST = np.array((1e-5, 1e-5, 1e-6, 1e-3, 1e-3, 1e-3))
-"""Costs of squared contact forces [1/N^2] and torques [1/(N m)^2]. They are small, and make the feet share the load."""
+"""Costs of squared contact forces [1/N^2] and torques [1/(N m)^2]. These small costs make the feet share the load."""
 FOOT_DAMPING = 20.0
-"""Rate at which a moving foot is brought to rest [1/s]."""
+"""Deceleration of a moving foot, divided by its velocity [1/s]."""
 
 
 class WholeBodyProgram:
-    """Finds the accelerations a of base and joints, and the wrenches w on the feet.
+    """Finds the joint efforts t that fulfil the tasks of a whole body best.
 
-    It minimises the weighted squared errors of the tasks, subject to M a + b = S' t + J' w with efforts t of the joints
-    within their limits, feet that do not move, J a = -J' v, and wrenches that soles can take, C w <= 0. The efforts
-    follow from a and w, and are not unknowns of the program. Without a warm start, a solution depends only on the
-    arguments.
+    The unknowns of the quadratic program are the accelerations a of base and joints, and the wrenches w on the feet.
+    The cost is the weighted sum of the tasks' squared errors and of w squared. The constraints are:
+
+    - Dynamics: M a + b = S^T t + J^T w, with t within the effort limits. The efforts follow from a and w.
+    - Feet at rest: J a + dJ/dt v = -`FOOT_DAMPING` J v.
+    - Soles that neither slide nor tip: C w <= 0.
+    - Soft bounds on joint accelerations, which keep the joints within their position limits.
+
+    The solver starts without the last solution, so a solution depends only on robot and tasks.
 
     Args:
         robot: The robot, whose attributes `solve` reads.
-        cone: The matrix C for one sole, shape (c, 6).
+        cone: The matrix C of one sole, shape (c, 6); see `wrench_cone`.
         feet: Number of feet.
     """
 
@@ -66,9 +71,9 @@ class WholeBodyProgram:
 
         Args:
             tasks: Desired accelerations of parts of the robot.
-            posture: Desired accelerations of all joints, shape (n - 6,).
-            posture_weight: Weight of `posture`, as in `AccelerationTask`.
-            feet: Motions of the soles, each in its own axes.
+            posture: Desired accelerations of all joints, shape (n - 6,) [rad/s^2].
+            posture_weight: Cost of the squared deviation from `posture`.
+            feet: Motion of each sole, in the sole's own axes.
         """
         robot, n, matrix = self._robot, self._n, self._matrix
         jacobian = np.concatenate([foot.jacobian for foot in feet])
@@ -89,8 +94,9 @@ class WholeBodyProgram:
         return efforts
 
     def _within_limits(self) -> tuple[Array, Array]:
-        """Returns lower and upper bounds of the joint accelerations, from critically damped springs at the position
-        limits.
+        """Returns lower and upper bounds of the joint accelerations, each of shape (n - 6,) [rad/s^2].
+
+        The bounds are the accelerations of critically damped springs at the position limits.
         """
         robot = self._robot
         damping = 2.0 * LIMIT_RATE * robot.velocities[FREE:]
@@ -114,19 +120,19 @@ class WholeBodyProgram:
 
 
 def wrench_cone(half_length: float, half_width: float, friction: float) -> Array:
-    """Returns the matrix C of the wrenches w that a rectangular sole can take: C w <= 0.
+    """Returns the matrix C for a rectangular sole. The sole neither slides nor tips under a wrench w if C w <= 0.
 
-    A wrench is the force [N] and torque [N m] of the floor on the middle of the sole, in the sole's axes: x along its
-    length, z up. The friction cone is replaced with a pyramid inside it. Source: Caron, Pham and Nakamura, "Stability
-    of surface contacts for humanoid robots", ICRA 2015.
+    The wrench is the force [N] and torque [N m] of the floor on the middle of the sole, in the sole's axes: x along the
+    sole, z up. A pyramid inside the friction cone replaces the cone. Source: Caron, Pham and Nakamura, "Stability of
+    surface contacts for humanoid robots", ICRA 2015.
 
     Args:
-        half_length: Half the length along x [m].
-        half_width: Half the width along y [m].
-        friction: Coefficient of friction.
+        half_length: Half the sole's length along x [m].
+        half_width: Half the sole's width along y [m].
+        friction: Coefficient of friction between sole and floor.
 
     Returns:
-        Shape (16, 6).
+        Matrix of shape (16, 6).
     """
     x, y, mu = half_length, half_width, friction / np.sqrt(2.0)
     rows = [(a, b, -mu, 0.0, 0.0, 0.0) for a, b in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))]

@@ -1,6 +1,4 @@
-"""Tasks of a whole-body controller: desired accelerations of parts of the robot, and the approach of a hand to its
-target.
-"""
+"""Tasks of a whole-body controller: desired accelerations of parts of the robot, and the moving target of a hand."""
 
 from __future__ import annotations
 
@@ -16,20 +14,20 @@ from .dynamics import FrameMotion, rotation_of, turn_between, turned
 GRAVITY = 9.81
 """Acceleration due to gravity [m/s^2]."""
 RATE = 6.0
-"""Rate at which the remaining distance is reduced [1/s]."""
+"""Rate at which `Approach` reduces the remaining distance and angle [1/s]."""
 TURN_SPEED = 1.5
-"""Largest rotational speed [rad/s]."""
+"""Largest angular speed of `Approach` [rad/s]."""
 LEASH_M, LEASH_RAD = 0.05, 0.3
-"""Largest distance [m] and angle [rad] between the moving target and the hand."""
+"""Largest distance [m] and angle [rad] between the pose of `Approach` and the hand."""
 
 
 class AccelerationTask(NamedTuple):
-    """A desired acceleration: `jacobian @ a = wanted`, as nearly as tasks with larger weights permit.
+    """Asks for accelerations a of the robot with `jacobian @ a = wanted`.
 
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
-        wanted: Shape (k,) [m/s^2 or rad/s^2].
-        weight: Cost of the square of a deviation.
+        wanted: Desired acceleration, shape (k,) [m/s^2 or rad/s^2].
+        weight: Cost of the squared deviation from `wanted`.
     """
 
     jacobian: Array
@@ -42,7 +40,7 @@ class Gain(NamedTuple):
 
     Attributes:
         stiffness: Stiffness divided by mass [1/s^2].
-        weight: See `AccelerationTask`.
+        weight: Cost of the squared deviation from the spring's acceleration.
     """
 
     stiffness: float
@@ -50,21 +48,27 @@ class Gain(NamedTuple):
 
 
 def spring(motion: FrameMotion, rows: slice, error: Array, gain: Gain, feed: Array | float = 0.0) -> AccelerationTask:
-    """Returns the task that pulls a frame to its goal, along some axes, like a critically damped spring.
+    """Returns a task that pulls a frame towards a goal like a critically damped spring.
 
     Args:
         motion: Present motion of the frame.
-        rows: The rows of the motion that the spring acts on.
-        error: Goal minus present value, for these rows [m or rad].
+        rows: The k rows of `motion` on which the spring acts.
+        error: Goal minus present value in these rows, shape (k,) [m or rad].
         gain: Stiffness and weight of the spring.
-        feed: Velocity of the goal [m/s or rad/s].
+        feed: Velocity of the goal in these rows, shape (k,) [m/s or rad/s]. Default: a goal at rest.
     """
     wanted = pull(error, feed - motion.velocity[rows], gain)
     return AccelerationTask(motion.jacobian[rows], wanted - motion.drift[rows], gain.weight)
 
 
 def pull(error: Array, velocity: Array, gain: Gain) -> Array:
-    """Returns the acceleration of a critically damped spring from the errors of position and velocity."""
+    """Returns the acceleration of a critically damped spring.
+
+    Args:
+        error: Goal minus present position [m or rad].
+        velocity: Velocity of the goal minus present velocity [m/s or rad/s].
+        gain: The spring's stiffness; its weight is not used.
+    """
     acceleration: Array = gain.stiffness * error + 2.0 * np.sqrt(gain.stiffness) * velocity
     return acceleration
 
@@ -74,17 +78,18 @@ def capture(
 ) -> AccelerationTask:
     """Returns the task that brings the capture point over a goal on the floor.
 
-    The centre of mass c moves like a linear inverted pendulum, c'' = w^2 (c - p), with w^2 = g / height. The capture
-    point is c + c'/w. The centre of pressure p leads the capture point by `gain` times its error, which pushes it back
-    (Englsberger et al., "Bipedal walking control based on capture point dynamics", IROS 2011).
+    The centre of mass c moves like a linear inverted pendulum: c'' = w^2 (c - p) with w^2 = g / height. The capture
+    point is c + c'/w. The task places the centre of pressure p beyond the capture point, as seen from the goal, which
+    pushes the capture point back to the goal. Source: Englsberger et al., "Bipedal walking control based on capture
+    point dynamics", IROS 2011.
 
     Args:
         motion: Motion of the centre of mass.
         centre: Position of the centre of mass, shape (3,) [m].
         goal: Desired x and y of the capture point, shape (2,) [m].
         height: Height of the centre of mass above the floor [m].
-        gain: Lead of p over the capture point, divided by the error of the capture point.
-        weight: See `AccelerationTask`.
+        gain: Distance from the capture point to p, divided by the distance from the goal to the capture point.
+        weight: Cost of the squared deviation from the desired acceleration of the centre of mass.
     """
     w = np.sqrt(GRAVITY / height)
     capture_point = centre[:2] + motion.velocity[:2] / w
@@ -93,16 +98,16 @@ def capture(
 
 
 class Approach:
-    """A moving pose that approaches its target at limited speed.
+    """A moving pose between the hand and its target, which approaches the target at limited speed.
 
-    A critically damped spring pulls the point. Its force is limited, which limits the speed. The pose waits for the
-    hand, so that a target out of reach does not make the robot fall.
+    A critically damped spring with limited force pulls the position towards the target. The limit of the force limits
+    the speed. The pose stays near the hand, so that a target out of reach does not make the robot fall.
 
     Args:
-        position: Position of the first pose, shape (3,) [m].
-        turn: Orientation of the first pose, shape (3, 3).
+        position: Initial position, shape (3,) [m].
+        turn: Initial orientation as a rotation matrix, shape (3, 3).
         period_s: Time between two calls of `advance` [s].
-        speed: Largest speed [m/s].
+        speed: Largest linear speed [m/s].
 
     Attributes:
         position: Position of the moving pose, shape (3,) [m].
@@ -116,12 +121,12 @@ class Approach:
         self._period_s, self._speed = period_s, speed
 
     def advance(self, target: Pose, position: Array, turn: Array) -> None:
-        """Moves the pose towards a target for one period.
+        """Moves the pose towards a target for the time `period_s`.
 
         Args:
             target: Target pose of the hand in the world.
             position: Present position of the hand, shape (3,) [m].
-            turn: Present orientation of the hand, shape (3, 3).
+            turn: Present orientation of the hand as a rotation matrix, shape (3, 3).
         """
         way = _shortened(target.position - self.position, 2.0 * self._speed / RATE)
         self.velocity += self._period_s * (RATE * RATE * way - 2.0 * RATE * self.velocity)

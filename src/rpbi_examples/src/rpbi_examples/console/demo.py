@@ -1,4 +1,4 @@
-"""The command `demo`: simulates, records, tabulates and draws."""
+"""The command `demo`: runs an example, records its topics, and writes tables and pictures of the recording."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def demo(
 
 
 def _leave(number: int, _: object) -> None:
-    """Exits so that all `with` blocks clean up, and ignores further signals of this kind."""
+    """Raises SystemExit, so that all `with` blocks clean up. Ignores further signals in `ENDINGS`."""
     for each in ENDINGS:
         signal.signal(each, signal.SIG_IGN)
     sys.exit(128 + number)
@@ -112,7 +112,7 @@ def _demo(out: Path, seconds: float, headless: bool, strict: bool) -> int:
 
 @contextmanager
 def _example(headless: bool, log: Path) -> Iterator[None]:
-    """Runs the example on a ROS master of its own for the duration of the `with` block."""
+    """Runs the example on a separate ROS master for the duration of the `with` block."""
     port = unused_port()
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"
@@ -136,7 +136,7 @@ def _example(headless: bool, log: Path) -> Iterator[None]:
 
 
 def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
-    """Waits until the arm's targets and the colour images are published, which start last."""
+    """Waits until the arm's targets and the colour images are published. These two topics start last."""
     end_s = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < end_s and process.poll() is None:
         if _is_published(TARGETS) and _is_published(COLOUR):
@@ -147,8 +147,8 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
 
 
 def _start_world() -> None:
-    """Starts the world through `rosservice` in a separate process, since rospy suppresses exceptions of signal handlers
-    while it waits for a service.
+    """Calls the service that starts the world, in a separate process `rosservice`. While rospy itself waits for a
+    service, it suppresses exceptions of signal handlers.
     """
     command = ["rosservice", "call", "/rpbi/start"]
     try:
@@ -168,7 +168,7 @@ def _is_published(topic: str) -> bool:
 
 
 def _expected_rates() -> dict[str, float]:
-    """Returns the rate of each topic [Hz] that the files of the example configure."""
+    """Returns the configured rate of each topic [Hz], from the example's files."""
     world = load_world(WORLD)
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     robot = configs["kuka_lwr"]
@@ -186,8 +186,9 @@ def _expected_rates() -> dict[str, float]:
 
 
 def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path) -> dict[str, Any]:
-    """Writes tables, pictures and the summary, and returns the summary. Rates are measured over the end of the
-    recording, since the recorder may connect late on a busy machine.
+    """Writes tables, pictures and the summary, and returns the summary.
+
+    Rates are measured over the last part of the recording, since the recorder may connect late on a busy machine.
     """
     tables = bag_to_dataframes(bag, [STATES, TARGETS, WRIST, CONTACTS, "/clock", "/diagnostics"])
     states, targets, clock = tables[STATES], tables[TARGETS], tables["/clock"]["clock"]
@@ -228,13 +229,13 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
 
 def _friction(world: LoadedWorld, *names: str) -> float:
-    """Returns the coefficient of friction between two objects: the product of their coefficients, as in PyBullet."""
+    """Returns the coefficient of friction between objects: the product of their own coefficients, as in PyBullet."""
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     return math.prod(configs[name].changeDynamics.lateralFriction for name in names)
 
 
 def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
-    """Returns the real-time factor, the overruns and the renderer, as the simulator reported them while it ran."""
+    """Returns real-time factor, number of overruns and renderer from the simulator's diagnostics."""
     own = table[table["name"].str.endswith(": simulation") & (table["message"] != "stopped")]
     overruns = own["values/overruns_total"].astype(int)
     return {
@@ -245,13 +246,13 @@ def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _messages(bag: Path, since_s: float) -> dict[str, int]:
-    """Returns the number of messages of each topic that were recorded at or after a given ROS time [s]."""
+    """Returns the number of messages of each topic, from a given ROS time [s] to the end of the bag."""
     with BagReader(bag) as recording:
         return Counter(each.topic for each in recording.messages(recording.types) if each.record_time_s >= since_s)
 
 
 def _static_pose(bag: Path, frame: str) -> Pose:
-    """Returns the pose of a static frame of the recording, in the frame's parent."""
+    """Reads the pose of a static TF frame, in its parent frame, from the recording."""
     with BagReader(bag) as recording:
         for each in recording.messages(["/tf_static"]):
             message = TFMessage()
@@ -264,7 +265,7 @@ def _static_pose(bag: Path, frame: str) -> Pose:
 
 
 def _middle_image(bag: Path, topic: str, dtype: type, channels: int) -> np.ndarray | None:
-    """Returns the middle one of the recorded images, shape (height, width, channels), or None if there is not any."""
+    """Returns the image at half of the recording, shape (height, width, channels). None without an image."""
     with BagReader(bag) as recording:
         count = recording.counts.get(topic, 0)
         for number, each in enumerate(recording.messages([topic])):

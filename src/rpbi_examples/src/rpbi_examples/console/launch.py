@@ -1,4 +1,4 @@
-"""The command `launch`."""
+"""The command `launch`: runs an example, a user's world or a launch file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ WORLDS = (".yaml", ".yml")
 WORLD = "world"
 """Name of the launch file that runs a user's world."""
 PRINTS = ("--files", "--args", "--nodes", "--find-node", "--dump-params", "--ros-args")
-"""Options with which `roslaunch` prints something and starts no node."""
+"""Options with which `roslaunch` only prints information and does not start nodes."""
 ANNOUNCE_PERIOD_S = 0.5
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
@@ -103,10 +103,18 @@ def launch(
 
 
 def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tuple[Path, list[str]]:
-    """Returns the launch file that the first words name, and the words after them.
+    """Finds the launch file to run.
+
+    Args:
+        name: An example, a launch file, or a package.
+        rest: Words after `name` on the command line. For a package, the first word is its launch file.
+        examples: Launch files of the examples, indexed by name.
+
+    Returns:
+        The launch file, and the remaining words.
 
     Raises:
-        UnknownNameError: If the name is not an example.
+        UnknownNameError: If `name` is neither a launch file nor an example, and a launch file does not follow.
         RLException: If the package does not exist, or does not have the file.
     """
     if name.endswith(".launch") and Path(name).is_file():
@@ -119,10 +127,10 @@ def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tu
 
 
 class _Parent(ROSLaunchParent, ProcessListener):
-    """A launch that records whether a required node has ended with an error.
+    """A roslaunch parent that records whether a required node has ended with an error.
 
     Args:
-        parents: List that this object is appended to.
+        parents: The new object appends itself to this list.
     """
 
     def __init__(self, parents: list[_Parent], *arguments: Any, **options: Any) -> None:
@@ -132,12 +140,12 @@ class _Parent(ROSLaunchParent, ProcessListener):
         parents.append(self)
 
     def start(self, *arguments: Any, **options: Any) -> None:
-        """Starts the nodes, and a thread that prints a line once a simulator is up."""
+        """Starts the nodes. Also starts a thread that prints a line when a simulator is running."""
         super().start(*arguments, **options)
         threading.Thread(target=self._announce, daemon=True).start()
 
     def _announce(self) -> None:
-        """Prints the commands for a running world as soon as a simulator is up."""
+        """Waits until a simulator is running, and prints the commands for a running world."""
         nodes = {rosgraph.names.ns_join(node.namespace, node.name) for node in self.config.nodes}
         while self.pm is not None and not self.pm.is_shutdown:
             if (namespace := simulator_namespace(nodes, self.config.master.uri)) is not None:
@@ -150,14 +158,16 @@ class _Parent(ROSLaunchParent, ProcessListener):
             time.sleep(ANNOUNCE_PERIOD_S)
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Records whether a required node has ended with an error; a process name is the node's name and a number."""
+        """Records whether a required node has ended with an error. A process is named NODE-NUMBER."""
         required = {f"{node.namespace}{node.name}".strip("/") for node in self.config.nodes if node.required}
         self.has_failed |= bool(exit_code) and process_name.rpartition("-")[0] in required
 
 
 def _controls_of(world: str, given: Iterable[str]) -> list[str]:
-    """Returns launch arguments for the key `controls` of a world's file. Returns none if `controls` is among the given
-    arguments, or if the file is wrong, which the simulator reports.
+    """Returns the launch arguments that correspond to the key `controls` of a world's file.
+
+    The list is empty if the given arguments already have `controls`. It is also empty if the file cannot be loaded; the
+    simulator reports the error then.
     """
     try:
         config = load_config(find_file(world, str(Path.cwd() / world)))
@@ -171,13 +181,13 @@ def _controls_of(world: str, given: Iterable[str]) -> list[str]:
 
 
 def _purpose(path: Path) -> str:
-    """Returns the first comment of a launch file."""
+    """Returns the first comment of a launch file as one line."""
     comment = _COMMENT.search(path.read_text(encoding="utf-8"))
     return " ".join(comment[1].split()) if comment else ""
 
 
 def _options() -> argparse.ArgumentParser:
-    """Returns the parser of the options that `launch` adds to those of roslaunch."""
+    """Returns the parser of the options that `launch` has in addition to roslaunch's options."""
     parser = argparse.ArgumentParser(prog="launch", add_help=False, allow_abbrev=False)
     parser.add_argument("--ns")
     parser.add_argument("--replace", action="store_true")
@@ -186,7 +196,7 @@ def _options() -> argparse.ArgumentParser:
 
 
 def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str]) -> None:
-    """Raises an UnknownNameError for an argument that a launch file lacks, which roslaunch would ignore."""
+    """Raises an UnknownNameError if an argument is not declared by the launch file; roslaunch would ignore it."""
     for argument in arguments:
         name, is_given, _ = argument.partition(":=")
         if is_given and name not in known and not name.startswith("_"):  # reserved by ROS, such as __ns
@@ -194,7 +204,13 @@ def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str])
 
 
 def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Returns the roslaunch arguments that correspond to the options."""
+    """Translates options of `launch` to arguments for roslaunch.
+
+    Args:
+        options: Parsed options.
+        given: Arguments from the command line; they take precedence.
+        known: Names of the arguments that the launch file declares.
+    """
     added = [] if options.port is None else ["-p", str(options.port)]
     if options.ns is None:
         return added
@@ -207,11 +223,11 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
 
 def _make_way(file: Path, options: argparse.Namespace) -> None:
-    """Refuses a launch file that would stop a running simulator; with the option `--replace`, stops that simulator.
+    """Checks that the launch would not stop a running simulator. With `--replace`, stops that simulator instead.
 
     Raises:
-        InterfaceError: If the launch would stop a simulator, or if it is in a namespace and a node publishes the
-            master's clock.
+        InterfaceError: If the launch would stop a simulator without `--replace`. Also if `--ns` is given although a
+            node publishes the master's clock.
     """
     master = master_of(options.port)
     if options.ns is not None and (clock := clocks(master)):

@@ -1,4 +1,4 @@
-"""The command `score`."""
+"""The command `score`: runs a scene from many random starts and counts the successes."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _numbers(text: str) -> range:
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    """Prints the rows as a table with a result in words, without the hashes."""
+    """Prints the rows as a table, without state hashes. The last column states the result in words."""
     hidden = {"reason", "state_hash", "success", "done", "of"}
     names = [name for name in dict.fromkeys(name for row in rows for name in row) if name not in hidden]
     lines = [[*(f"{row[name]:g}" if name in row else "-" for name in names), _verdict(row)] for row in rows]

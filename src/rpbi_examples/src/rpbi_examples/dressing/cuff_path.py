@@ -1,4 +1,4 @@
-"""The path of the cuff along a person's arm."""
+"""The path along which a robot pulls the cuff of a sleeve over a person's arm."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ CUFF = (0.86, -0.26, 1.43)
 AHEAD_AT_START = (-1.0, 0.0, 0.0)
 """Unit vector of the initial direction in which the cuff is pulled."""
 HAND_M, BEFORE_HAND_M = 0.19, 0.05
-"""Length of a hand, and distance before the hand at which the cuff is in line with the forearm [m]."""
+"""Length of a hand, and distance before the fingertips at which the cuff is in line with the forearm [m]."""
 PAST_ELBOW_M = 0.10
 """Distance past the elbow at which the path of the cuff ends [m]."""
 BLEND_M = 0.05
 """Distance before and after the elbow over which the cuff turns [m]."""
 HELD_OUT_M = 0.25
-"""An arm counts as held out if the point before its hand is nearer than this to the cuff's initial position [m]."""
+"""Largest distance between the cuff's initial position and the point before the hand of an arm that is held out [m]."""
 
 
 class ArmPosition(NamedTuple):
@@ -35,8 +35,8 @@ class ArmPosition(NamedTuple):
 
 
 class CuffPath:
-    """Path of the cuff: from its initial position to a point before the hand, over the hand and the forearm, past the
-    elbow.
+    """Path of the middle of the cuff. It leads from the cuff's initial position to a point before the hand, then over
+    hand and forearm, and ends past the elbow.
 
     Args:
         arm: Joint positions of the person's arm.
@@ -53,12 +53,14 @@ class CuffPath:
         self.length = sum(math.dist(a, b) for a, b in pairwise(self._corners))
 
     def place(self, done: float) -> Array:
-        """Returns the middle of the cuff at a distance along the path [m], shape (3,) [m]."""
+        """Returns the point at a given distance along the path [m], shape (3,) [m]."""
         return _along(self._corners, done)
 
     def ahead(self, done: float) -> Array:
-        """Returns the direction of the cuff at a distance along the path [m], as a unit vector of shape (3,). Before
-        the hand, it is the direction of the forearm.
+        """Returns the direction in which the cuff is pulled at a given distance along the path [m].
+
+        Returns:
+            Unit vector, shape (3,). Before the hand, it is the direction from the wrist to the elbow.
         """
         start = math.dist(*self._corners[:2])
         to = self.place(min(max(done, start) + BLEND_M, self.length))
@@ -66,7 +68,7 @@ class CuffPath:
 
 
 def is_held_out(arm: ArmPosition) -> bool:
-    """Returns whether an arm is held out to the cuff."""
+    """Returns whether an arm is held out to the cuff; see `HELD_OUT_M`."""
     forearm = _unit(arm.wrist - arm.elbow)
     return math.dist(arm.wrist + (HAND_M + BEFORE_HAND_M) * forearm, CUFF) < HELD_OUT_M
 
@@ -76,7 +78,7 @@ def _unit(vector: Array) -> Array:
 
 
 def _along(corners: Sequence[Array], distance: float) -> Array:
-    """Returns the point at a distance along a polyline."""
+    """Returns the point at a given distance along a polyline [m]; beyond the end, the last corner."""
     for a, b in pairwise(corners):
         length = math.dist(a, b)
         if distance <= length:

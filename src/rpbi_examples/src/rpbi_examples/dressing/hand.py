@@ -1,4 +1,4 @@
-"""The robot's hand that holds the cuff, and the controller that pulls the sleeve over the arm."""
+"""Kinematics of the robot's hand that holds a cuff, and the controller that pulls the sleeve over a person's arm."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ ROBOT, BASE_LINK, HAND_LINK = "franka_panda/panda.urdf", "panda_link0", "panda_g
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
 """Base of the robot in the world, as in `panda.yaml`."""
 MAX_TURN_RAD = 0.3
-"""Largest rotation of a joint to the next target [rad]; solutions with a larger one are not used."""
+"""Largest rotation of a joint between two targets [rad]. Solutions with a larger rotation are not used."""
 TARGET_HZ = 50
-"""Rate of the targets."""
+"""Rate of the targets [Hz]."""
 SETTLING_S = 0.5
-"""Time for which the cuff is held at the end of its path [s]."""
+"""Time for which the robot holds the cuff at the end of its path [s]."""
 MAX_LEAD_M = 0.02
-"""Largest distance of the cuff's target from the cuff [m]; the target waits until the cuff is within it."""
+"""Largest distance of the cuff's target from the cuff [m]. At a larger distance, the target waits."""
 MAX_TURN_RATE = 1.5
 """Largest angular speed of the cuff [rad/s]."""
 
 
 class HandTarget(NamedTuple):
-    """Target pose, in the world, of the point between the robot's fingertips.
+    """Target pose of the point between the robot's fingertips, in the world.
 
     Attributes:
         position: x, y, z [m].
-        quat_xyzw: Orientation: z points at the person's arm, and x along the trailing sleeve.
+        quat_xyzw: Orientation. The axis z points at the person's arm; x points against the direction of pulling.
     """
 
     position: tuple[float, float, float]
@@ -45,11 +45,11 @@ class HandTarget(NamedTuple):
 
 
 def holding(cuff: Array, ahead: Array) -> HandTarget:
-    """Returns the pose of a level hand that holds the cuff at its right side.
+    """Returns the pose of a level hand that holds the cuff's right side.
 
     Args:
         cuff: Middle of the cuff, shape (3,) [m].
-        ahead: Unit vector of the direction in which the cuff is pulled, shape (3,).
+        ahead: Direction in which the cuff is pulled, a unit vector of shape (3,).
     """
     to_arm = np.cross((0.0, 0.0, 1.0), -ahead)
     to_arm /= np.linalg.norm(to_arm)
@@ -60,10 +60,10 @@ def holding(cuff: Array, ahead: Array) -> HandTarget:
 
 
 class HandSolver:
-    """Kinematics of the robot that holds the cuff.
+    """Forward and inverse kinematics of the robot that holds the cuff.
 
     Attributes:
-        joint_names: Names of the arm's joints, in the order of all joint positions in this class.
+        joint_names: Names of the arm's joints. All joint positions in this class have the same order.
     """
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class HandSolver:
         return np.array((ROBOT_BASE @ self._solver.chain.pose(positions) @ in_hand).position)
 
     def solve(self, target: HandTarget, positions: Sequence[float]) -> dict[str, float] | None:
-        """Returns joint positions [rad] by name, or None if there is no solution near the present ones.
+        """Returns joint positions [rad] indexed by joint name. None if there is no solution near the present positions.
 
         Args:
             target: Target pose of the hand.
@@ -95,10 +95,10 @@ class HandSolver:
 
 
 class Dressing:
-    """Moves the cuff along a person's arm and follows the arm's motion.
+    """Computes targets that move the cuff along a person's arm and follow the arm's motion.
 
-    The cuff slows down as a force on the arm approaches its limit, and moves back while a limit is exceeded. Its target
-    waits while the hand lags behind, so that the hand does not make a large motion at once afterwards.
+    The cuff slows down as a force on the arm approaches its limit, and moves back while a limit is exceeded. The target
+    waits while the cuff lags behind the target, so that the hand does not jump afterwards.
 
     Args:
         speed: Speed of the cuff without contact [m/s].
@@ -112,7 +112,7 @@ class Dressing:
 
     @property
     def has_begun(self) -> bool:
-        """Whether the motion of the cuff has begun."""
+        """Whether `target` has been called."""
         return self._left_m is not None
 
     @property
@@ -121,12 +121,12 @@ class Dressing:
         return self._rested_s >= SETTLING_S
 
     def target(self, arm: ArmPosition, cuff: Array, force_share: float, dt: float) -> HandTarget:
-        """Advances along the path, and returns the target of the robot's hand.
+        """Advances the target along the cuff's path, and returns the corresponding target of the robot's hand.
 
         Args:
             arm: Joint positions of the person's arm.
-            cuff: Present middle of the cuff, shape (3,) [m].
-            force_share: Force on the arm as a share of its limit.
+            cuff: Present position of the middle of the cuff, shape (3,) [m].
+            force_share: Largest ratio of a force on the arm to its limit.
             dt: Time since the last target [s].
         """
         path = CuffPath(arm)

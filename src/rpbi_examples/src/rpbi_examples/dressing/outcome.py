@@ -1,4 +1,4 @@
-"""Forces on a person's arm as shares of their limits, and whether the person is dressed."""
+"""Result of dressing a person: forces on the arm compared to their limits, and the position of the sleeve."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .cuff_path import ArmPosition, Array
 
 ARM_SEGMENTS = tuple(REGIONS)
 MEAN_S = 0.1
-"""Time over which contact forces are averaged [s], since the contact forces of soft bodies are noisy."""
+"""Time over which contact forces are averaged [s], since soft bodies have noisy contact forces."""
 AROUND, RINGS = 14, 12
 """Number of corners in each ring of the sleeve, and number of rings."""
 ENOUGH_M = 0.05
@@ -24,12 +24,12 @@ ENOUGH_M = 0.05
 
 
 def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Sequence[float]) -> dict[str, SegmentForce]:
-    """Returns the force on each segment of the arm.
+    """Checks the contact forces, and returns the forces on the arm, indexed by segment name.
 
     Args:
         segments: Names of n segments of the person.
-        sums: For each segment, the sum of the magnitudes of its contact forces, shape (n,) [N].
-        largest: For each segment, the magnitude of its largest contact force, shape (n,) [N].
+        sums: Sum of the magnitudes of all contact forces on each segment, shape (n,) [N].
+        largest: Magnitude of the largest contact force on each segment, shape (n,) [N].
 
     Raises:
         ValueError: If the lengths differ, a segment of the arm is missing, or a force on the arm is negative or not
@@ -54,18 +54,21 @@ def forces_on_arm(segments: Sequence[str], sums: Sequence[float], largest: Seque
 
 
 class ArmForce:
-    """Forces on the arm over the last tenth of a second, as shares of their limits.
+    """Compares the forces on the arm over the last `MEAN_S` with their limits.
 
-    Three kinds of forces are limited: a single contact by the transient limit of its body region, the mean force on a
-    segment by the quasi-static limit of its region, and the mean force on the whole arm by a limit chosen for comfort.
+    Three forces have limits:
+
+    - A single contact must not exceed the transient limit of its body region.
+    - The mean force on a segment must not exceed the quasi-static limit of its body region.
+    - The mean force on the whole arm must not exceed `limit_n`, which is chosen for comfort.
 
     Args:
-        limit_n: Largest sum over the arm [N].
+        limit_n: Largest sum of the forces on the arm [N].
 
     Attributes:
-        arm_n: Sum of the forces on the arm, as mean over 0.1 s [N].
+        arm_n: Sum of the forces on the arm, averaged over `MEAN_S` [N].
         peak_n: Largest `arm_n` so far [N].
-        share: Largest ratio of a force to its limit; above 1 a limit is exceeded.
+        share: Largest ratio of a force to its limit. Above 1, a limit is exceeded.
         peak_share: Largest `share` so far.
     """
 
@@ -75,7 +78,7 @@ class ArmForce:
         self.arm_n = self.peak_n = self.share = self.peak_share = 0.0
 
     def add(self, time_s: float, forces: Mapping[str, SegmentForce]) -> None:
-        """Adds the forces on the segments of the arm at a time [s]."""
+        """Adds the forces at a time [s], indexed by segment name, and updates the attributes."""
         self._recent.append((time_s, forces))
         while self._recent[0][0] < time_s - MEAN_S:
             self._recent.popleft()
@@ -96,8 +99,8 @@ class Outcome(NamedTuple):
     Attributes:
         past_elbow_m: Distance of the middle of the cuff past the elbow, along the upper arm [m].
         is_around: Whether the arm is inside the cuff, and inside the ring of the sleeve that is nearest to the elbow.
-        peak_force_n: Largest force on the arm [N]: the sum of all magnitudes, as mean over 0.1 s.
-        peak_share: Largest ratio of a force to its limit: of a contact, of a segment or of the arm.
+        peak_force_n: Largest force on the arm [N]; see `ArmForce.peak_n`.
+        peak_share: Largest ratio of a force to its limit; see `ArmForce`.
     """
 
     past_elbow_m: float
@@ -112,17 +115,17 @@ class Outcome(NamedTuple):
 
     @property
     def is_within_limits(self) -> bool:
-        """Whether no force on the arm was ever above its limit."""
+        """Whether all forces on the arm stayed within their limits."""
         return self.peak_share <= 1.0
 
 
 def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
-    """Returns the result of dressing.
+    """Computes the result of dressing.
 
     Args:
-        rings: Corners of the sleeve's rings, shape (11, 14, 3) [m].
+        rings: Corners of the sleeve's rings, shape (11, 14, 3) [m]. The first ring is the cuff.
         arm: Joint positions of the person's arm.
-        force: Forces on the arm so far.
+        force: Forces on the arm during the whole trial.
     """
     upper_arm = arm.shoulder - arm.elbow
     upper_arm /= np.linalg.norm(upper_arm)
@@ -134,10 +137,16 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 
 
 def rings_of(corners: ArrayLike) -> Array:
-    """Returns all rings of the sleeve except the last, shape (11, 14, 3) [m], from the corners of its triangles.
+    """Extracts the sleeve's rings from the corners of its triangles.
+
+    Args:
+        corners: Three corners of each triangle, 9 numbers per triangle in any shape [m].
+
+    Returns:
+        Corners of all rings except the last, shape (11, 14, 3) [m].
 
     Raises:
-        ValueError: If the number of triangles is not that of the sleeve, or a corner is not finite.
+        ValueError: If the number of triangles is wrong, or a corner is not finite.
     """
     triangles, expected = np.asarray(corners, dtype=float), 2 * AROUND * (RINGS - 1)
     if triangles.size != 9 * expected:
@@ -148,7 +157,13 @@ def rings_of(corners: ArrayLike) -> Array:
 
 
 def _encloses(ring: Array, point: Array, axis: Array) -> bool:
-    """Returns whether a ring goes once around the line that passes through a point along an axis."""
+    """Returns whether a ring encloses a line exactly once.
+
+    Args:
+        ring: Corners of the ring, shape (14, 3) [m].
+        point: A point of the line, shape (3,) [m].
+        axis: Direction of the line, a unit vector of shape (3,); it must not be vertical.
+    """
     across = np.cross(axis, (0.0, 0.0, 1.0))
     across /= np.linalg.norm(across)
     beside = ring - point

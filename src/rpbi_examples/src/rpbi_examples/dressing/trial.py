@@ -25,7 +25,7 @@ from .outcome import ARM_SEGMENTS, ArmForce, Outcome, outcome, rings_of
 WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
 AVATAR_HEIGHT_M = 1.75
 HEIGHTS_M = (1.60, 1.90)
-"""Range of the people's heights [m]."""
+"""Range of the random heights of persons [m]."""
 FORCE_LIMIT_N, SPEED = 15.0, 0.1
 MAX_DURATION_S = 30.0
 
@@ -34,9 +34,9 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
     """Runs the example as fast as possible and returns its result.
 
     Args:
-        seed: Seed for the person's height and for the pose of the arm.
-        force_limit_n: Sum of forces on the arm above which the cuff moves back [N].
-        speed: Speed of the cuff [m/s].
+        seed: Seed of the person's height and of the arm's pose.
+        force_limit_n: Largest sum of forces on the arm [N]. Above this limit, the cuff moves back.
+        speed: Speed of the cuff without contact [m/s].
     """
     world = World.from_file(WORLD)
     try:
@@ -50,17 +50,17 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
 
 
 class Trial:
-    """A trial: a person holds out an arm in the example's world, and a controller dresses them.
+    """One trial: a simulated person holds out an arm, and a robot pulls a sleeve over the arm.
 
     Args:
-        world: World of the example, possibly with additions.
-        person: Person whose segments the avatar follows.
-        dressing: The controller.
+        world: World of the example, possibly with additional objects.
+        person: Simulated person whose motion the avatar follows.
+        dressing: The controller of the cuff.
         force_limit_n: Largest sum of forces on the arm [N].
 
     Attributes:
-        force: Forces on the arm.
-        cuff: Middle of the cuff, shape (3,) [m].
+        force: Forces on the arm so far.
+        cuff: Position of the middle of the cuff, shape (3,) [m].
     """
 
     def __init__(self, world: World, person: ArmHeldOut, dressing: Dressing, force_limit_n: float) -> None:
@@ -85,12 +85,12 @@ class Trial:
 
     @property
     def time_s(self) -> float:
-        """Time since the start [s]."""
+        """Time since the start of the trial [s]."""
         return self._number / TARGET_HZ
 
     @property
     def is_over(self) -> bool:
-        """Whether the motion of the cuff has ended, or the trial has timed out."""
+        """Whether the controller is done, or the trial has timed out."""
         return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:
@@ -116,7 +116,7 @@ class Trial:
         self._number += 1
 
     def outcome(self) -> Outcome:
-        """Returns the result."""
+        """Computes the result from the present state of the sleeve and the arm."""
         return outcome(rings_of(self._corners), self._arm(), self.force)
 
     def _arm(self) -> ArmPosition:
@@ -128,12 +128,12 @@ class Trial:
 
 
 def _joint_positions(robot: Any) -> dict[str, float]:
-    """Returns the positions of the movable joints, indexed by joint name [rad or m]."""
+    """Returns the positions of the movable joints [rad or m], indexed by joint name."""
     return dict(zip((joint.name for joint in robot.model.moving), robot.joint_positions().values()))
 
 
 def main() -> int:
-    """Runs trials for the given seeds, and returns 1 if a person is not dressed."""
+    """Runs a trial for each seed of the command line. Returns 1 if a person is not dressed, otherwise 0."""
     parser = argparse.ArgumentParser(description="Dresses random people, as fast as possible and without ROS.")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
     parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")

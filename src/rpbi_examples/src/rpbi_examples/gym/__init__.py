@@ -1,4 +1,4 @@
-"""Gymnasium environments with the robots of the examples; importing this module registers them."""
+"""Gymnasium environments with the robots of the examples. Importing this module registers the environments."""
 
 from rpbi.gym.env import register
 from rpbi.gym.tasks import TASKS
@@ -6,10 +6,10 @@ from rpbi_examples.scenes import SCENES
 
 FOLDER = "{rpbi_examples}/configs/gym"
 ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in TASKS}
-"""Folder of each environment's files, indexed by the environment's id."""
+"""Name of each environment's folder below `FOLDER`, indexed by the environment's id."""
 
 SCENE_ENVIRONMENTS = {f"rpbi/{''.join(map(str.capitalize, name.split('_')))}-v0": name for name in SCENES}
-"""Scenes that are also environments, indexed by the environment's id; see docs/examples.md."""
+"""Names of the scenes that are registered as environments, indexed by the environment's id; see docs/examples.md."""
 
 for _id, _folder in ENVIRONMENTS.items():
     register(_id, f"{FOLDER}/{_folder}/world.yaml", f"{FOLDER}/{_folder}/task.yaml")

@@ -1,4 +1,4 @@
-"""The cross-entropy method, and linear policies for vectorised environments, whose weights it finds."""
+"""The cross-entropy method for learning parameters, and linear policies for vectorised environments."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Array = npt.NDArray[np.float64]
 
 
 class CrossEntropy:
-    """Draws parameters from a normal distribution, and moves the distribution towards the best of them.
+    """Draws parameter vectors from a normal distribution, and moves the distribution towards the best vectors.
 
     Args:
-        size: Number of parameters.
-        deviation: Initial standard deviation of each parameter.
-        elite: Share of the drawn parameter vectors that count as the best.
-        floor: Smallest standard deviation.
-        random: Generator that the parameters are drawn from.
-        rate: Step towards the mean and deviation of the best vectors, as a share of the difference.
+        size: Number of parameters in a vector.
+        deviation: Initial standard deviation of each parameter. The initial mean is 0.
+        elite: Share of the drawn vectors that count as the best.
+        floor: Lower bound of the standard deviations.
+        random: Random generator for the drawn vectors.
+        rate: Step size of an update: 1 adopts the mean and deviation of the best vectors, 0 changes nothing.
     """
 
     def __init__(
@@ -40,8 +40,11 @@ class CrossEntropy:
         return self.mean + self.deviation * self._random.normal(size=(count, len(self.mean)))
 
     def update(self, parameters: Array, scores: Array) -> None:
-        """Moves the distribution towards the parameters, shape (count, size), with the highest scores, shape
-        (count,).
+        """Moves the distribution towards the parameter vectors with the highest scores.
+
+        Args:
+            parameters: Drawn vectors, shape (count, size).
+            scores: Score of each vector, shape (count,).
         """
         best = parameters[np.argsort(scores)[-max(2, round(self._elite * len(scores))) :]]
         self.mean += self._rate * (best.mean(axis=0) - self.mean)
@@ -50,10 +53,10 @@ class CrossEntropy:
 
 
 class LinearPolicies:
-    """A linear policy for each of n environments: action = tanh(W features), without an offset.
+    """One linear policy for each of n environments: action = tanh(W features).
 
     Args:
-        parameters: The weights W of each policy, action by action, shape (n, actions * features).
+        parameters: The matrix W of each policy, flattened row by row, shape (n, actions * features).
         features: Number of features.
     """
 
@@ -61,17 +64,17 @@ class LinearPolicies:
         self._weights = parameters.reshape(len(parameters), -1, features)
 
     def __call__(self, features: Array) -> Array:
-        """Returns actions, shape (n, actions), for features, shape (n, features)."""
+        """Returns the actions, shape (n, actions), for features of shape (n, features)."""
         return np.tanh(np.einsum("naf,nf->na", self._weights, features))
 
 
 class Episodes(NamedTuple):
-    """Results of an episode in each of n environments.
+    """Results of n episodes, one in each environment.
 
     Attributes:
-        returns: Sums of rewards, shape (n,).
+        returns: Sum of each episode's rewards, shape (n,).
         successes: Whether each episode succeeded, shape (n,).
-        actions: Number of actions in all episodes.
+        actions: Total number of actions in all episodes.
     """
 
     returns: Array
@@ -80,7 +83,7 @@ class Episodes(NamedTuple):
 
 
 def run_episodes(envs: Any, policies: Any, features: Any, seeds: Sequence[int]) -> Episodes:
-    """Runs an episode in each environment, with a policy for each.
+    """Runs one episode in each environment, and returns the results.
 
     Args:
         envs: A vector of n environments.

@@ -1,8 +1,8 @@
-"""Learns from scratch to reach random goals with seven joints, and draws the learning curve.
+"""Trains a policy that reaches random goals with seven joints, and draws the learning curve.
 
     .venv/bin/python -m rpbi_examples.gym.train_reach
 
-It takes about a minute on two processors.
+Training takes about a minute on two processors.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from .cross_entropy import Array, CrossEntropy, LinearPolicies, run_episodes
 ENVIRONMENT = next(name for name in rpbi_examples.gym.ENVIRONMENTS if "Reach" in name)
 FEATURES, ACTIONS = 3, 7
 UNIT_M = 0.1
-"""Distance that corresponds to a feature of 1 [m]."""
+"""Distance that corresponds to a feature with the value 1 [m]."""
 TESTS = 32
 """Number of test episodes, a multiple of the number of environments."""
 FIRST_TEST_SEED = 1_000_000
-"""First seed of the test episodes; these seeds are not used to learn."""
+"""First seed of the test episodes. Training does not use the test seeds."""
 
 
 class Progress(NamedTuple):
-    """Result of a generation.
+    """Result of the training up to a generation.
 
     Attributes:
         actions: Number of training actions so far.
-        score: Mean return of the mean policy in test episodes.
-        success: Share of test episodes in which the mean policy succeeded.
-        seconds: Time so far [s].
+        score: Mean return in the test episodes. The tested policy has the mean of the distribution as weights.
+        success: Share of test episodes in which this policy succeeded.
+        seconds: Wall time since the start of the training [s].
     """
 
     actions: int
@@ -48,18 +48,18 @@ class Progress(NamedTuple):
 
 
 def features(observations: dict[str, npt.NDArray[np.float32]]) -> Array:
-    """Returns the vectors from the tool to the goals, shape (n, 3)."""
+    """Returns the vectors from the tool to the goals in units of `UNIT_M`, shape (n, 3)."""
     return observations["way"].astype(np.float64) / UNIT_M
 
 
 def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
-    """Learns, and returns the progress before the first generation and after each.
+    """Trains a policy, and returns the progress before the first generation and after each generation.
 
     Args:
-        envs: Environments, one for each policy of a generation.
+        envs: Vector of environments, one for each policy of a generation.
         generations: Number of generations.
         tries: Number of episodes of each policy in a generation.
-        seed: Seed of the drawn parameters; the seeds of the training episodes count from it.
+        seed: Seed of the drawn parameters, and seed of the first training episode. Later episodes have the next seeds.
     """
     count, begin_s, actions = envs.num_envs, time.monotonic(), 0
     method = CrossEntropy(FEATURES * ACTIONS, 1.0, 0.25, 0.05, np.random.default_rng(seed))
@@ -79,7 +79,7 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
 
 
 def _test(envs: Any, parameters: Array) -> tuple[float, float]:
-    """Returns a policy's mean return and share of successes in test episodes."""
+    """Runs the test episodes with one policy, and returns the mean return and the share of successes."""
     policies = LinearPolicies(np.tile(parameters, (envs.num_envs, 1)), FEATURES)
     seeds = np.arange(FIRST_TEST_SEED, FIRST_TEST_SEED + TESTS).reshape(-1, envs.num_envs).tolist()
     found = [run_episodes(envs, policies, features, each) for each in seeds]
@@ -92,7 +92,7 @@ def _line(progress: Progress) -> str:
 
 
 def draw(progress: list[Progress], file: Path) -> None:
-    """Draws returns and successes over the number of actions, and writes the picture."""
+    """Writes a picture of the test returns and successes over the number of training actions."""
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
@@ -108,7 +108,7 @@ def draw(progress: list[Progress], file: Path) -> None:
 
 
 def main() -> None:
-    """Learns, and draws the curve."""
+    """Trains a policy with options of the command line, and writes the learning curve."""
     parser = argparse.ArgumentParser(description="Learns to reach random goals.")
     parser.add_argument("--generations", type=int, default=25)
     parser.add_argument("--policies", type=int, default=8, help="policies of a generation")

@@ -1,4 +1,4 @@
-"""The arm that learns: it moves to places, follows the teleoperated frame, and follows plans."""
+"""Controls the arm that learns, through topics and services: moves to positions, teleoperation, and plans."""
 
 from __future__ import annotations
 
@@ -33,31 +33,33 @@ ORIGIN, TARGET, TARGET_TIP, TIP = (
 )
 BASE = "rpbi/kuka_lwr/lwr_arm_0_link"
 HOME = {"lwr_arm_1_joint": 0.2, "lwr_arm_3_joint": -1.6, "lwr_arm_5_joint": 1.35}
-"""Posture above the box [rad]; other joints at 0."""
+"""Posture with the tip above the box [rad]. Joints without a value are at 0."""
 HOME_S, START_S = 2.0, 1.0
-"""Time to get there, and from there to a start [s]."""
+"""Duration of the motion to `HOME`, and of the motion from `HOME` to a start position [s]."""
 SIGNAL_HZ = 50.0
 RETURN_RATE = 3.0
-"""Speed towards the plan per metre of the target's distance from it [1/s]."""
+"""Speed with which the target returns to the plan, divided by the target's distance from the plan [1/s]."""
 LAG_M, SLACK_M = 0.02, 0.01
-"""Lag of the tip behind the plan that is normal, and further lag that halves the speed of the plan [m].
+"""Largest lag of the tip behind the plan at full speed, and additional lag at which the plan has half its speed [m].
 
 The plan waits for the arm by phase stopping: Ijspeert et al., Dynamical Movement Primitives, Neural Computation 25(2).
 """
 MIN_PACE = 0.1
-"""Least speed of the plan, so that it ends even if the arm cannot follow."""
+"""Least speed of the plan as a share of its full speed, so that the plan ends even if the arm cannot follow."""
 BEYOND_M = 0.02
-"""Tolerance by which a plan may exceed the limits of teleoperation, at which the target stops [m]."""
+"""Distance by which a plan may exceed the limits of teleoperation [m]. The target itself stops at the limits."""
 END_S = 0.5
-"""Time for which the last place is kept [s]."""
+"""Time for which the target stays at the end of a plan [s]."""
 
 
 class Arm:
-    """The arm; places are x and y in the person's frame [m].
+    """Moves the arm's tip, and switches the person's teleoperation of the arm on and off.
+
+    All places are x and y in the person's frame `rpbi/teleop_origin`, shape (2,) [m].
 
     Args:
-        tf: TF.
-        solver: Name of the solver of `ik_ros`.
+        tf: Access to TF.
+        solver: Name of the IK solver in `ik_ros`.
     """
 
     def __init__(self, tf: TfInterface, solver: str) -> None:
@@ -69,12 +71,12 @@ class Arm:
         self._limits = np.array([limits.xlim, limits.ylim])
 
     def home(self) -> None:
-        """Raises the tip far above the box; afterwards, the arm follows no target."""
+        """Ends teleoperation, and raises the tip far above the box."""
         self._switch(False)
         self._move(JointState(name=list(HOME), position=list(HOME.values())), HOME_S)
 
     def go_to(self, place: Array) -> None:
-        """Moves the tip down to a place, from home, and follows the person from there.
+        """Moves the tip from home down to a place, and starts teleoperation from there.
 
         Raises:
             InterfaceError: If the place is out of reach.
@@ -84,20 +86,24 @@ class Arm:
         self._switch(True)
 
     def require_reach(self, place: Array, subject: str) -> None:
-        """Checks that the tip reaches a place.
+        """Checks that the tip can reach a place.
+
+        Args:
+            place: The place.
+            subject: Name of the place, with which the error message begins.
 
         Raises:
-            InterfaceError: If it does not; the message begins with the subject.
+            InterfaceError: If the place is out of reach.
         """
         answer = self._solution(place, required=False)
         if not answer.success:
             raise InterfaceError(f"{subject} is out of reach: {answer.message}")
 
     def require_plan(self, plan: PushPlan) -> None:
-        """Checks that the target may move along a plan.
+        """Checks that a plan stays within the limits of teleoperation.
 
         Raises:
-            InterfaceError: If it leaves the limits of teleoperation.
+            InterfaceError: If the plan exceeds the limits by more than `BEYOND_M`.
         """
         for axis, (lower, upper), column in zip("xy", self._limits, plan.places.T):
             if column.min() < lower - BEYOND_M or column.max() > upper + BEYOND_M:
@@ -107,7 +113,10 @@ class Arm:
                 )
 
     def follow(self, plan: PushPlan) -> None:
-        """Moves the target along a plan by velocities, as a person does; returns at the end of the plan."""
+        """Moves the target along a plan, and returns at the end of the plan.
+
+        Publishes velocities on the topic of the person's signals. Meanwhile, signals of the person are ignored.
+        """
         call_service("operator_node/toggle", SetBool, False)  # signals of the person are ignored meanwhile
         try:
             now, rate = rospy.Time.now(), rospy.Rate(SIGNAL_HZ)
@@ -129,7 +138,11 @@ class Arm:
             call_service("operator_node/toggle", SetBool, True)
 
     def _pace(self, planned: Array) -> float:
-        """Returns the speed of the plan's time; it is less than 1 while the tip is far from the plan."""
+        """Returns the speed of the plan as a share of its full speed. While the tip lags behind, the share is below 1.
+
+        Args:
+            planned: Present place in the plan.
+        """
         message = self._tf.get_tf_msg(ORIGIN, TIP)
         if message is None:
             return 1.0
@@ -138,7 +151,7 @@ class Arm:
         return max(1.0 / (1.0 + (max(lag - LAG_M, 0.0) / SLACK_M) ** 2), MIN_PACE)
 
     def _switch(self, on: bool) -> None:
-        """Switches on or off whether the arm follows the person."""
+        """Switches the person's teleoperation of the arm on or off."""
         if on != self._follows_person:
             for toggle in self._toggles:
                 call_service(toggle, SetBool, on)
@@ -154,7 +167,7 @@ class Arm:
         return call(f"ik/solver/{self._solver}/solve_ik", SolveIK, problem)
 
     def _tip_pose(self, place: Array) -> Pose:
-        """Returns the pose of the tip at a place, in the arm's base."""
+        """Returns the pose of the tip at a place, in the frame of the arm's base."""
         origin, tip = (
             TfInterface.msg_to_matrix(self._tf.wait_for_tf_msg(*frames))
             for frames in ((BASE, ORIGIN), (TARGET, TARGET_TIP))
@@ -163,6 +176,6 @@ class Arm:
 
 
 def planar(message: TransformStamped) -> PlanarPose:
-    """Returns the pose of a transform on the floor."""
+    """Projects a transform onto the floor: returns its x, y and yaw."""
     place, quat = TfInterface.msg_to_pos_quat(message)
     return PlanarPose(float(place[0]), float(place[1]), yaw_of(quat))

@@ -1,4 +1,4 @@
-"""The box that is pushed: adds and removes it, and looks up its pose."""
+"""Adds and removes the box that is pushed, and looks up the box's pose."""
 
 from __future__ import annotations
 
@@ -21,17 +21,20 @@ from .report import BoxError
 FILE, NAME = "{rpbi_examples}/configs/lfd/box.yaml", "pushing_box"
 FRAME, GOAL = f"rpbi/{NAME}", "rpbi/visual_goal"
 REST_S, MAX_DROP_S = 0.5, 5.0
-"""Time for which the box has to be at rest, and longest time until it is [s]."""
+"""Time for which the dropped box must be at rest, and timeout of the whole drop [s]."""
 REST_M = 0.0005
-"""Distance by which a box at rest may move meanwhile [m]."""
+"""Distance by which the box may move in `REST_S` and still count as at rest [m]."""
 POLL_S = 0.05
 
 
 class PushedBox:
-    """The box that is pushed.
+    """Adds and removes the box that is pushed, and measures its distance from the goal.
+
+    Args:
+        tf: Access to TF.
 
     Attributes:
-        is_there: Whether it is in the world.
+        is_there: Whether the box is in the world.
     """
 
     def __init__(self, tf: TfInterface) -> None:
@@ -39,10 +42,10 @@ class PushedBox:
         self.is_there = False
 
     def drop(self) -> None:
-        """Adds the box above the floor, and waits until it is at rest.
+        """Adds the box above the floor, and waits until the box is at rest.
 
         Raises:
-            InterfaceError: If it cannot be added, or does not come to rest.
+            InterfaceError: If the box cannot be added, or does not come to rest within `MAX_DROP_S`.
         """
         box = PybulletObject(object_type=PybulletObject.DYNAMIC, filename=FILE)
         call_service("rpbi/add_pybullet_object", AddPybulletObject, box)
@@ -58,17 +61,19 @@ class PushedBox:
                 still_s, last = rospy.get_time(), pose
 
     def remove(self) -> None:
-        """Removes the box, if it is in the world."""
+        """Removes the box if the box is in the world."""
         if self.is_there:
             call_service("rpbi/remove_pybullet_object", SetString, NAME)
             self.is_there = False
 
     def error(self) -> BoxError:
-        """Returns its present error from the goal."""
+        """Returns the present distance and angle of the box from its goal."""
         return BoxError.of(*TfInterface.msg_to_pos_quat(self._pose_in(GOAL)))
 
     def _pose_in(self, frame: str) -> TransformStamped:
-        """Returns its pose in a frame, not older than this call, since TF keeps poses of an earlier box."""
+        """Waits for a pose of the box that is newer than this call, and returns the pose in a frame. Older poses may
+        belong to an earlier box.
+        """
         now = rospy.Time.now()
         while (message := self._tf.wait_for_tf_msg(frame, FRAME)) is None or message.header.stamp < now:
             time.sleep(POLL_S)

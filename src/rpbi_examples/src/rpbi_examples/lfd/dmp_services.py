@@ -1,4 +1,4 @@
-"""Motions that are learned and planned by the services of `dmp_server`."""
+"""Learns and plans motions with the services of `dmp_server`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ NEAR_M = 0.003
 
 
 class ServerMotion:
-    """A primitive of each axis, learned by `learn_dmp_from_demo`.
+    """A motion that the service `learn_dmp_from_demo` learned from a demonstration, with one DMP for each axis.
 
     Args:
-        times: m times [s].
-        places: m places, shape (m, 2) [m].
+        times: Times of the m samples of the demonstration [s].
+        places: Position of the tip in each sample, shape (m, 2) [m].
 
     Raises:
-        InterfaceError: If the service refuses the demonstration.
+        InterfaceError: If the service rejects the demonstration.
     """
 
     def __init__(self, times: Array, places: Array) -> None:
@@ -42,10 +42,13 @@ class ServerMotion:
         self._learned = learned
 
     def plan(self, start: Array | None = None) -> MotionPlan:
-        """Returns the motion from a start, by default that of the demonstration [m].
+        """Plans the learned motion with the service `get_dmp_plan`.
+
+        Args:
+            start: First position, shape (2,) [m]. Default: the demonstrated start.
 
         Raises:
-            InterfaceError: If a service refuses the request.
+            InterfaceError: If a service rejects the request.
         """
         first = self._start if start is None else start
         near = np.full(len(first), NEAR_M)

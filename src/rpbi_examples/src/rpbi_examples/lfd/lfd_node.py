@@ -1,5 +1,5 @@
-"""`run_lfd.py`: learns from a person to push a box, plans from random starts, executes the plans, and draws the
-results.
+"""`run_lfd.py`: learns from a person's demonstration to push a box, plans pushes from random starts, executes them, and
+draws the results.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ from .report import SIZE, Run, draw_paths, draw_pipeline, write_picture, write_s
 from .skill import Learn, PushSkill, learn_dmp
 
 LEARN: dict[str, Learn] = {"own": learn_dmp, "server": ServerMotion}
-"""Classes that learn and plan, by value of the launch file's argument `dmp`."""
+"""Functions that learn a motion, indexed by the launch file's argument `dmp`."""
 DEMONSTRATING = "demonstrating"
 AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
-"""State after a failed step, by the state before the step."""
+"""State after a failed step, indexed by the state before the step. In other states, a failure keeps the state."""
 ORIGIN_PLACE = np.zeros(2)
 MAX_OFFSET_M = 0.1
-"""Largest distance of a random start from the origin, along x and y [m]."""
+"""Largest distance of a random start from the origin, along x and along y [m]."""
 NEAR_ORIGIN_M = 0.03
-"""Distance of the tip from the origin up to which a demonstration may begin [m]."""
+"""Largest distance of the tip from the origin at the start of a demonstration [m]."""
 QUIET_S = 15.0
-"""Wall time without motion in a demonstration after which a warning is logged [s]."""
+"""Wall time after the start of a demonstration at which a warning is logged if the tip is still at the origin [s]."""
 POLL_S = 0.05
 
 
 class LfdNode:
-    """Carries out the requests of keys one after the other, and publishes on `lfd/state` which key it expects."""
+    """Executes the steps that keys or services request, one after the other. Publishes its state on `lfd/state`."""
 
     def __init__(self) -> None:
         self._out = Path(rospy.get_param("~out", "lfd"))
@@ -87,10 +87,10 @@ class LfdNode:
         rospy.Subscriber("joy", Joy, self._on_joy, queue_size=100)
 
     def run(self) -> None:
-        """Runs until ROS shuts down, or until the requested number of executions.
+        """Runs until ROS shuts down, or until the number of executions is `~rounds`. `~rounds` 0 means without limit.
 
         Raises:
-            InterfaceError: If the box was not at its goal after one of them.
+            InterfaceError: If an execution did not bring the box to its goal.
         """
         wait_until_ready()
         rospy.loginfo("key 1: home; key 2: starts and ends a demonstration; key 3: learns, and then executes")
@@ -137,7 +137,7 @@ class LfdNode:
         self._state.publish(name)
 
     def _idle(self) -> None:
-        """Updates windows, and warns of a demonstration without motion."""
+        """Updates the windows of the plots. Warns if the tip has not moved since the start of a demonstration."""
         if self._plots and self._executed:
             from matplotlib import pyplot
 
@@ -151,7 +151,7 @@ class LfdNode:
     # --- The steps
 
     def _home(self) -> None:
-        """Raises the arm, removes the box and moves to the origin; an unfinished demonstration is discarded."""
+        """Discards an unfinished demonstration, raises the arm, removes the box and moves the tip to the origin."""
         if self._name == DEMONSTRATING:
             rospy.loginfo("discarded: %s", discard_episode())
         self._become("moving")
@@ -159,7 +159,7 @@ class LfdNode:
         self._become("home")
 
     def _demonstrate(self) -> None:
-        """Starts a demonstration, or ends it."""
+        """Starts a demonstration, or ends the running demonstration."""
         if self._name == DEMONSTRATING:
             self._end_demonstration()
             return
@@ -178,7 +178,7 @@ class LfdNode:
         return not self._box.is_there and max(math.hypot(*each[:2]) for each in (tip, target)) < NEAR_ORIGIN_M
 
     def _last_contact(self) -> Array:
-        """Returns the place of the tip after it has pushed the box to the goal along a straight line [m]."""
+        """Returns the position of the tip at the end of a straight push from the origin to the goal, shape (2,) [m]."""
         goal = np.array([self._goal.x, self._goal.y])
         return np.asarray(goal * (1.0 - (HALF_SIDE_M + TIP_RADIUS_M) / np.linalg.norm(goal)))
 
@@ -204,7 +204,7 @@ class LfdNode:
         self._become("learned")
 
     def _execute(self) -> None:
-        """Plans from a random start, moves there, and executes the plan."""
+        """Plans from a random start, moves the tip to this start, executes the plan, and writes the results."""
         assert self._skill is not None
         start = self._random.uniform(-MAX_OFFSET_M, MAX_OFFSET_M, 2)
         self._become("executing")
@@ -225,7 +225,7 @@ class LfdNode:
         return planar(self._tf.wait_for_tf_msg(ORIGIN, frame))
 
     def _prepare(self, start: Array) -> None:
-        """Raises the arm, removes the box and moves the tip to a start."""
+        """Raises the arm, removes the box and moves the tip to a start position [m]."""
         self._arm.home()
         self._box.remove()
         self._arm.go_to(start)
@@ -237,7 +237,7 @@ class LfdNode:
     # --- Results
 
     def _report(self) -> None:
-        """Writes summary.json and the pictures, and shows them if wanted."""
+        """Writes summary.json and the pictures. With `~plot`, also shows the pictures in windows."""
         facts = {
             "operator": rospy.get_param("~operator", ""),
             "seed": self._seed,
@@ -254,7 +254,7 @@ class LfdNode:
             write_picture(figure, self._out / f"{name}.png")
 
     def _figure(self, name: str) -> Figure:
-        """Returns an empty figure, with a window if wanted."""
+        """Returns an empty figure. With `~plot`, the figure has a window."""
         if not self._plots:
             return Figure(figsize=SIZE, layout="constrained")
         from matplotlib import pyplot  # needs a screen

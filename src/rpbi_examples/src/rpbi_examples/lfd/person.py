@@ -1,4 +1,4 @@
-"""A simulated person who pushes a box to a goal by four arrow keys and sees box and tip."""
+"""A simulated person who pushes a box to a goal with the four arrow keys. The person sees the box and the arm's tip."""
 
 from __future__ import annotations
 
@@ -13,37 +13,39 @@ from rpbi_examples.motions import PlanarPose
 Place = tuple[float, float]
 
 HALF_SIDE_M, TIP_RADIUS_M = 0.1, 0.015
-"""Half of a side of the box, and the radius of the ball at the tip [m]."""
+"""Half of the box's side length, and radius of the ball at the arm's tip [m]."""
 CLEARANCE_M = 0.035
-"""Distance of the tip from the box while it moves around it [m]."""
+"""Distance of the tip from the box while the tip moves around the box [m]."""
 ALIGNED_M, PASSED_M = 0.003, 0.015
-"""Distance from its end at which a leg is complete: for the last leg before a push, and for others [m]."""
+"""Distance from the end of a leg at which the leg is complete [m]: the last leg before a push, and other legs."""
 CLOSE_M, CLOSE_RAD = 0.02, math.radians(5.0)
-"""Distance and angle of the box from its goal at which the person is content."""
+"""Distance [m] and angle [rad] of the box from its goal at which the person stops pushing."""
 TURNED_RAD = math.radians(8.0)
-"""Rotation of the box during a push at which the person stops and pushes another point [rad]."""
+"""Increase of the box's angle during a push at which the person ends the push and chooses another one [rad]."""
 REACTION_S = 0.08
-"""Time from an observation until the tip stops [s]."""
+"""Time between the observation that ends a push and the stop of the tip [s]."""
 TURN_ARM_M2 = 0.006
-"""Product of the distance of a push from the box's middle and of its length that turns the box by 1 rad [m2]."""
+"""Product of lever arm and length of a push that turns the box by 1 rad [m2]."""
 MAX_ASIDE_M = 0.05
-"""Largest distance of a push from the middle [m]."""
+"""Largest lever arm of a push: its distance from the middle of the box's side [m]."""
 STILL_SPEED, STILL_S = 0.005, 0.2
-"""Speed below which the tip counts as at rest [m/s], and time for which it must be at rest [s]."""
+"""Speed below which the tip counts as at rest [m/s], and time for which the tip must be at rest [s]."""
 HERE_M, MIN_PUSH_M = 0.02, 0.02
-"""Bonus length of a push from the present side of the tip, and least length of a push that turns the box [m]."""
+"""Two lengths [m]. The first is a bonus for a push along the axis on which the tip already is, since the tip need not
+move around the box. The second is the least length of a push in the computation of the lever arm.
+"""
 PUSHED_M, PRESS_SHARE = 0.006, 0.75
-"""Distance from the goal at which a push is over [m], and share of the remaining distance for which a key is held."""
+"""Distance from the goal at which a push is over [m], and share of the remaining distance covered by one key press."""
 MAX_PUSHES, MAX_PRESSES = 10, 8
-"""Number of pushes after which the person gives up, and number of key presses for one leg."""
+"""Largest number of pushes, and largest number of key presses for one leg. The person gives up afterwards."""
 MAX_AIM_ERROR_M = 0.002
-"""Largest sideways error of the point at which the person pushes [m]."""
+"""Largest random sideways error of the point at which the person pushes [m]."""
 LOST_M = 0.5
 """Distance of the box from its goal at which the person gives up [m]."""
 
 
 class Direction(Enum):
-    """The arrow keys, and the direction in which each moves the tip: right is x, away from the person is y."""
+    """Arrow keys. The value of a key is the tip's direction of motion: x to the right, y away from the person."""
 
     RIGHT = (1, 0)
     UP = (0, 1)
@@ -52,26 +54,32 @@ class Direction(Enum):
 
     @property
     def axis(self) -> int:
-        """Index of its coordinate."""
+        """Index of the coordinate that changes: 0 for x, 1 for y."""
         return 0 if self.value[0] else 1
 
     @property
     def sign(self) -> int:
-        """Sign of the motion along the coordinate."""
+        """Sign of the motion along `axis`: 1 or -1."""
         return sum(self.value)
 
     @classmethod
     def along(cls, axis: int, sign: float) -> Direction:
-        """Returns the direction along a coordinate."""
+        """Returns the direction along an axis (0 or 1) with the sign of a number."""
         return next(each for each in cls if each.axis == axis and each.sign * sign > 0.0)
 
 
 ROUND = (Direction.RIGHT, Direction.UP, Direction.LEFT, Direction.DOWN)
-"""The sides of the box, in order around it."""
+"""The sides of the box, counter-clockwise as seen from above."""
 
 
 class _Leg(NamedTuple):
-    """Part of the path around the box: motion along one coordinate to a value [m]."""
+    """Part of the path around the box: the tip moves along x or y until this coordinate has a value.
+
+    Attributes:
+        axis: Index of the coordinate: 0 for x, 1 for y.
+        value: Value of the coordinate at the end of the leg [m].
+        tolerance: Distance from the value at which the leg is complete [m].
+    """
 
     axis: int
     value: float
@@ -79,15 +87,19 @@ class _Leg(NamedTuple):
 
 
 class Person:
-    """Decides which arrow key is held; places are in the person's frame, x to the right and y away.
+    """Decides which arrow key is held. Positions are in the person's frame: x to the right, y away from the person.
 
-    A push is along x or y. It begins at the middle of the rear side, or off the middle to turn the box back. The person
-    goes around the box along its sides, and observes box and tip again when both are at rest.
+    Each push is along x or y, and starts near the middle of the box's rear side. A push off the middle turns the box
+    back. Before a push, the person moves the tip around the box. When the tip is at rest, the person chooses the next
+    key press from the present positions of box and tip.
 
     Args:
         goal: Goal pose of the box.
         speed: Speed of the tip while a key is held [m/s].
-        random: Source of small errors of the aim.
+        random: Random generator for small errors of the aim.
+
+    Attributes:
+        is_done: Whether the box is at its goal, or the person has given up.
     """
 
     def __init__(self, goal: PlanarPose, speed: float, random: np.random.Generator) -> None:
@@ -103,12 +115,12 @@ class Person:
         self.is_done = False
 
     def key(self, time_s: float, tip: Place, box: PlanarPose) -> Direction | None:
-        """Returns the arrow key that is held now, None if none is; see `is_done`.
+        """Processes an observation, and returns the arrow key to hold now. None: all keys are released.
 
         Args:
-            time_s: The time [s].
-            tip: Where the tip is [m].
-            box: Where the box is.
+            time_s: Time of the observation [s].
+            tip: Position of the tip [m].
+            box: Pose of the box.
         """
         (last_s, last_tip), self._last = self._last, (time_s, tip)
         dt_s = time_s - last_s
@@ -124,7 +136,7 @@ class Person:
         return None if self._held is None else self._held[0]
 
     def _next(self, time_s: float, tip: Place, box: PlanarPose) -> tuple[Direction, float] | None:
-        """Returns the key that is pressed next, and until when [s]."""
+        """Chooses the next key press: returns the key and the time of its release [s]. None: no key is pressed yet."""
         self._presses += 1
         self._is_pushing = False
         if self._presses > MAX_PRESSES:
@@ -148,7 +160,14 @@ class Person:
         return push, time_s + max(PRESS_SHARE * way, PUSHED_M) / self._speed
 
     def _is_pushed(self, tip: Place, velocity: list[float], box: PlanarPose) -> bool:
-        """Returns whether the push is over: the box is at its goal, has turned too far, or was missed."""
+        """Returns whether the push is over. A push ends when the box is at its goal along the push, when the box has
+        turned too far, or when the tip has missed the box.
+
+        Args:
+            tip: Position of the tip [m].
+            velocity: Velocity of the tip [m/s].
+            box: Pose of the box.
+        """
         assert self._push is not None
         axis, sign = self._push.axis, self._push.sign
         left = sign * (self._goal[axis] - box[axis] - velocity[axis] * REACTION_S)
@@ -156,7 +175,9 @@ class Person:
         return is_past or left <= PUSHED_M or abs(box.yaw - self._goal.yaw) > self._max_turn_rad
 
     def _choose(self, tip: Place, box: PlanarPose) -> None:
-        """Chooses the next push, and the path to its start; without a useful push, the person is done."""
+        """Chooses the next push and the path to its start. Sets `is_done` if the box is at its goal, or if the person
+        gives up.
+        """
         left = (self._goal.x - box.x, self._goal.y - box.y)
         turn = box.yaw - self._goal.yaw
         is_close = math.hypot(*left) < CLOSE_M and abs(turn) < CLOSE_RAD
@@ -175,14 +196,19 @@ class Person:
 
     @staticmethod
     def _side(tip: Place, box: PlanarPose) -> Direction:
-        """Returns the side of the box that the tip is on."""
+        """Returns the side of the box on which the tip is."""
         x, y = tip[0] - box.x, tip[1] - box.y
         return Direction.along(0, x) if abs(x) > abs(y) else Direction.along(1, y)
 
     @staticmethod
     def _way_to(push: Direction, aside: float, side: Direction, box: PlanarPose) -> list[_Leg]:
-        """Returns the path from a side of the box to the start of a push, which is `aside` to the left of the middle
-        [m].
+        """Returns the path of the tip around the box to the start of a push.
+
+        Args:
+            push: Direction of the push.
+            aside: Distance of the push from the middle of the box, positive to the left of the push [m].
+            side: Side of the box on which the tip is.
+            box: Pose of the box.
         """
         away = _half_width(box.yaw) + TIP_RADIUS_M + CLEARANCE_M
         begin, end = ROUND.index(side), (ROUND.index(push) + 2) % 4
@@ -200,5 +226,5 @@ class Person:
 
 
 def _half_width(yaw: float) -> float:
-    """Returns half of the extent of the turned box along x or y [m]."""
+    """Returns half of the extent along x of a box with a given yaw [m]. The extent along y is equal."""
     return HALF_SIDE_M * (abs(math.cos(yaw)) + abs(math.sin(yaw)))

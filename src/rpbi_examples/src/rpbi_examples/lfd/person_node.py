@@ -1,4 +1,6 @@
-"""`lfd_person.py`: a scripted person, who publishes keys as the keyboard's node does, or presses keys of its window."""
+"""`lfd_person.py`: a simulated person who demonstrates a push with keys. The node publishes keys like the keyboard's
+node, or presses keys in the window of the keyboard's node.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,7 @@ NEXT_KEY = {
     "learned": "3",
     "executed": "3",
 }
-"""Key that is pressed in each state."""
+"""Key to press, indexed by the state of `run_lfd.py`."""
 DEMONSTRATING, DEMONSTRATE = "demonstrating", "2"
 MAX_TRIES = 4
 MAX_ANSWER_S = 5.0
@@ -38,14 +40,14 @@ PRESS_S = 0.1
 
 
 Send = Callable[[bool, str], None]
-"""Called with whether a key goes down, and its name."""
+"""Function that presses a key (True) or releases a key (False). The second argument is the key's name."""
 
 
 class ScriptedPerson:
-    """Demonstrates when the node expects it, and presses the key that the state requires.
+    """Operates `run_lfd.py`: presses the key that its state requires, and pushes the box in demonstrations.
 
     Args:
-        send: Presses and releases keys.
+        send: Function that presses and releases keys.
     """
 
     def __init__(self, send: Send) -> None:
@@ -56,10 +58,10 @@ class ScriptedPerson:
         rospy.Subscriber("lfd/state", String, self._on_state)
 
     def run(self) -> None:
-        """Acts until ROS shuts down.
+        """Operates `run_lfd.py` until ROS shuts down.
 
         Raises:
-            InterfaceError: If the box was not at its goal after a few demonstrations.
+            InterfaceError: If `MAX_TRIES` demonstrations did not bring the box to its goal.
         """
         goal, tries = planar(self._tf.wait_for_tf_msg(ORIGIN, GOAL)), 0
         speed = rospy.get_param("operator_node/config/scale")
@@ -77,7 +79,7 @@ class ScriptedPerson:
         self._state = message.data
 
     def _wait_for_state(self) -> str:
-        """Waits until a key is expected, and returns the state."""
+        """Waits until the state of `run_lfd.py` is a key of `NEXT_KEY`, and returns the state."""
         rate = rospy.Rate(LOOK_HZ)
         while (state := self._state) not in NEXT_KEY:
             rate.sleep()
@@ -95,7 +97,7 @@ class ScriptedPerson:
         self._send(False, key)
 
     def _hold(self, down: Direction | None, up: Direction | None) -> None:
-        """Releases one key, and presses another."""
+        """Releases the arrow key `up`, and presses the arrow key `down`. None: no key."""
         if up is not None:
             self._send(False, up.name)
         if down is not None:
@@ -103,7 +105,7 @@ class ScriptedPerson:
 
 
 def key_topics() -> Send:
-    """Returns the function that publishes keys as the keyboard's node does."""
+    """Returns a function that publishes key presses like the keyboard's node."""
     topics = {
         is_down: rospy.Publisher(f"~{name}", Key, queue_size=100)
         for is_down, name in ((True, "keydown"), (False, "keyup"))
@@ -116,7 +118,11 @@ def key_topics() -> Send:
 
 
 def window_keys() -> Send:
-    """Returns the function that presses keys of the keyboard's window, by xdotool."""
+    """Returns a function that presses keys in the window of the keyboard's node, with xdotool.
+
+    Raises:
+        InterfaceError: If xdotool fails.
+    """
 
     def xdotool(*arguments: str) -> None:
         try:
@@ -129,10 +135,12 @@ def window_keys() -> Send:
 
 
 def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | None, Direction | None], None]) -> None:
-    """Makes a person push the box seen on TF; returns when the person is done.
+    """Runs a demonstration, and returns when the person is done.
 
     Args:
-        hold: Called when the held key changes, with the key that goes down and the one that goes up.
+        tf: Access to TF, from which the person observes tip and box.
+        person: The simulated person.
+        hold: Called when the held key changes. Its arguments are the key to press and the key to release; None: no key.
     """
     held: Direction | None = None
     rate = rospy.Rate(LOOK_HZ)
@@ -148,7 +156,7 @@ def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | Non
 
 
 def main() -> None:
-    """Runs the node; with `~window` it presses keys of the keyboard's window."""
+    """Runs the node. With `~window`, the node presses keys in the keyboard's window instead of publishing the keys."""
     run_node("lfd_person", _act)
 
 

@@ -1,4 +1,4 @@
-"""Demonstrations and executions as episodes, and episodes as tables."""
+"""Records demonstrations and executions as episodes, and reads episodes as tables."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROBOT = "kuka_lwr"
 
 
 def begin_episode() -> str:
-    """Begins an episode, and returns a sentence about it.
+    """Starts the recording of an episode, and returns the recorder's message.
 
     Raises:
         InterfaceError: If the recorder cannot begin, for instance on a full disk.
@@ -33,15 +33,20 @@ def begin_episode() -> str:
 
 
 def discard_episode() -> str:
-    """Discards the episode that is being recorded, and returns its folder."""
+    """Discards the episode that is being recorded, and returns the recorder's message."""
     return str(call_service("record/discard", Trigger).message)
 
 
 def finish_episode(out: Path, error: BoxError, plan: PushPlan | None = None) -> Run:
-    """Ends the episode that is recorded, labels it, and writes its table below a folder.
+    """Stops the recording, labels the episode as success or failure, and writes the episode's table.
+
+    Args:
+        out: Folder of the results. Tables are written below `out/tables`.
+        error: Distance and angle of the box from its goal at the end.
+        plan: The executed plan. None for a demonstration.
 
     Raises:
-        InterfaceError: If it cannot be ended or read.
+        InterfaceError: If the recording cannot be stopped, or the episode cannot be read.
     """
     call_service("record/stop", Trigger)
     call_service("record/label", SetString, "success" if error.is_at_goal else "failure")
@@ -53,10 +58,12 @@ def finish_episode(out: Path, error: BoxError, plan: PushPlan | None = None) -> 
 
 
 def read_episode(bag: str | Path) -> pd.DataFrame:
-    """Returns tip, box, contact force [N] and signal of an episode in one table, at the times of the tip; see `Run`.
+    """Reads an episode's bag, and returns one table with the columns of `Run.table`.
+
+    The table has a row for each recorded pose of the tip. The other columns have the values nearest in time.
 
     Raises:
-        InterfaceError: If the bag cannot be read, or has no tip or no box.
+        InterfaceError: If the bag cannot be read, or lacks the frame of the tip or of the box.
     """
     tables = bag_to_dataframes(bag)
     tip, box = (transforms_between(tables, ORIGIN, frame) for frame in (TIP, FRAME))

@@ -1,4 +1,4 @@
-"""Results of a session: where the box was left, summary.json, and pictures of demonstration, plan and execution."""
+"""Results of a session: final errors of the box, summary.json, and pictures of demonstration, plan and execution."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .person import HALF_SIDE_M
 from .skill import PushPlan, ShownPush
 
 NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
-"""Distance and angle up to which the box counts as at its goal [m, rad]."""
+"""Largest distance [m] and angle [rad] from the goal at which the box counts as at its goal."""
 SHOWN_SHARE = 2.0 / 3.0
-"""Share of these limits within which a demonstration counts as good: an execution adds errors of its own."""
+"""A demonstration counts as good within this share of `NEAR_M` and `NEAR_RAD`, since an execution adds errors."""
 TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
@@ -41,7 +41,12 @@ class BoxError(NamedTuple):
 
     @classmethod
     def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
-        """Returns the error of a pose in the frame of the goal; a box on its side has an angle, too."""
+        """Returns the distance and angle of a pose in the goal's frame.
+
+        Args:
+            position: x, y, z [m].
+            quat_xyzw: Orientation. The angle is about any axis, so a tipped box has a large angle.
+        """
         return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
 
     @property
@@ -51,7 +56,7 @@ class BoxError(NamedTuple):
 
     @property
     def is_good_to_learn(self) -> bool:
-        """Whether a demonstration that left the box there is good enough to be repeated."""
+        """Whether a demonstration with this final error is good enough to learn from."""
         return self._is_within(SHOWN_SHARE)
 
     def _is_within(self, share: float) -> bool:
@@ -62,14 +67,14 @@ class BoxError(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A demonstration or an execution, in the person's frame.
+    """A demonstration or an execution. Positions are in the person's frame.
 
     Attributes:
-        episode: Number of its episode.
-        table: Rows by time [s] with tip/x, tip/y, box/x, box/y [m], box/yaw [rad], contact [N],
+        episode: Number of the recorded episode.
+        table: Samples indexed by time [s], with the columns tip/x, tip/y, box/x, box/y [m], box/yaw [rad], contact [N],
             signal/x, signal/y [m/s].
-        error: Where the box was left.
-        plan: The plan, None for a demonstration.
+        error: Distance and angle of the box from its goal at the end.
+        plan: The executed plan. None for a demonstration.
     """
 
     episode: int
@@ -78,13 +83,13 @@ class Run(NamedTuple):
     plan: PushPlan | None = None
 
     def path(self) -> ShownPush:
-        """Returns the tip's path, and when the box was first touched."""
+        """Returns the tip's path, with the time of the first contact with the box."""
         touched = self.table.index[self.table["contact"] > 0.0]
         contact_s = float(touched[0]) if len(touched) else None
         return ShownPush(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
 
     def summary(self) -> dict[str, Any]:
-        """Returns its entry in summary.json."""
+        """Returns the entry of this run in summary.json."""
         return {
             "episode": self.episode,
             "seconds": round(float(self.table.index[-1] - self.table.index[0]), 2),
@@ -96,7 +101,14 @@ class Run(NamedTuple):
 
 
 def write_summary(path: Path, facts: dict[str, Any], shown: Sequence[Run], executed: Sequence[Run]) -> None:
-    """Writes summary.json."""
+    """Writes summary.json.
+
+    Args:
+        path: File to write.
+        facts: Entries about the whole session.
+        shown: Demonstrations.
+        executed: Executions.
+    """
     text = {
         **facts,
         "demonstrations": [run.summary() for run in shown],
@@ -108,10 +120,10 @@ def write_summary(path: Path, facts: dict[str, Any], shown: Sequence[Run], execu
 
 
 def write_tables(table: pd.DataFrame, path: Path) -> None:
-    """Writes a table twice, as `.parquet` and as `.csv`.
+    """Writes a table to two files, with the suffixes `.parquet` and `.csv`.
 
     Raises:
-        OSError: If one cannot be written.
+        OSError: If a file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(path.with_suffix(".parquet")) as part:
@@ -121,13 +133,17 @@ def write_tables(table: pd.DataFrame, path: Path) -> None:
 
 
 def write_picture(figure: Figure, path: Path) -> None:
-    """Writes a figure; raises OSError if that fails."""
+    """Writes a figure to a picture file.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
     with atomic_file(path) as part:
         figure.savefig(part, dpi=DPI)
 
 
 def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[Run]) -> None:
-    """Draws the last demonstration and some executions as seen from above."""
+    """Draws a demonstration and all executions as seen from above. Only the last execution is drawn in detail."""
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     _draw_run(left, goal, shown, f"demonstration: box {shown.error}")
     for run in executed[:-1]:
@@ -137,7 +153,7 @@ def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[
 
 
 def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -> None:
-    """Draws the pipeline from the operator's signal to the executed plan, step by step."""
+    """Draws six plots, from the operator's signal to the executed plan, and connects the plots with arrows."""
     assert executed.plan is not None
     plan, seconds = executed.plan, shown.table.index - shown.table.index[0]
     grid = figure.subplots(2, 3)
@@ -173,7 +189,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
 
 
 def _push_begins(shown: Run, plan: PushPlan) -> float:
-    """Returns the first time at which the demonstrated tip was at the start of the plan's push [s]."""
+    """Returns the time [s] in the demonstration at which the tip was nearest to the start of the plan's push."""
     place, _ = plan.at(plan.push_s)
     tip = shown.table[["tip/x", "tip/y"]].to_numpy()
     return float((shown.table.index - shown.table.index[0])[int(np.argmin(np.linalg.norm(tip - place, axis=1)))])
@@ -207,14 +223,14 @@ def _map(axes: Axes, goal: PlanarPose, title: str) -> None:
 
 
 def _outline(box: PlanarPose) -> Array:
-    """Returns the corners of a box, shape (5, 2) [m]."""
+    """Returns the corners of the box at a pose, shape (5, 2) [m]. The last corner equals the first."""
     corners = HALF_SIDE_M * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)])
     cos, sin = math.cos(box.yaw), math.sin(box.yaw)
     return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + (box.x, box.y))
 
 
 def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
-    """Draws an arrow between two neighbouring plots, once the layout has placed them."""
+    """Draws an arrow from one plot to a neighbouring plot. The layout must have placed both plots."""
     one, other = begin.get_position(), end.get_position()
     x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
     if abs(one.y0 - other.y0) > 0.1:

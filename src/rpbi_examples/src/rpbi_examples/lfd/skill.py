@@ -1,4 +1,4 @@
-"""The learned skill: approach a box from any start, and push it as demonstrated."""
+"""The learned skill: approaches a box from any start, and pushes the box as demonstrated."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from motion_primitives import Demonstration, MotionPlan, make_primitive
 
 NAMES = ("x", "y")
 MOVED_M = 0.002
-"""Distance from the first and the last place within which the tip counts as at rest [m]."""
+"""Largest distance from the first or last position at which the tip counts as at rest [m]."""
 GAP_M = 0.025
-"""Distance of the tip from its first contact where the approach ends and the push begins [m]."""
+"""Distance of the tip from the point of first contact at which the approach ends and the push begins [m]."""
 MIN_BASES, MAX_BASES, BASES_PER_S = 30, 1000, 20.0
 """Number of basis functions of a primitive: lower and upper limit, and number per second of demonstration."""
 ALPHA_PER_S = 25.0
-"""Damping of a primitive per second of demonstration, so that the accuracy does not depend on its duration."""
+"""Damping of a primitive, divided by the duration of the demonstration [1/s]."""
 
 
 class ShownPush(NamedTuple):
-    """A demonstration as the tip's path, in the person's frame.
+    """The tip's path in a demonstration, in the person's frame.
 
     Attributes:
-        times: m times [s].
-        places: m places, shape (m, 2) [m].
-        contact_s: Time of the first contact with the box, None if there was none [s].
+        times: Times of the m samples [s].
+        places: Position of the tip in each sample, shape (m, 2) [m].
+        contact_s: Time of the first contact with the box [s]. None without contact.
     """
 
     times: Array
@@ -36,7 +36,11 @@ class ShownPush(NamedTuple):
     contact_s: float | None
 
     def moving(self) -> ShownPush:
-        """Returns the demonstration without the rest before and after the motion."""
+        """Returns the part of the demonstration in which the tip moves: from its first to its last motion.
+
+        Raises:
+            InterfaceError: If the tip has not moved.
+        """
         off = [np.linalg.norm(self.places - self.places[index], axis=1) > MOVED_M for index in (0, -1)]
         if not off[0].any():
             raise InterfaceError("the tip has not moved: there is nothing to learn")
@@ -46,12 +50,12 @@ class ShownPush(NamedTuple):
 
 
 class PushPlan(NamedTuple):
-    """A planned motion from a start.
+    """A planned motion of the tip.
 
     Attributes:
-        times: m times [s] from 0 on.
-        places: m places, shape (m, 2) [m].
-        velocities: m velocities, shape (m, 2) [m/s].
+        times: Times of the m points; the first is 0 [s].
+        places: Position at each time, shape (m, 2) [m].
+        velocities: Velocity at each time, shape (m, 2) [m/s].
         push_s: Time at which the push begins [s].
     """
 
@@ -62,11 +66,11 @@ class PushPlan(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """Time of the last place [s]."""
+        """Duration of the plan [s]."""
         return float(self.times[-1])
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns place [m] and velocity [m/s] at a time [s]; after the end, the last place at rest."""
+        """Returns position [m] and velocity [m/s] at a time [s]. After the end, returns the last position and 0."""
         place, velocity = (
             np.array([np.interp(time_s, self.times, column) for column in rows.T])
             for rows in (self.places, self.velocities)
@@ -78,15 +82,15 @@ class LearnedMotion(Protocol):
     """A motion that was learned from a demonstration."""
 
     def plan(self, start: Array | None = None) -> MotionPlan:
-        """Returns the motion from a start, by default that of the demonstration [m]."""
+        """Returns the learned motion from a start position [m]. Default: the demonstrated start."""
 
 
 Learn = Callable[[Array, Array], LearnedMotion]
-"""Learns a motion from m times [s] and m places of the shape (m, 2) [m]."""
+"""Function that learns a motion from times [s] of shape (m,) and positions [m] of shape (m, 2)."""
 
 
 def learn_dmp(times: Array, places: Array) -> LearnedMotion:
-    """Returns a primitive of the type `dmp` of `motion_primitives`; see `Learn`."""
+    """Learns a motion with the primitive `dmp` of the package `motion_primitives`; see `Learn`."""
     shown = Demonstration.of(times, places, names=NAMES)
     bases = min(max(MIN_BASES, round(BASES_PER_S * shown.duration_s)), MAX_BASES)
     options = {"bases": bases, "alpha": ALPHA_PER_S * max(shown.duration_s, 1.0)}
@@ -94,14 +98,14 @@ def learn_dmp(times: Array, places: Array) -> LearnedMotion:
 
 
 class PushSkill:
-    """Two primitives: one of the demonstration before the tip reaches the box, one of the rest.
+    """Learns two primitives from a demonstration: the approach to the box, and the push.
 
-    A push has the same effect only if it touches the box at the demonstrated point. The approach therefore begins
-    anywhere and ends just before the demonstrated contact, where the push begins.
+    The approach may start anywhere and ends just before the demonstrated contact, where the push begins. A push has the
+    same effect only if the tip touches the box at the demonstrated point.
 
     Args:
         shown: The demonstration.
-        learn: Learns each of the two.
+        learn: Function that learns each primitive.
 
     Raises:
         InterfaceError: If the demonstration has no contact, or no approach.
@@ -122,7 +126,7 @@ class PushSkill:
         self._push = learn(shown.times[split:], shown.places[split:])
 
     def plan(self, start: Array) -> PushPlan:
-        """Returns the motion from a start [m]: the approach, and the demonstrated push."""
+        """Plans the approach from a start position [m] and the demonstrated push, and returns both as one motion."""
         approach, push = self._approach.plan(start=start), self._push.plan()
         parts: tuple[MotionPlan, MotionPlan] = approach, push
         times = np.concatenate([approach.times, approach.duration_s + push.times[1:]])

@@ -1,4 +1,4 @@
-"""Examples with a box: an arm picks and places it, an arm pushes it, and boxes are thrown into the world."""
+"""Three example nodes: an arm picks and places a box, an arm pushes a box, and boxes are thrown into the world."""
 
 import math
 from itertools import cycle
@@ -20,18 +20,18 @@ from .joint_targets import HZ, JointTargets
 HAND_LINK, FINGER = "panda_grasptarget", "panda_finger_joint1"
 GRASP_GOALS = (PlanarPose(0.5, 0.2, 0.0), PlanarPose(0.4, -0.2, 0.35))
 MOVE_S, FINGERS_S = 2.0, 1.0
-"""Duration of a step of the hand or of the fingers [s]."""
+"""Duration of a motion of the hand, and of a motion of the fingers [s]."""
 ROBOT = "kuka_lwr"
 REST_S = 0.5
-"""Time for which the arm rests at first, and between two checks of a box that is out of reach [s]."""
+"""Time for which the arm rests at the start, and after a box was found out of reach [s]."""
 BOX = "{rpbi_examples}/configs/pybullet_objects_example/box.yaml"
 NAME = "box"
 STAY_S = 3.0
-"""Time for which each box stays [s] of ROS time."""
+"""ROS time for which each box stays in the world [s]."""
 
 
 def grasp_example() -> None:
-    """Runs the node of an arm that picks up a box, carries it to another place and puts it down."""
+    """Runs the node with which an arm repeatedly picks up a box, carries the box to another goal and puts it down."""
     run_node("grasp_example", _pick_and_place)
 
 
@@ -54,7 +54,7 @@ def _pick_and_place() -> None:
 
 
 def _box(tf: TfInterface, frame: str) -> PlanarPose:
-    """Returns the pose of the box in a frame, from TF."""
+    """Looks up the pose of the box in a TF frame, projected onto the floor."""
     position, quat = TfInterface.msg_to_pos_quat(tf.wait_for_tf_msg(frame, "rpbi/box"))
     return PlanarPose(position[0], position[1], 2.0 * math.atan2(quat[2], quat[3]))
 
@@ -66,7 +66,7 @@ def _problem(step: GraspStep) -> CalculateInverseKinematicsProblem:
 
 
 def push_example() -> None:
-    """Runs the node of an arm that pushes a box back and forth."""
+    """Runs the node with which an arm pushes a box back and forth between two goals."""
     run_node("push_example", _push)
 
 
@@ -95,7 +95,7 @@ def _rest(arm: JointTargets, positions: tuple[float, ...]) -> None:
 
 
 def pybullet_objects_example() -> None:
-    """Runs the node that throws a box into the world again and again."""
+    """Runs the node that repeatedly throws a box into the world and removes the box."""
     run_node("pybullet_objects_example", _throw_boxes)
 
 

@@ -1,4 +1,4 @@
-"""Starts arm and haptic device, shows forces and heights, and reports one press and release."""
+"""Starts an arm and a haptic device, shows forces and heights, and evaluates each press of the arm on a box."""
 
 import contextlib
 import os
@@ -31,19 +31,19 @@ WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/tar
 SAMPLE_HZ = 100.0
 PLOT_S = 0.25
 MAX_BUFFERED = 1000
-"""Largest number of forces and poses that are kept until all data of the same time have arrived."""
+"""Size of the buffers in which forces and poses wait for the other data with the same time."""
 WINDOW_S = 20.0
 """Time span shown in the window [s]."""
 MAX_FAREWELL_S = 15.0
-"""Time after which roslaunch kills a node that it has interrupted [s]."""
+"""Time for which the node waits for roslaunch to stop it [s]; afterwards, roslaunch kills an interrupted node."""
 LEFT_S = 2.0
-"""Time after the end of the scripted motion at which the press counts as over [s]."""
+"""Time after the scripted device has disconnected at which the press counts as over [s]."""
 MAX_ERROR = 0.05
-"""Largest error of the mean force of a press, as a share of the force that stiffness and depth predict."""
+"""Largest relative error of a press's mean forces, on the tool and on the handle."""
 
 
 class Watch:
-    """Samples forces and heights, and writes figure and table after each press."""
+    """Samples forces and heights during a press, and writes a figure and a table after each press."""
 
     def __init__(self) -> None:
         self._folder = Path(rospy.get_param("~working_directory", "."), rospy.get_param("~output", "."))
@@ -67,10 +67,10 @@ class Watch:
         self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
 
     def run(self) -> None:
-        """Shows the live figure, until ROS shuts down or the scripted press is over.
+        """Runs until ROS shuts down or the scripted press is over. With `~plot`, shows the figure of the present press.
 
         Raises:
-            InterfaceError: If the scripted press differs from the prediction.
+            InterfaceError: If the mean force of the scripted press differs from the prediction.
         """
         self._begin()
         if rospy.get_param("~plot", False):
@@ -86,8 +86,8 @@ class Watch:
         rospy.signal_shutdown("the press is over")
 
     def _begin(self) -> None:
-        """Waits for the other nodes, and starts following the handle."""
-        # without contact it measures the weight of the tool
+        """Waits for the other nodes, and switches on the nodes with which the arm follows the handle."""
+        # the call tares the sensor; without contact, the sensor measures the weight of the tool
         get_srv_handler(SENSOR, Empty)()
         rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)
         rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=MAX_BUFFERED, tcp_nodelay=True)
@@ -125,7 +125,10 @@ class Watch:
             self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
-        """Adds the samples that are now complete; on a busy machine some data arrive late."""
+        """Adds a sample for each measured force for which TF has the tool's pose at the same time.
+
+        On a busy machine, TF may lag behind the forces, so the forces wait in a buffer.
+        """
         buffer = self._tf.tf_buffer
         while self._measured and not self._over.is_set():
             stamp, measured_n = self._measured[0]
@@ -179,16 +182,15 @@ class Watch:
 
 
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
-    """Returns the newest value at a time; 0 if there was none."""
+    """Returns the newest value that is not newer than a time [s], from pairs of stamp and value. Default: 0."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
 
 
 def interrupt_roslaunch() -> bool:
-    """Interrupts the roslaunch that started this process, which then ends all of its nodes, without an error.
+    """Interrupts the `roslaunch` that started this process, like Ctrl-C. It then ends all of its nodes.
 
     Returns:
-
-        Whether roslaunch started this process.
+        Whether `roslaunch` started this process.
     """
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():

@@ -1,4 +1,4 @@
-"""Moves an arm to its target and then tracks the target, with a solver of `ik_ros`."""
+"""`ik_example_node.py`: moves an arm to a target frame and then tracks the target, with a solver of `ik_ros`."""
 
 import sys
 
@@ -23,16 +23,16 @@ from rpbi_examples.motions import FigureEight
 from .joint_targets import wait_until_ready
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
-"""Start of the search [rad], unless `~home` names another; other joints at 0."""
+"""Default of `~home`: joint positions from which inverse kinematics start [rad]. Joints without a value are at 0."""
 APPROACH_S = 5.0
-"""Time of the motion to the figure [s]."""
+"""Duration of the motion to the target or to the figure [s]."""
 WAYPOINTS = 16
-"""Number of waypoints of a round, where the trajectory is planned as a whole."""
+"""Number of waypoints for one round of the figure, with the solver of whole trajectories."""
 WHOLE_TRAJECTORIES = "trajectory"
 
 
 def main() -> None:
-    """Runs the node for the robot and the solver that the arguments name."""
+    """Runs the node. The first argument names the robot, the second argument the solver."""
     run_node("ik_example", _run)
 
 
@@ -51,7 +51,10 @@ def _run() -> None:
 
 
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
-    """Switches on setup, solver and, if requested, the target once the arm is at the target."""
+    """Moves the arm to the target, and then switches on the tracking of the target.
+
+    Switches on the solver and its setup node. Also switches on the motion of the target, if `~target_toggle` is given.
+    """
     problem = IKProblem(has_target=True, target=_pose(target), start=_home())
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
     call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
@@ -62,7 +65,9 @@ def _track(robot: str, solver: str, target: np.ndarray) -> None:
 
 
 def _draw_a_round(robot: str, start: np.ndarray) -> None:
-    """Plans a trajectory to the figure and once around it, and sends it to the robot's trajectory controller."""
+    """Plans one trajectory to the figure eight and once around the figure. Publishes the trajectory to the robot's
+    trajectory controller.
+    """
     figure = FigureEight()
     times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)
     problem = IKProblem(start=_home())

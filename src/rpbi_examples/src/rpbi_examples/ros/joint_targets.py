@@ -1,4 +1,4 @@
-"""Targets of a robot's joints, by its topics and services."""
+"""Publishes joint targets for the robots of the simulator."""
 
 import threading
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
 
 HZ = 50.0
-"""Rate of the targets."""
+"""Rate of the targets [Hz]."""
 
 
 def wait_until_ready() -> None:
-    """Waits for a message on the topic that `~ready` names, if it is given.
+    """Waits for a message on the topic `~ready`. Returns at once if the parameter is empty or missing.
 
-    With a real robot, these are the commands of its driver. The guard accepts a first target only at the robot's
-    position. The simulated arm must not move before the guard runs.
+    With a real robot, `~ready` names the topic of the commands for the robot's driver. The simulated arm must not move
+    before the first command, since the guard accepts a first target only at the robot's present position.
     """
     topic = str(rospy.get_param("~ready", ""))
     if topic:
@@ -28,14 +28,19 @@ def wait_until_ready() -> None:
 
 
 class JointTargets:
-    """Sends targets to all movable joints of a robot while the world runs; see also `wait_until_ready`.
+    """Publishes targets for all movable joints of one or more robots while the world runs.
 
-    Targets of several robots go out together on `joint_states/target`, where names of joints begin with `NAME_`.
+    The constructor calls `wait_until_ready` and reads joints, positions and limits from the robots' services. Targets
+    for one robot are published on `rpbi/NAME/joint_states/target`. Targets for several robots are published on
+    `joint_states/target`, with `NAME_` in front of the joint names.
+
+    Args:
+        robot_names: Names of the robots.
 
     Attributes:
         names: Names of the n joints in the targets.
-        positions: Positions of the joints at the start, n [rad or m].
-        limits: Lower and upper limit of each, infinite where there is none.
+        positions: Initial positions of the n joints [rad or m].
+        limits: Lower and upper position limit of each joint [rad or m]; infinite without a limit.
     """
 
     def __init__(self, *robot_names: str) -> None:
@@ -59,10 +64,15 @@ class JointTargets:
         self._rate = rospy.Rate(HZ)
 
     def send(self, positions: Sequence[float]) -> None:
-        """Sends positions [rad or m] with a later stamp than before, and returns when the next ones are due.
+        """Publishes a target, and waits until the next target is due.
+
+        Also waits until the world runs, and until ROS time is later than the stamp of the last target.
+
+        Args:
+            positions: Target positions of the n joints [rad or m].
 
         Raises:
-            rospy.ROSInterruptException: If ROS shuts down meanwhile.
+            rospy.ROSInterruptException: If ROS shuts down while the method waits.
         """
         while not self._running.is_set() or rospy.Time.now() <= self._stamp:
             self._sleep()
@@ -73,7 +83,10 @@ class JointTargets:
         self._sleep()
 
     def _sleep(self) -> None:
-        """Waits for the next period; unlike rospy's sleep, it also ends when ROS shuts down in wall time."""
+        """Waits for the next period, and raises ROSInterruptException if ROS shuts down.
+
+        With wall time, rospy's sleep does not raise.
+        """
         self._rate.sleep()
         if rospy.is_shutdown():
             raise rospy.ROSInterruptException("ROS shuts down")
@@ -86,6 +99,6 @@ class JointTargets:
 
 
 def _limits(joint: JointInfo) -> tuple[float, float]:
-    """Returns lower and upper position limit; PyBullet returns an inverted range if there is none."""
+    """Returns lower and upper position limit, or -inf and inf for PyBullet's range of a joint without limits."""
     limited = joint.jointLowerLimit < joint.jointUpperLimit
     return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))

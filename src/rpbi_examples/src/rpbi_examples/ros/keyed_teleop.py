@@ -1,7 +1,7 @@
-"""`run_teleop.py` and `run_example.py`: programs that move the tip of an arm to a frame, and then make it follow the
-frame.
+"""`run_teleop.py` and `run_example.py`: nodes that move an arm's tip to a frame and then make the tip follow the frame.
 
-Names of topics, services, frames and parameters are those of the authors' release.
+Topics, services, frames and parameters have the same names as in the original release of this project
+(docs/from_the_release.md).
 """
 
 import sys
@@ -21,27 +21,30 @@ from ros_pybullet_interface.srv import ResetEffState
 
 WORLD = "rpbi/world"
 START_S, APPROACH_S = 2.0, 5.0
-"""Time to the origin of teleoperation, and to the figure [s]."""
+"""Duration of the motion to the origin of teleoperation, and of the motion to the figure eight [s]."""
 NEAR_M = 0.03
-"""Largest distance of the tip from the origin when teleoperation is switched on [m]."""
+"""Largest distance of the tip from the origin at which teleoperation can be switched on [m]."""
 ITERATIONS, RESIDUAL = 1000, 1e-7
-"""Iterations and tolerance of the inverse kinematics: with the defaults it stops before the orientation is reached."""
+"""Iterations and tolerance of inverse kinematics. With the defaults, the solver stops before the target orientation."""
 PYBULLET = "pybullet"
-"""Solver without a node of its own: the simulator solves the targets on the robot's topic `ik`."""
+"""Name of the solver inside the simulator, which solves the targets on the robot's topic `ik`."""
 
 
 def run_teleop() -> None:
-    """Waits for keys: 1 moves the tip to the origin, 2 switches teleoperation on and off."""
+    """Runs the node for teleoperation. Key 1 moves the tip to the origin, key 2 switches teleoperation on and off."""
     run_node("run_teleop", KeyedTeleop)
 
 
 def run_example() -> None:
-    """Moves the tip to the start of a figure eight, and has it track the figure by the solver of the first argument."""
+    """Runs the node that moves the tip to `figure_eight_base` and then starts the tracking of a moving frame.
+
+    The frame moves along a figure eight. The first argument names the IK solver.
+    """
     run_node("run_example", _track_figure)
 
 
 class KeyedTeleop:
-    """Moves an arm by keys."""
+    """On key presses, moves an arm's tip to the origin of teleoperation, or switches teleoperation on and off."""
 
     def __init__(self) -> None:
         self._robot, self._link = rospy.get_param("~robot_name", "kuka_lwr"), "end_effector_ball"
@@ -76,7 +79,7 @@ class KeyedTeleop:
         rospy.loginfo("teleoperation is %s", "on" if self._is_on else "off")
 
     def _check_place(self) -> None:
-        """Raises an InterfaceError unless the tip is at the origin."""
+        """Checks that the tip is near the origin; raises an InterfaceError otherwise."""
         position, _ = self._tf.get_tf("teleop_origin", f"rpbi/{self._robot}/{self._link}")
         if position is None:
             raise InterfaceError("TF has no teleop_origin, or no tip of the arm")
@@ -102,7 +105,7 @@ def _track_figure() -> None:
 
 
 def _toggles(solver: str) -> Sequence[str]:
-    """Returns the services that switch a solver."""
+    """Returns the names of the services that switch a solver on and off."""
     setup = f"ik/setup/{solver}/toggle"
     return (setup,) if solver == PYBULLET else (setup, f"ik/solver/{solver}/toggle")
 
@@ -113,7 +116,7 @@ def _switch(services: Sequence[str], is_on: bool) -> None:
 
 
 def _move_to(tf: TfInterface, robot: str, link: str, frame: str, duration_s: float) -> None:
-    """Moves a link to a TF frame; raises an InterfaceError if it does not arrive there."""
+    """Moves a link to a TF frame in a given time [s]; raises an InterfaceError if the service fails."""
     position, quat_xyzw = tf.wait_for_tf(WORLD, frame)
     problem = CalculateInverseKinematicsProblem(link_name=link, targetPosition=position, targetOrientation=quat_xyzw)
     problem.maxNumIterations, problem.residualThreshold = ITERATIONS, RESIDUAL

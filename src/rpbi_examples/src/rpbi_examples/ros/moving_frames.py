@@ -1,4 +1,4 @@
-"""TF frames that move: the camera's around the scene, and one in a figure eight."""
+"""Nodes that broadcast moving TF frames: a camera that orbits the scene, and a frame that moves in a figure eight."""
 
 from collections.abc import Callable
 
@@ -15,17 +15,17 @@ HZ = 50.0
 
 
 def orbit() -> None:
-    """Runs the node that circles the scene; the frame is `~child_frame_id`, by default `rpbi/camera`."""
+    """Runs the node that moves the frame `~child_frame_id` in a circle around the scene. Default: `rpbi/camera`."""
     run_node("orbit", lambda: _move("rpbi/world", rospy.get_param("~child_frame_id", "rpbi/camera"), camera_pose, HZ))
 
 
 def figure_eight() -> None:
-    """Runs the node that moves `figure_eight` in `figure_eight_base`."""
+    """Runs the node that moves the frame `figure_eight` along a figure eight in the frame `figure_eight_base`."""
     run_node("figure_eight", _FigureEightNode)
 
 
 class _FigureEightNode:
-    """Broadcasts the frame, which stops while the node is switched off.
+    """Broadcasts the frame `figure_eight` until ROS shuts down. While the node is switched off, the frame is at rest.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -45,7 +45,7 @@ class _FigureEightNode:
         self._moves = on
 
     def _own_time_s(self, now_s: float) -> float:
-        """Returns the time that it has moved [s]."""
+        """Returns the total time for which the frame has moved [s], given the time since the start of the node [s]."""
         if self._moves:
             self._time_s += now_s - self._last_s
         self._last_s = now_s
@@ -53,9 +53,13 @@ class _FigureEightNode:
 
 
 def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, ArrayLike]], hz: float) -> None:
-    """Broadcasts a frame until ROS shuts down.
+    """Broadcasts a moving TF frame until ROS shuts down.
 
-    `pose` returns position [m] and orientation (x, y, z, w) at a time since the start [s of ROS time].
+    Args:
+        parent: Name of the parent frame.
+        child: Name of the moving frame.
+        pose: Returns position [m] and orientation (x, y, z, w) at a ROS time since the start [s].
+        hz: Rate [Hz].
     """
     tf = TfInterface()
     start = last = rospy.Time.now()

@@ -1,4 +1,4 @@
-"""Nodes that move the robots of the examples, by topics and services of the simulator."""
+"""Nodes that move the robots of the examples through topics and services of the simulator."""
 
 import math
 import sys
@@ -22,46 +22,51 @@ from rpbi_examples.two_hands import MirroredHands
 from .joint_targets import HZ, JointTargets
 
 SETTLING_S = 0.5
-"""Time for which the arm presses before it wipes [s]."""
+"""Time between the first contact with the table and the start of wiping [s]."""
 
 
 def basic_robot_example() -> None:
-    """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other.
+    """Runs the node that swings a robot's joints, one after the other.
 
-    They swing by `~amplitude` (1 rad or m) about 0, or with `~about_start` about their first positions.
+    `~robot_name` or the first argument names the robot. The joints swing by `~amplitude` (default: 1 rad or m) about 0.
+    With `~about_start`, the joints swing about their initial positions.
     """
     run_node("basic_robot_example", _swing)
 
 
 def wave() -> None:
-    """Waves with the right hand of the human model that `~robot_name` or the first argument names."""
+    """Runs the node with which a human model waves. `~robot_name` or the first argument names the model."""
     run_node("wave", _wave)
 
 
 def drive_around() -> None:
-    """Drives the mobile base that `~robot_name` or the first argument names along a route, by its `base_state`."""
+    """Runs the node that drives a mobile base along a closed route.
+
+    `~robot_name` or the first argument names the base. The node reads `base_state` and publishes `cmd_vel`.
+    """
     run_node("drive_around", _drive)
 
 
 def dual_arm_example() -> None:
-    """Draws mirrored circles with the hands of two robots, which the arguments name, the left one first.
+    """Runs the node that draws mirrored circles with the hands of two robots.
 
-    The parameter `robot_description` has both. Targets of all joints go out on `joint_states/target`. The centres of
-    the circles are `~distance` apart [m]; with 0.3 the targets cross the arms.
+    The two arguments name the robots, the left robot first. The parameter `robot_description` contains both robots. The
+    node publishes targets for all joints on `joint_states/target`. `~distance` is the distance between the centres of
+    the circles [m]; at 0.3 m, the targets make the arms cross.
     """
     run_node("dual_arm_example", _draw)
 
 
 def wiping_example() -> None:
-    """Wipes back and forth with the KUKA of the wiping example once it touches the table."""
+    """Runs the node with which a KUKA wipes a table back and forth. Wiping starts after the first contact."""
     run_node("wiping_example", _wipe)
 
 
 def _robot_name() -> str:
-    """Returns the robot that `~robot_name` or the first argument names.
+    """Returns the robot's name from `~robot_name`, or otherwise from the first argument.
 
     Raises:
-        InterfaceError: If neither is given.
+        InterfaceError: If both are missing.
     """
     arguments = rospy.myargv(sys.argv)[1:]
     name = rospy.get_param("~robot_name", arguments[0] if arguments else None)
@@ -84,7 +89,7 @@ def _wave() -> None:
 
 
 def _play(robot: JointTargets, motion: Swing | Wave) -> NoReturn:
-    """Sends a motion until ROS shuts down."""
+    """Publishes the targets of a motion until ROS shuts down."""
     time_s = 0.0
     while True:
         robot.send(motion.at(time_s))

@@ -1,4 +1,6 @@
-"""Sends an arm's tip through three coloured balls, reports its distances from the balls, and draws its motion."""
+"""`run_interpolation.py`: moves an arm's tip through three coloured balls, reports the tip's distances from the balls,
+and draws the motion.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +23,20 @@ from custom_ros_tools.transforms import Array
 BASE, TIP, TARGET = "rpbi/kuka_lwr/lwr_arm_0_link", "rpbi/kuka_lwr/end_effector_ball", "interpol_target"
 HZ = 50.0
 DRAWN = 5
-"""Number of samples of the target from one marker in RViz to the next."""
+"""Number of samples of the target between two markers in RViz."""
 AFTER_S = 1.0
-"""Time for which the motion is drawn after its end [s]."""
+"""Time for which the measurement continues after the last ball [s]."""
 TF_PATIENCE_S = 60.0
 
 
 class Visit(NamedTuple):
-    """A ball that the tip visits: its colour, the time [s], and its position in the frame of the arm's base [m]."""
+    """A ball that the tip visits.
+
+    Attributes:
+        colour: Colour of the ball.
+        time_s: Time of the visit since the start of the motion [s].
+        position: Position of the ball in the frame of the arm's base [m].
+    """
 
     colour: str
     time_s: float
@@ -43,7 +51,7 @@ VISITS = (
 
 
 class RunInterpolation:
-    """Publishes waypoints from the tip's present pose through the balls, and measures the motion."""
+    """Publishes waypoints from the tip's present pose through all balls, and measures the motion of target and tip."""
 
     def __init__(self) -> None:
         self._tf = TfInterface()
@@ -56,10 +64,10 @@ class RunInterpolation:
         """Time since the start [s], and the positions of target and tip [m]."""
 
     def run(self) -> None:
-        """Plans, and measures the motion until ROS shuts down.
+        """Publishes the waypoints, measures the motion until `AFTER_S` after the last ball, and writes the picture.
 
         Raises:
-            InterfaceError: If TF has no tip, or the picture cannot be written.
+            InterfaceError: If TF does not have the tip within `TF_PATIENCE_S`, or the picture cannot be written.
         """
         start = self._tf.wait_for_tf(BASE, TIP, timeout=TF_PATIENCE_S)
         if start[0] is None:
@@ -94,7 +102,12 @@ class RunInterpolation:
         self._path.publish(self._drawn)
 
     def _plot(self, times_s: list[float], positions: Array) -> None:
-        """Writes the picture, if one is wanted: x, y and z of waypoints, plan and actual motion."""
+        """Writes a picture with x, y and z of waypoints, target and tip to the file `~plot`, if the parameter is given.
+
+        Args:
+            times_s: Times of the waypoints [s].
+            positions: Positions of the waypoints, shape (3, n) [m].
+        """
         name = rospy.get_param("~plot", "")
         if not name or not self._rows:
             return
@@ -123,7 +136,7 @@ class RunInterpolation:
 
 
 def as_message(rows: Array) -> Float64MultiArray:
-    """Returns a matrix as `interpolation_node.py` reads it: row by row, with labelled dimensions."""
+    """Converts a matrix to the message that `interpolation_node.py` reads: row by row, with labelled dimensions."""
     count, columns = rows.shape
     dimensions = [MultiArrayDimension("rows", count, rows.size), MultiArrayDimension("columns", columns, columns)]
     return Float64MultiArray(MultiArrayLayout(dimensions, 0), rows.ravel().tolist())

@@ -1,4 +1,4 @@
-"""Simulators that already run on the ROS master of a new launch."""
+"""Finds and stops simulators that already run on the ROS master of a new launch."""
 
 import time
 from collections.abc import Iterable, Set
@@ -14,33 +14,33 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TIMEOUT_S, TimedTransport
 
 MAX_END_S = 60.0
-"""Longest time that a simulator and its launch may need to end [s]; then an error is reported."""
+"""Timeout for the end of a simulator and its `roslaunch` [s]."""
 _CALLER = "/rpbi_launch"
 _PACKAGE = "ros_pybullet_interface"
 _LIST = "rpbi/list_objects"
-"""A service that every simulator has, and no other node."""
+"""A service that every simulator has. Other nodes do not have the service."""
 _POLL_S = 0.1
 
 
 class RunningNode(NamedTuple):
-    """A node that answers.
+    """A running ROS node.
 
     Attributes:
-        name: Its full name.
-        uri: Address of its XML-RPC interface.
+        name: Full name of the node.
+        uri: Address of the node's XML-RPC interface.
     """
 
     name: str
     uri: str
 
     def stop(self, master: str) -> None:
-        """Stops the node, and waits until it has ended, with its `roslaunch` if that runs on this machine.
+        """Stops the node and waits for its end. Also waits for the node's `roslaunch` if that runs on this machine.
 
         Args:
-            master: Address of its ROS master, which may end with that `roslaunch`.
+            master: Address of the node's ROS master. The master may end together with `roslaunch`.
 
         Raises:
-            InterfaceError: If it does not end within `MAX_END_S`.
+            InterfaceError: If the node or its `roslaunch` does not end within `MAX_END_S`.
         """
         launch = self._launch_process(master)
         end_s = time.monotonic() + MAX_END_S
@@ -52,7 +52,7 @@ class RunningNode(NamedTuple):
             time.sleep(_POLL_S)
 
     def _launch_process(self, master: str) -> int | None:
-        """Returns the process id of the `roslaunch` that started the node, None if there is none on this machine."""
+        """Returns the process id of the `roslaunch` that started the node. None if it does not run on this machine."""
         _, _, uris = _proxy(master).getParam(_CALLER, "/roslaunch/uris")
         for uri in uris.values() if isinstance(uris, dict) else ():
             host, _ = rosgraph.network.parse_http_host_and_port(uri)
@@ -69,14 +69,22 @@ class RunningNode(NamedTuple):
 
 
 def master_of(port: str | None) -> str:
-    """Returns the address of the master that `roslaunch` uses, with the port given to it, if any."""
+    """Returns the address of the ROS master that `roslaunch` uses.
+
+    Args:
+        port: Value of the option `-p` of `roslaunch`. None: the master from the environment.
+    """
     return rosgraph.network.create_local_xmlrpc_uri(int(port)) if port else rosgraph.get_master_uri()
 
 
 def running_simulators(file: str, master: str) -> list[RunningNode]:
-    """Returns the simulators that would end if a launch file were run, since its nodes have the same names.
+    """Returns the running simulators that ROS would stop if a launch file were run, since node names are equal.
 
-    Nodes that were killed stay registered with the master; they do not count.
+    Killed nodes are not returned, although they stay registered with the master.
+
+    Args:
+        file: The launch file.
+        master: Address of the ROS master.
     """
     publishers, subscribers, services = _state(master)
     registered = {node for _, nodes in (*publishers, *subscribers, *services) for node in nodes}
@@ -88,7 +96,12 @@ def running_simulators(file: str, master: str) -> list[RunningNode]:
 
 
 def simulator_namespace(nodes: Set[str], master: str) -> str | None:
-    """Returns the namespace of the first simulator among some nodes, such as `left`; None before it is up."""
+    """Returns the namespace of the first simulator among some nodes, such as `left`. None before a simulator runs.
+
+    Args:
+        nodes: Full names of the nodes.
+        master: Address of the ROS master.
+    """
     for service, servers in sorted(_state(master)[2]):
         if service.endswith(f"/{_LIST}") and not nodes.isdisjoint(servers):
             return service.removesuffix(_LIST).strip("/")
@@ -96,13 +109,13 @@ def simulator_namespace(nodes: Set[str], master: str) -> str | None:
 
 
 def clocks(master: str) -> list[RunningNode]:
-    """Returns the nodes that publish the clock of a master."""
+    """Returns the running nodes that publish `/clock` on a master."""
     publishers, _, _ = _state(master)
     return _running({node for topic, nodes in publishers for node in nodes if topic == "/clock"}, master)
 
 
 def _state(master: str) -> list[list[tuple[str, list[str]]]]:
-    """Returns publishers, subscribers and services with their nodes; none if no master answers, as before a launch."""
+    """Returns the master's publishers, subscribers and services, each with its nodes. Empty lists without a master."""
     try:
         return _proxy(master).getSystemState(_CALLER)[2]
     except MASTER_FAILURES:
@@ -110,7 +123,7 @@ def _state(master: str) -> list[list[tuple[str, list[str]]]]:
 
 
 def _running(names: Iterable[str], master: str) -> list[RunningNode]:
-    """Returns the nodes that answer, by name."""
+    """Returns those of the named nodes that answer, sorted by name."""
     nodes = [RunningNode(name, _proxy(master).lookupNode(_CALLER, name)[2]) for name in sorted(names)]
     return [node for node in nodes if node.uri and _answers(node.uri)]
 
@@ -128,7 +141,7 @@ def _answers(uri: str) -> bool:
 
 
 def _is_running(process: int) -> bool:
-    """Returns whether there is such a process, and it has not ended; see proc_pid_stat(5)."""
+    """Returns whether a process exists and is not a zombie; see proc_pid_stat(5)."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""A robot draws a sleeve over the arm of a person, whose avatar is in the world."""
+"""`telepresence_node.py`: a robot pulls a sleeve over the arm of a person's avatar."""
 
 import json
 import math
@@ -33,9 +33,9 @@ from .joint_targets import wait_until_ready
 
 JOINTS_OF_ARM = ("RightUpperArm", "RightForeArm", "RightHand")
 STILL_S = 1.0
-"""Time for which the person holds out the arm before the robot begins [s]."""
+"""Time for which the person must hold out the arm before the robot begins [s]."""
 SEES_NOTHING_S = 1.0
-"""Time without a message about the arm, or about the force on it, after which the robot waits [s]."""
+"""Age of the latest pose of the arm, or of the latest force, above which the robot waits [s]."""
 
 
 class TelepresenceParameters(ConfigModel):
@@ -48,7 +48,7 @@ class TelepresenceParameters(ConfigModel):
 
 
 class TelepresenceNode:
-    """Waits until the person holds out the right arm, then draws the sleeve over it, and reports the result.
+    """Waits until the person holds out the right arm, then pulls the sleeve over the arm, and reports the result.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -74,7 +74,11 @@ class TelepresenceNode:
         self._subscribe("avatar/segment_forces", SegmentForces, self._on_forces, queue_size=100)
 
     def run(self) -> None:
-        """Dresses the person, and returns when the sleeve is on, or ROS shuts down."""
+        """Dresses the person and reports the result. Returns at the end of the cuff's path, or when ROS shuts down.
+
+        Raises:
+            InterfaceError: If arm or sleeve are unknown at the end.
+        """
         wait_until_ready()
         rate, still_s, last_s = rospy.Rate(TARGET_HZ), 0.0, rospy.get_time()
         rospy.loginfo("waiting for the person to hold out the right arm")
@@ -109,7 +113,7 @@ class TelepresenceNode:
         self._show(arm, force_n)
 
     def _arm(self) -> ArmPosition | None:
-        """Returns the position of the arm; None if it is unknown or too old."""
+        """Looks up the joint positions of the person's arm on TF. None if a pose is missing or too old."""
         places = []
         for name in JOINTS_OF_ARM:
             message = self._tf.get_tf_msg("rpbi/world", f"rpbi/human/{name}")
@@ -160,7 +164,7 @@ class TelepresenceNode:
         self._positions = tuple(positions)
 
     def _on_world_state(self, message: SimulationState) -> None:
-        """Slows the robot down when the world is slower than wall time."""
+        """Stores the world's real-time factor, at most 1. The robot slows down by this factor."""
         self._world_pace = min(message.real_time_factor, 1.0)
 
     def _on_surface(self, message: Marker) -> None:

@@ -1,6 +1,6 @@
-"""`run_human_interaction.py`: a Touch X moves an arm up and down, and renders the force on its tool.
+"""`run_human_interaction.py`: a haptic device Touch X moves an arm up and down, and renders the force on the tool.
 
-Names of topics, frames and parameters are those of the authors' release; `haptic_node.py` computes the forces.
+Topics, frames and parameters have the same names as in the original release of this project (docs/from_the_release.md).
 """
 
 import math
@@ -17,9 +17,9 @@ from operator_node.haptics.haptic_node import HapticNode
 
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 SAMPLES = 100
-"""Number of samples whose mean is the weight of the tool."""
+"""Number of initial samples of the sensor. Their mean is the weight of the tool."""
 REPEAT_HZ, EXPIRY_S = 250.0, 0.06
-"""Rate at which a force is repeated, since the sensor may be slow, and the age at which that ends [s]."""
+"""Rate at which the latest force is published again [Hz], since the sensor may be slow, and its largest age [s]."""
 HZ = 400.0
 PARAMETERS = {
     "device": "touch",
@@ -33,13 +33,14 @@ PARAMETERS = {
     "energy_allowance_j": 0.05,
     "energy_refill_w": 0.05,
 }
-"""Defaults of private parameters."""
+"""Defaults of the node's private parameters."""
 
 
 class TouchXExample(HapticNode):
-    """Runs the haptic node with the device `~device_name` (`Left`), and the sensor at the wrist as its force.
+    """A haptic node for the device `~device_name` (default: `Left`) that renders the force from the wrist's sensor.
 
-    The sensor measures the force of the wrist on the tool, as the release's does: the tool is pushed by the opposite.
+    The sensor measures the force of the wrist on the tool. The rendered force is the opposite: the force of the
+    environment on the tool.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""RViz for any world: with displays for its contact forces and camera images."""
+"""Starts RViz with displays for the contact forces and camera images of the running world."""
 
 import logging
 import os
@@ -18,14 +18,14 @@ from rpbi.world.loading import LoadedWorld, load_world
 
 _log = logging.getLogger(__name__)
 CONFIG = "-d"
-"""Option of RViz that names its configuration."""
+"""Option of RViz for the configuration file."""
 
 
 def main() -> None:
-    """Replaces itself by RViz, with the same arguments and a configuration that has the displays of the running world.
+    """Replaces this process with RViz. RViz gets the same arguments, and displays for the running world.
 
-    There are no such displays without a simulator that was configured by a file, or if that file is wrong, which the
-    simulator reports.
+    Without a simulator that loaded a world from a file, RViz starts without these displays. The same holds if the file
+    is invalid; the simulator reports the error then.
     """
     arguments = sys.argv[1:]
     place = arguments.index(CONFIG) + 1
@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def _world() -> LoadedWorld:
-    """Returns the world that the simulator of this namespace is configured with."""
+    """Loads the files of the world that the simulator in this namespace runs."""
     logging.getLogger("rpbi").setLevel(logging.ERROR)  # warnings are logged by the simulator
     given = rospy.get_param("ros_pybullet_interface")
     file = given["config_file"]
@@ -54,7 +54,7 @@ def _world() -> LoadedWorld:
 
 
 def _displays_of(world: LoadedWorld) -> Iterator[dict[str, Any]]:
-    """Yields displays for contact forces and camera images; of several cameras, only the first one is switched on."""
+    """Yields RViz displays for contact forces and camera images. Only the first camera's display is switched on."""
     for each in world.objects:
         contacts = getattr(each.config, "contacts", None)
         if contacts is not None and contacts.arrows_hz:
