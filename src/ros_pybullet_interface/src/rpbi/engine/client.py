@@ -1,4 +1,4 @@
-"""One connection to PyBullet."""
+"""A connection to PyBullet, which logs PyBullet's output and watches changes of the world."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from custom_ros_tools.errors import PhysicsError
 from robot_model.geometry import Vector
 
 WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
-"""Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
+"""Connection modes in which this process opens PyBullet's window; in other modes only a server may have a window."""
 MAXIMAL_COORDINATES = 1
-"""PyBullet's type of bodies that the solver of rigid bodies moves, in `getDynamicsInfo`."""
+"""Body type in `getDynamicsInfo` of bodies that PyBullet's rigid-body solver moves, not its multibody solver."""
 
 
 PRINTING = frozenset(
@@ -27,7 +27,7 @@ PRINTING = frozenset(
     "createCollisionShape createMultiBody createSoftBodyAnchor createConstraint changeConstraint removeConstraint "
     "removeBody startStateLogging stopStateLogging vhacd".split()
 )
-"""Functions in which PyBullet may print; the others are called often, and never print."""
+"""PyBullet functions whose output is logged. Other functions are called often and never print."""
 CHANGING = frozenset(
     "applyExternalForce applyExternalTorque changeConstraint changeDynamics createConstraint createMultiBody "
     "createSoftBodyAnchor loadBullet loadMJCF loadSDF loadSoftBody loadURDF performCollisionDetection removeBody "
@@ -37,18 +37,17 @@ CHANGING = frozenset(
     "setJointMotorControlMultiDof setJointMotorControlMultiDofArray setPhysicsEngineParameter setRealTimeSimulation "
     "setTimeStep stepSimulation".split()
 )
-"""Functions that change the motion of a world."""
+"""PyBullet functions that change the motion of a world."""
 MAX_LINES = 20
-"""Largest number of lines logged for one call; further ones are counted. PyBullet prints several for each link."""
+"""Largest number of lines that are logged for one call; further lines are counted. PyBullet prints several per link."""
 log = logging.getLogger("pybullet")
 
 
 class _Printed:
-    """The lines that PyBullet prints while a call lasts, on their way to the log.
+    """Redirects PyBullet's printed output to the log.
 
-    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These
-    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, is not
-    affected.
+    PyBullet prints to C's `stdout` and `stderr`. While output is redirected, these two C variables refer to a file in
+    memory. File descriptors 1 and 2 do not change, so the output of Python code in any thread is not affected.
     """
 
     def __init__(self) -> None:
@@ -64,7 +63,10 @@ class _Printed:
 
     @contextmanager
     def to_log(self) -> Iterator[None]:
-        """Logs what is printed while the block runs, in this thread or, from within C, in others."""
+        """Redirects C output of the whole process during a `with` block, and logs the printed lines at its end.
+
+        Blocks of several threads may overlap or be nested. The last block to end restores C's streams.
+        """
         with self._lock:
             if not self._depth:
                 self._originals = [stream.value for stream in self._streams]
@@ -110,11 +112,14 @@ def _logged(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class ChangeWatch:
-    """Notes calls that change a world by other means than its methods, which record their effect as commands.
+    """Detects calls of PyBullet that change a world without being recorded.
+
+    The methods of a world record their changes as commands. A direct call of a function in `CHANGING` is not recorded.
 
     Attributes:
-        recording: Number of such methods under way.
-        unrecorded: The first of CHANGING that was called outside of them since the world was built or reset.
+        recording: Number of recording methods that run at present.
+        unrecorded: Name of the first function called outside recording methods since the world was built or reset;
+            empty if there was no such call.
     """
 
     def __init__(self) -> None:
@@ -122,7 +127,7 @@ class ChangeWatch:
         self.unrecorded = ""
 
     def watched(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Returns a function whose calls are noted."""
+        """Wraps a PyBullet function: a call outside recording methods sets `unrecorded` to `name`."""
 
         def call(*arguments: Any, **options: Any) -> Any:
             if not self.recording and not self.unrecorded:
@@ -133,16 +138,16 @@ class ChangeWatch:
 
 
 class Client:
-    """PyBullet's functions and constants as attributes, bound to one connection.
+    """Provides PyBullet's functions and constants as attributes, bound to one connection.
 
-    The binding is made once per function, since at a thousand ticks a second its cost would matter.
+    Each function is bound at its first use and then kept, since binding at every call would be slow.
 
     Args:
         mode: PyBullet's connection mode, such as `pybullet.DIRECT`.
-        options: Further arguments of `pybullet.connect`, for other modes than DIRECT, which has none.
+        options: Further arguments of `pybullet.connect`; ignored in mode DIRECT.
 
     Raises:
-        PhysicsError: If PyBullet does not connect, or a window is asked for and no screen answers.
+        PhysicsError: If PyBullet does not connect, or if the mode needs a window and there is no screen.
     """
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
@@ -153,17 +158,17 @@ class Client:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
         self.has_window = mode != pybullet.DIRECT
         self._window_prints = ExitStack()
-        """The log of what PyBullet's window prints between calls, in a thread of its own."""
+        """Redirects the output of the window's own thread to the log, until `disconnect`."""
         self.is_deformable = False
-        """Whether its world was set up for soft bodies."""
+        """Whether the world was set up for soft bodies."""
         self.gravity: Vector = (0.0, 0.0, 0.0)
-        """Gravity of its world, as last set [m/s^2]."""
+        """Gravity of the world, as last set [m/s^2]."""
         self.sub_steps = 0
-        """Sub-steps of each step of its world, as last set; 0 is one."""
+        """Number of sub-steps per step of the world, as last set; 0 means one sub-step."""
         self.changes = ChangeWatch()
-        """Calls that change its world."""
+        """Watches calls that change the world."""
         self.advance: Callable[[], None] = partial(pybullet.stepSimulation, physicsClientId=self.client_id)
-        """`stepSimulation` for the ticks of its world, which is not watched."""
+        """`stepSimulation` for the ticks of the world; `changes` does not watch these calls."""
         if self.client_id < 0:
             raise PhysicsError("PyBullet did not connect")
         if mode in WINDOWS:
@@ -173,13 +178,13 @@ class Client:
         """Ends the connection.
 
         Raises:
-            pybullet.error: If it has ended already.
+            pybullet.error: If the connection has ended already.
         """
         with self._window_prints, _printed.to_log():
             pybullet.disconnect(self.client_id)
 
     def become(self, other: Client) -> None:
-        """Takes over another connection and closes its own."""
+        """Closes this client's connection, and takes over the connection of another client."""
         self.disconnect()
         values = {name: value for name, value in vars(other).items() if not callable(value)}
         kept = {"changes": self.changes, "advance": other.advance}
@@ -198,12 +203,13 @@ class Client:
 
 @contextmanager
 def _screen() -> Iterator[None]:
-    """Holds a connection to the screen: without a screen, PyBullet would end the process.
+    """Checks that there is an X11 screen, and holds a connection to the screen during a `with` block.
 
-    It is held until PyBullet has its own, since a virtual screen restarts when the last connection closes.
+    Without a screen, PyBullet would end the process. The connection is held until PyBullet has connected, since a
+    virtual screen restarts when its last connection closes.
 
     Raises:
-        PhysicsError: If no screen answers.
+        PhysicsError: If there is no screen.
     """
     try:
         x11 = ctypes.CDLL("libX11.so.6")

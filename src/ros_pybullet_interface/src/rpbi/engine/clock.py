@@ -1,4 +1,4 @@
-"""Integer simulated time: ticks, nanoseconds, and when a rate is due."""
+"""Simulated time in integers: ticks, stamps in nanoseconds, and schedules of periodic work."""
 
 import time
 from fractions import Fraction
@@ -8,15 +8,15 @@ SLOWEST_HZ = Fraction(1, 1_000_000)
 
 
 class Clock:
-    """Counts ticks and gives each its stamp.
+    """Counts ticks, and assigns a stamp to each tick.
 
-    Stamps never repeat and never decrease while the clock exists. Simulated stamps are exact: tick `n` is stamped `(n +
-    1) * dt`, so the initial state has the stamp dt, since a stamp of 0 means "no time yet" in ROS. Ticks are the
-    world's: they begin at 0 again when it is reset, while the stamps go on.
+    Each stamp is greater than all stamps before. Simulated stamps are exact: tick `n` has the stamp `(n + 1) * dt`. The
+    initial state therefore has the stamp dt, since a stamp of 0 means "no time yet" in ROS. When the world is reset,
+    ticks begin at 0 again, and stamps continue to increase.
 
     Args:
         time_step_s: Length of a tick [s], rounded to whole nanoseconds.
-        simulated: Whether stamps are simulated time; otherwise they are wall time (Unix epoch).
+        simulated: Whether stamps are simulated time. If not, they are wall time (Unix epoch).
 
     Raises:
         ValueError: If the time step is shorter than a nanosecond.
@@ -32,7 +32,7 @@ class Clock:
 
     @property
     def dt_s(self) -> float:
-        """Length of a tick [s], exactly what PyBullet steps by."""
+        """Length of a tick [s], equal to PyBullet's time step."""
         return self.dt_ns / NS_PER_S
 
     @property
@@ -50,35 +50,41 @@ class Clock:
             self.restamp()
 
     def skip(self, ticks: int) -> None:
-        """Advances by ticks at once, for a world that is put into a later state."""
+        """Advances by several ticks at once, for a world that is set to a later state."""
         self.tick += ticks - 1
         self._on_time_ns += (ticks - 1) * self.dt_ns if self.simulated else 0
         self.advance()
 
     def restart(self) -> None:
-        """Counts ticks from 0 again, for a world that was reset; stamps go on."""
+        """Counts ticks from 0 again after a reset of the world; the stamp advances by a tick."""
         self.advance()
         self.tick = 0
 
     def restamp(self) -> None:
-        """Renews a wall-time stamp within the same tick, for state that is sent again while stopped."""
+        """Renews a wall-time stamp within the same tick, so that a stopped world can publish its state again.
+
+        Simulated stamps do not change.
+        """
         if not self.simulated:
             self.stamp_ns = max(self.stamp_ns + 1, time.time_ns())
 
     def bump_stamp(self) -> None:
-        """Makes the next stamp differ from the last one; the stamps of coming ticks do not change."""
+        """Increases the present stamp by 1 ns. The stamps of later ticks do not change."""
         self.stamp_ns += 1
 
 
 class Schedule:
-    """The ticks at which something of a given rate is due.
+    """Decides at which ticks periodic work is due.
 
-    It is due at tick `n` when `floor(n * dt * hz)` is greater than at tick `n - 1`: the mean rate is exact and the
-    jitter at most one tick. All in integers, so nothing drifts.
+    Work is due at tick `n` if `floor(n * dt * hz)` is greater than at tick `n - 1`. The mean rate is exact, and the
+    jitter is at most one tick. Integer arithmetic avoids drift.
 
     Args:
-        hz: Rate [Hz]; at least SLOWEST_HZ and at most `1 / dt` (see `clamped`).
+        hz: Rate of the work [Hz], clipped to SLOWEST_HZ ... `1 / dt`.
         dt_ns: Length of a tick [ns].
+
+    Attributes:
+        clamped: Whether `hz` was above `1 / dt`.
     """
 
     def __init__(self, hz: float, dt_ns: int) -> None:
@@ -87,11 +93,16 @@ class Schedule:
         self._numerator, self._denominator = min(per_tick, Fraction(1)).as_integer_ratio()
 
     def is_due(self, tick: int, since: int | None = None) -> bool:
-        """Returns whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
+        """Returns whether work is due at a tick. At tick 0 it is always due.
+
+        Args:
+            tick: The tick.
+            since: Previous tick that was checked; work due at a tick after `since` counts. None: the tick before.
+        """
         return self._count(tick) > self._count(tick - 1 if since is None else since)
 
     def next_due(self, tick: int) -> int:
-        """Returns the first tick after `tick` at which it is due."""
+        """Returns the first tick after `tick` at which work is due."""
         return -(-(self._count(tick) + 1) * self._denominator // self._numerator)
 
     def _count(self, tick: int) -> int:

@@ -1,4 +1,4 @@
-"""Inputs of bodies and sensors while the world runs."""
+"""Inputs of bodies and sensors: values that other threads send while the world runs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Input:
     """An input of a body or sensor.
 
     Attributes:
-        check: Converts a received value for `apply`, in the receiving thread, without PyBullet. It raises ValueError or
-            an InterfaceError to refuse the value.
-        apply: Acts on the newest value, on the simulation thread, before the tick.
-        merge: Combines a waiting value with a newer one; without it, the newer one replaces it.
-        ros_topic: Place of the Topic of an input from another package, as `module:NAME`.
-        owner: Value of `{name}` in the topic's name; the body or sensor if empty.
+        check: Converts a received value for `apply`. Runs in the receiving thread and must not call PyBullet. Raises
+            ValueError or an InterfaceError to refuse the value.
+        apply: Applies the newest value. Runs on the simulation thread before the tick.
+        merge: Combines a waiting value with a newer value; None replaces the waiting value.
+        ros_topic: Import path `module:NAME` of the input's Topic, for an input from another package.
+        owner: Value of `{name}` in the topic's name; empty for the name of the body or sensor.
     """
 
     check: Callable[[Any], Any]
@@ -37,13 +37,14 @@ class Input:
 
 @dataclass(frozen=True, kw_only=True)
 class PoseInput(Input):
-    """A pose in the world that follows a TF frame.
+    """An input whose values are the poses of a TF frame in the world.
 
     Attributes:
-        tf_id: The frame to follow.
+        tf_id: Name of the TF frame.
         hz: Rate of TF look-ups [Hz], in wall time.
-        timeout_s: Time without a new pose after which it is stale [s].
-        is_tracked: Whether physics moves the body while it is stale; then a new stamp with the same pose is news too.
+        timeout_s: Time without a new pose after which the input is stale [s].
+        is_tracked: Whether physics moves the body while the input is stale. If so, an unchanged pose with a new stamp
+            counts as a new pose.
     """
 
     tf_id: str
@@ -53,16 +54,22 @@ class PoseInput(Input):
 
     @classmethod
     def following(cls, object_tf: ObjectTf, apply: Callable[[Pose], None], is_tracked: bool = False) -> PoseInput:
-        """Follows the frame that YAML names under `object_tf`."""
+        """Creates the input for the frame that YAML configures under `object_tf`.
+
+        Args:
+            object_tf: Configuration of the frame.
+            apply: Applies a pose, see `Input.apply`.
+            is_tracked: See `PoseInput.is_tracked`.
+        """
         tf = object_tf
         return cls(check_pose, apply, tf_id=tf.tf_id, hz=tf.hz, timeout_s=tf.timeout_s, is_tracked=is_tracked)
 
 
 def check_pose(given: geometry.Pose | Mapping[str, Any]) -> Pose:
-    """Returns a pose, or that of a mapping of its fields, with its quaternion normalised.
+    """Checks a pose, or converts a mapping of its fields, and returns the pose with a normalized quaternion.
 
     Raises:
-        ValueError: If it is none, a number is not finite or the quaternion is zero.
+        ValueError: If `given` is not a pose, a number is not finite or too large, or the quaternion is zero.
     """
     position, quat = as_tuple(Pose, given)
     if not all(map(math.isfinite, (*position, *quat))):

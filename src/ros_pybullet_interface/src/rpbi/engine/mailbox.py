@@ -1,4 +1,4 @@
-"""Values and calls from other threads to the one thread that owns PyBullet."""
+"""Passes values and calls from other threads to the simulation thread, which owns PyBullet."""
 
 import threading
 from collections import deque
@@ -14,14 +14,14 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class ClosedError(RuntimeError):
-    """The simulation has ended and accepts no more requests."""
+    """A request was refused because the simulation has ended."""
 
 
 class Mailbox:
-    """Latest-wins slots for streams, and a queue of calls with futures for requests.
+    """Holds the newest value of each input stream, and a queue of requested calls.
 
-    Any thread may `put` and `request`; only the simulation thread calls `drain` and `run_requests`. Threads share a
-    single lock, which is held only to swap a reference.
+    Each stream has a slot. Any thread may call `put` and `request`; only the simulation thread calls `drain` and
+    `run_requests`. A lock protects the slots and the queue, and is held only briefly.
     """
 
     def __init__(self) -> None:
@@ -31,14 +31,21 @@ class Mailbox:
         self._closed = False
         self._busy: Callable[[], str] | None = None
         self.generation = 0
-        """Incremented whenever all waiting values are dropped."""
+        """Number of calls of `drop`."""
 
     def put(
         self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, generation: int | None = None
     ) -> None:
-        """Puts a value into a slot; one that still waits is replaced, or merged with it.
+        """Stores a value in a slot, for the next `drain`.
 
-        A value of another `generation` than the present one is dropped; so is any value while the world is busy.
+        Ignores the value while the world is busy, see `hold`.
+
+        Args:
+            slot: Name of the slot.
+            value: The value.
+            merge: Combines the value that waits in the slot with the new value. None replaces the waiting value.
+            generation: The mailbox's `generation` at which the value was checked. If `drop` was called since then, the
+                value is ignored. None always stores the value.
         """
         with self._lock:
             if self._busy is not None or generation not in (None, self.generation):
@@ -54,41 +61,41 @@ class Mailbox:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no value waits."""
+        """Whether all slots are empty."""
         return not self._slots
 
     def drain(self) -> Mapping[str, Any]:
-        """Empties all slots and returns their values by slot name."""
+        """Empties all slots, and returns their values, keyed by slot name."""
         if not self._slots:  # the usual case, which must be fast
-            return NOTHING  # not the slots themselves: other threads may put something there while the caller reads
+            return NOTHING  # not self._slots, since other threads may add values while the caller reads
         with self._lock:
             taken, self._slots = self._slots, {}
         return taken
 
     def drop(self) -> None:
-        """Empties all slots, and begins a new generation."""
+        """Empties all slots, and increments `generation`."""
         with self._lock:
             self._slots = {}
             self.generation += 1
 
     def hold(self, busy: Callable[[], str] | None) -> None:
-        """Marks the world as busy: inputs are dropped and requests refused; None ends that.
+        """Marks the world as busy, or ends this. A busy world ignores new values and refuses requests.
 
         Args:
-            busy: Returns the answer to requests meanwhile.
+            busy: Function that returns the error message for refused requests; None if the world is no longer busy.
         """
         with self._lock:
             self._busy, self._slots = busy, {}
 
     def request(self, call: Callable[[], T], even_if_busy: bool = False) -> Future[T]:
-        """Asks the simulation thread to make a call.
+        """Queues a call for the simulation thread, and returns a future of the call's result.
 
         Args:
-            call: The call.
-            even_if_busy: Whether it is made even while the world is busy, see `hold`.
+            call: Function without arguments.
+            even_if_busy: Whether to make the call even while the world is busy, see `hold`.
 
         Returns:
-            A future that gets the call's result, or the exception it raised.
+            Future of the result, or of the exception that the call raised. After `close` the exception is ClosedError.
         """
         future: Future[T] = Future()
         with self._lock:
@@ -99,7 +106,7 @@ class Mailbox:
         return future
 
     def run_requests(self) -> None:
-        """Makes the calls that wait now; those that come meanwhile wait for the next time."""
+        """Makes the queued calls, and sets their futures. Calls queued meanwhile wait for the next run."""
         for _ in range(len(self._requests)):
             call, future, even_if_busy = self._requests.popleft()
             if not future.set_running_or_notify_cancel():
@@ -112,7 +119,7 @@ class Mailbox:
                 future.set_exception(error)
 
     def close(self) -> None:
-        """Refuses further requests and fails those that wait."""
+        """Refuses further requests, and fails all waiting requests with ClosedError."""
         with self._lock:
             self._closed = True
             waiting, self._requests = self._requests, deque()

@@ -1,4 +1,4 @@
-"""Keeps ticks in step with the wall clock."""
+"""Paces ticks by the wall clock, and explains why a world is too slow."""
 
 from __future__ import annotations
 
@@ -6,51 +6,51 @@ import time
 from typing import NamedTuple
 
 MAX_DEBT_S = 0.25
-"""Largest lateness of a tick that is caught up with [s]; beyond it, all of it is dropped and counted as lost."""
+"""Largest delay of a tick that later ticks recover [s]. A larger delay is counted as lost time instead."""
 
 LEAST_SHARE = 0.8
-"""Smallest share of a processor that suffices; below it, it is reported as the cause."""
+"""Share of a processor below which lack of processor time is reported as the reason for a slow world."""
 
 MAX_SLEEP_S = 0.005
 """Longest sleep between two checks for requests [s]."""
 
 
 class Pacer:
-    """Determines when the next tick is due by the wall clock, and counts late ticks.
+    """Decides by the wall clock when the next tick is due, and counts late ticks.
 
-    Deadlines are absolute, so lateness does not add up: after a late tick, the next ones follow at once until the delay
-    is recovered. A delay beyond MAX_DEBT_S is dropped.
+    Deadlines are absolute, so delays do not accumulate. After a late tick, the next ticks follow at once until the
+    delay is recovered. A delay beyond MAX_DEBT_S is not recovered.
 
     Args:
         dt_s: Length of a tick [s] of simulated time.
-        real_time_factor: Simulated seconds per wall second; 0 is as fast as possible.
+        real_time_factor: Simulated seconds per wall second; 0 to run as fast as possible.
 
     Attributes:
-        real_time_factor: The same, as it was set last.
+        real_time_factor: Present real-time factor, as last set.
     """
 
     def __init__(self, dt_s: float, real_time_factor: float = 1.0) -> None:
         self._dt_s = dt_s
         self.overruns = 0
-        """Ticks that began more than one period late."""
+        """Number of ticks that began more than one period late."""
         self.lost_s = 0.0
-        """Wall time that could not be caught up with [s]."""
+        """Sum of the delays that were not recovered [s] of wall time."""
         self.set_factor(real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Changes the pace, and restarts."""
+        """Sets the real-time factor, and restarts."""
         self.real_time_factor = real_time_factor
         self._period_s = self._dt_s / real_time_factor if real_time_factor else 0.0
         self.restart()
 
     def restart(self) -> None:
-        """Restarts with a tick due now, as after a stop."""
+        """Sets the next deadline to now, for example after a stop of the world."""
         self._deadline_s = time.monotonic()
         self._window_start_s = self._deadline_s
         self._window_ticks = 0
 
     def is_due(self) -> bool:
-        """Returns whether the next tick is due; if so, counts it as begun."""
+        """Returns whether the next tick is due. If so, counts the tick, and moves the deadline to the next one."""
         if not self._period_s:
             self._window_ticks += 1
             return True
@@ -77,18 +77,18 @@ class Pacer:
         return not self._period_s
 
     def count(self, ticks: int) -> None:
-        """Counts ticks that were made without asking whether they are due."""
+        """Counts ticks that were made without `is_due`, for `measure`."""
         self._window_ticks += ticks
 
     def wait(self) -> None:
-        """Sleeps until the next tick is due, or until it is time to check for requests."""
+        """Sleeps until the next tick is due, but at most `MAX_SLEEP_S`, so that the caller can check for requests."""
         if self._period_s:
             left_s = self._deadline_s - time.monotonic()
             if left_s > 0.0:
                 time.sleep(min(left_s, MAX_SLEEP_S))
 
     def measure(self) -> float:
-        """Returns the real-time factor since the last call or restart."""
+        """Returns the measured real-time factor since the last call of this method, or since the last restart."""
         now_s = time.monotonic()
         factor = self._window_ticks * self._dt_s / max(now_s - self._window_start_s, 1e-9)
         self._window_start_s, self._window_ticks = now_s, 0
@@ -96,14 +96,14 @@ class Pacer:
 
 
 class Load(NamedTuple):
-    """Time spent until now [s].
+    """Time that the process has used, either until now or between two instants.
 
     Attributes:
-        wall_s: By the wall clock.
-        loop_s: Processor time of the thread that runs the world.
-        process_s: Processor time of all threads of the process.
-        physics_s: Wall time in PyBullet's steps.
-        ticks: Ticks that were made.
+        wall_s: Time by a monotonic wall clock [s].
+        loop_s: Processor time of the thread that runs the world [s].
+        process_s: Processor time of all threads of the process [s].
+        physics_s: Wall time spent in PyBullet's steps [s].
+        ticks: Number of ticks made.
     """
 
     wall_s: float
@@ -114,16 +114,21 @@ class Load(NamedTuple):
 
     @classmethod
     def now(cls, physics_s: float, ticks: int) -> Load:
-        """Returns the time of this process; called in the thread that runs the world."""
+        """Returns the time used until now. The thread that runs the world must make the call.
+
+        Args:
+            physics_s: Wall time spent in PyBullet's steps [s].
+            ticks: Number of ticks made.
+        """
         return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)
 
     def since(self, before: Load) -> Load:
-        """Returns the time since an earlier one."""
+        """Returns the time used since an earlier instant."""
         wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
         return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 
     def reason(self, dt_s: float) -> str:
-        """Returns the reason why the world is too slow, with advice.
+        """Returns a message with the likely reason why the world is too slow, and advice.
 
         Args:
             dt_s: Simulated time of a tick [s].

@@ -1,4 +1,4 @@
-"""Scheduling of the simulator's threads and of the renderer process."""
+"""Sets the scheduling of the simulator's threads and of the renderer process."""
 
 import contextlib
 import os
@@ -7,20 +7,20 @@ from collections.abc import Callable
 from .pacer import Load
 
 NICE = 10
-"""Difference of the nice values of a renderer that yields and the simulator, which gets nine times its share."""
+"""Nice value added in a renderer that yields. The simulator then gets nine times as much processor time."""
 
 REAL_TIME_PRIORITY = 5
-"""Priority of the simulator among real-time threads; below 10, that of a haptic loop."""
+"""Real-time priority of the simulator's threads, below the priority 10 of a haptic loop."""
 
 MOST_SHARE = 0.5
-"""Share of a processor up to which real-time scheduling leaves enough for other programs."""
+"""Largest processor use with which the process gets real-time scheduling, as a share of one processor."""
 
 
 class RealTimePriority:
-    """Gives all threads of this process real-time scheduling while its world needs little of a processor.
+    """Gives all threads of this process real-time scheduling while the process uses little processor time.
 
-    On a busy machine a real-time thread runs as soon as it has something to do. Without the permission, scheduling
-    stays as it is. Processes that this one starts are scheduled normally.
+    On a busy machine, a real-time thread runs as soon as it has work. Without permission for real-time scheduling,
+    nothing changes. Child processes are scheduled normally.
     """
 
     def __init__(self) -> None:
@@ -28,10 +28,12 @@ class RealTimePriority:
         """Whether the threads have real-time scheduling."""
 
     def review(self, load: Load, period_s: float) -> None:
-        """Decides again by the processor time of the last second or so, for new threads as well.
+        """Starts or ends real-time scheduling, as the recent processor use demands; call this about once a second.
+
+        Each call includes threads started since the last call.
 
         Args:
-            load: That processor time.
+            load: Time used since the last call.
             period_s: Wall time of a tick [s]; 0 if ticks are made as fast as possible.
         """
         wall_s = min(load.wall_s, load.ticks * period_s) if load.ticks else load.wall_s
@@ -41,7 +43,7 @@ class RealTimePriority:
             self.end()
 
     def end(self) -> None:
-        """Restores normal scheduling."""
+        """Restores normal scheduling of all threads."""
         if self.acts:
             self.acts = False
             _for_all_threads(os.getpid(), self._schedule_normally)
@@ -58,10 +60,10 @@ class RealTimePriority:
 
 
 def yield_to_simulator() -> None:
-    """Gives all threads of this process a lower priority than the simulator has.
+    """Gives all threads of this process, a renderer, a lower priority than the simulator's.
 
-    They are batch threads, which interrupt no other one when they wake up. Idle priority would be too low: any process
-    of nice 19 would take the processor from the renderer.
+    The threads get the batch policy, so they do not preempt other threads when they wake up. The idle policy would be
+    too low: any process with nice value 19 would take the processor from the renderer.
     """
 
     nice = os.getpriority(os.PRIO_PROCESS, 0) + NICE
@@ -74,7 +76,12 @@ def yield_to_simulator() -> None:
 
 
 def run_normally(process_id: int, nice: int) -> None:
-    """Gives a process that yields, which may be this one, a nice value again, as far as its user may do that."""
+    """Restores normal scheduling of a process after `yield_to_simulator`, as far as permissions allow.
+
+    Args:
+        process_id: The process, which may be the calling one.
+        nice: Nice value to set.
+    """
 
     def set_normal(thread_id: int) -> None:
         os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
@@ -84,7 +91,12 @@ def run_normally(process_id: int, nice: int) -> None:
 
 
 def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
-    """Changes all threads of a process, including those that start meanwhile."""
+    """Calls a function for each thread of a process, including threads that start meanwhile.
+
+    Args:
+        process_id: The process.
+        change: Function of a thread id. OSErrors are ignored.
+    """
     changed: set[int] = set()
     while new := _threads(process_id) - changed:
         for thread_id in new:
@@ -94,7 +106,7 @@ def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
 
 
 def _threads(process_id: int) -> set[int]:
-    """Returns the threads of a process, none if it is gone."""
+    """Returns the ids of a process's threads; empty if the process has ended."""
     with contextlib.suppress(OSError):
         return {int(name) for name in os.listdir(f"/proc/{process_id}/task")}
     return set()
