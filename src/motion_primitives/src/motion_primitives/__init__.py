@@ -1,4 +1,4 @@
-"""Movement primitives: learned from demonstrations, planned and executed with other starts, goals and durations."""
+"""Movement primitives: learned from demonstrations, then executed with different starts, goals and durations."""
 
 from .coupling import ForceCoupling as ForceCoupling
 from .coupling import ObstacleCoupling as ObstacleCoupling
@@ -11,4 +11,4 @@ from .primitive import ViaPoint as ViaPoint
 from .primitives import PRIMITIVES
 
 make_primitive = PRIMITIVES.make
-"""Makes a primitive by its name, see `PluginTable.make`."""
+"""Makes a primitive of a type given by name, see `PluginTable.make`."""

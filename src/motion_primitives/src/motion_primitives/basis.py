@@ -1,4 +1,4 @@
-"""Basis functions over the phase, and the weights that fit them to samples."""
+"""Basis functions of phase or time, and a least-squares fit of their weights to samples."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from scipy.linalg import null_space
 from custom_ros_tools.transforms import Array
 
 LAST_PHASE = 0.01
-"""Phase of a discrete primitive at its end; it is 1 at its start."""
+"""Phase at the end of a discrete primitive; the phase at the start is 1."""
 DECAY = -math.log(LAST_PHASE)
-"""Rate at which the phase decays, per duration."""
+"""Decay rate of the phase, per duration: phase = exp(-DECAY * time / duration)."""
 OVERLAP = 0.8
-"""Value of a Gaussian at the centre of the next one."""
+"""Value of a basis function at the centre of the next basis function, before normalisation."""
 RIDGE = 1e-10
-"""Weight of the squared weights against the squared errors of a fit, relative to the largest basis function."""
+"""Factor of the squared weights in the cost of `fitted` without `roughness`, relative to the largest basis function."""
 SMOOTHING = 1e-9
-"""Weight of the roughness against the squared errors of a fit, relative to the largest basis function."""
+"""Factor of the roughness in the cost of `fitted` with `roughness`, relative to the largest basis function."""
 
 
 class GaussianBasis(NamedTuple):
     """Normalised Gaussians of a phase that decays from 1 (Ijspeert 2013, equation 2.3).
 
     Attributes:
-        centers: k centres.
-        widths: k factors of the squared distance.
+        centers: k centres, as phases.
+        widths: k factors w in exp(-w * (phase - centre)^2).
     """
 
     centers: Array
@@ -35,13 +35,17 @@ class GaussianBasis(NamedTuple):
 
     @classmethod
     def of(cls, count: int) -> GaussianBasis:
-        """Returns Gaussians at equal distances in time."""
+        """Makes `count` Gaussians whose centres are equally spaced in time."""
         centers = np.exp(-DECAY * np.linspace(0.0, 1.0, count))
         widths = -math.log(OVERLAP) / np.diff(centers) ** 2
         return cls(centers, np.append(widths, widths[-1]))
 
     def values(self, progress: Array) -> Array:
-        """Returns the basis functions times the phase, shape (m, k), at m shares of the duration."""
+        """Returns the k basis functions times the phase, shape (m, k).
+
+        Args:
+            progress: m times, as fractions of the duration.
+        """
         phase = np.exp(-DECAY * np.asarray(progress))[..., None]
         values = np.exp(-self.widths * (phase - self.centers) ** 2)
         return np.asarray(phase * values / values.sum(axis=-1, keepdims=True))
@@ -52,7 +56,7 @@ class PeriodicBasis(NamedTuple):
 
     Attributes:
         centers: k centres [rad].
-        width: Factor of the cosine.
+        width: Factor w in exp(w * (cos(angle - centre) - 1)).
     """
 
     centers: Array
@@ -60,23 +64,27 @@ class PeriodicBasis(NamedTuple):
 
     @classmethod
     def of(cls, count: int) -> PeriodicBasis:
-        """Returns functions at equal distances."""
+        """Makes `count` functions whose centres are equally spaced over one period."""
         centers = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
         return cls(centers, -math.log(OVERLAP) / (1.0 - math.cos(2.0 * math.pi / count)))
 
     def values(self, cycles: Array) -> Array:
-        """Returns the basis functions, shape (m, k), after m numbers of cycles."""
+        """Returns the k basis functions, shape (m, k).
+
+        Args:
+            cycles: m times, as numbers of periods since the start.
+        """
         angle = 2.0 * math.pi * np.asarray(cycles)[..., None]
         values = np.exp(self.width * (np.cos(angle - self.centers) - 1.0))
         return np.asarray(values / values.sum(axis=-1, keepdims=True))
 
 
 class TimeBasis(NamedTuple):
-    """Normalised Gaussians of the share of the duration that has passed (Paraschos 2013, equation 6).
+    """Normalised Gaussians of time, as a fraction of the duration (Paraschos 2013, equation 6).
 
     Attributes:
         centers: k centres, from 0 to 1.
-        variance: Square of their width.
+        variance: Variance of each Gaussian.
     """
 
     centers: Array
@@ -84,16 +92,20 @@ class TimeBasis(NamedTuple):
 
     @classmethod
     def of(cls, count: int) -> TimeBasis:
-        """Returns Gaussians at equal distances."""
+        """Makes `count` Gaussians whose centres are equally spaced from 0 to 1."""
         return cls(np.linspace(0.0, 1.0, count), -1.0 / (8.0 * count**2 * math.log(0.7)))
 
     def values(self, progress: Array) -> Array:
-        """Returns the basis functions, shape (m, k), at m shares of the duration."""
+        """Returns the k basis functions, shape (m, k).
+
+        Args:
+            progress: m times, as fractions of the duration.
+        """
         values = self._gaussians(progress)
         return np.asarray(values / values.sum(axis=-1, keepdims=True))
 
     def rates(self, progress: Array) -> Array:
-        """Returns their derivatives by the share of the duration, shape (m, k)."""
+        """Returns the derivatives of `values` with respect to `progress`, shape (m, k)."""
         values = self._gaussians(progress)
         rates = (self.centers - np.asarray(progress)[..., None]) / self.variance * values
         total = values.sum(axis=-1, keepdims=True)
@@ -101,7 +113,7 @@ class TimeBasis(NamedTuple):
 
     @property
     def roughness(self) -> Array:
-        """Matrix of the squared second differences of weights, shape (k, k); straight lines have none."""
+        """Matrix R of shape (k, k): w R w is the sum of squared second differences of weights w."""
         bends = np.diff(np.eye(len(self.centers)), n=2, axis=0)
         return np.asarray(bends.T @ bends)
 
@@ -111,13 +123,14 @@ class TimeBasis(NamedTuple):
 
 
 def fitted(values: Array, samples: Array, conditions: Array | None = None, roughness: Array | None = None) -> Array:
-    """Returns weights with the least squared error.
+    """Fits weights of basis functions to samples, with least squared error.
 
     Args:
-        values: Basis functions at m samples, shape (m, k).
+        values: The k basis functions at m samples, shape (m, k).
         samples: Samples of d signals, shape (m, d).
-        conditions: Rows that are 0 for all weights, shape (c, k).
-        roughness: Matrix of a smooth prior of the weights, shape (k, k): it determines what samples leave open.
+        conditions: Linear constraints, shape (c, k): `conditions @ w` is 0 for the weights w of each signal.
+        roughness: Matrix of a smoothness prior, see `TimeBasis.roughness`; it determines weights that the samples do
+            not determine. By default, small weights are preferred instead.
 
     Returns:
         Weights, shape (d, k).

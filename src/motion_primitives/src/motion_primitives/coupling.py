@@ -1,4 +1,4 @@
-"""Couplings: additional accelerations of an executed motion."""
+"""Couplings: accelerations that are added to an executed motion, to yield to forces or to avoid obstacles."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from custom_ros_tools.transforms import Array, finite_vector
 from .dynamics import MotionState, SpringDamper
 
 STEEPNESS = 20.0 / math.pi
-"""Decay of the avoidance with the angle between the motion and the obstacle [1/rad] (Hoffmann 2009)."""
+"""Decay rate of the avoidance over the angle between velocity and obstacle [1/rad] (Hoffmann 2009)."""
 SLOWEST_M_S = 1e-6
-"""Speed below which a motion has no direction [m/s]."""
+"""Speed below which the direction of a motion counts as undefined [m/s]."""
 
 
 @dataclass
@@ -23,8 +23,8 @@ class ForceCoupling:
     """Yields to a force like a spring: a constant force shifts the motion by force / stiffness.
 
     Attributes:
-        stiffness: Stiffness along each coordinate of the velocity [N/m or N m/rad]; a single number applies to all.
-        force: Force on the moved object [N or N m], shape (dof,); set it at each measurement.
+        stiffness: Stiffness for each velocity coordinate, shape (dof,), or one number for all [N/m or N m/rad].
+        force: Measured force on the moved object, shape (dof,) [N or N m]. Callers update it at each measurement.
     """
 
     stiffness: ArrayLike
@@ -35,22 +35,22 @@ class ForceCoupling:
             raise ValueError(f"stiffness: expected numbers above 0, got {self.stiffness!r}")
 
     def __call__(self, state: MotionState, spring: SpringDamper) -> Array:
-        """Returns the acceleration."""
+        """Returns the acceleration to add, shape (dof,) [m/s^2 or rad/s^2]."""
         given_way = np.asarray(self.force, dtype=float) / np.asarray(self.stiffness, dtype=float)
         return np.asarray(spring.stiffness * np.broadcast_to(given_way, state.velocity.shape))
 
 
 @dataclass
 class ObstacleCoupling:
-    """Steers the first three positions around a ball (Hoffmann 2009, equation 8).
+    """Steers a motion around a ball, in the space of its first three positions (Hoffmann 2009, equation 8).
 
-    The motion is turned away from the direction of the ball's edge: the more, the smaller the angle to it and the
-    distance from the surface.
+    The velocity is turned away from the ball. The avoidance decays with the angle between the velocity and the ball's
+    edge, and with the distance from the ball's surface.
 
     Attributes:
-        center: Its centre x, y, z [m]; set it when the ball moves.
-        radius_m: Its radius [m].
-        range_m: Distance from its surface at which the avoidance has fallen to 37 % [m].
+        center: Centre of the ball x, y, z [m]. Callers update it when the ball moves.
+        radius_m: Radius of the ball [m].
+        range_m: Distance from the ball's surface at which the avoidance has fallen to 37 % [m].
         gain: Strength of the avoidance, 1000 in the paper.
     """
 
@@ -67,7 +67,7 @@ class ObstacleCoupling:
                 raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
 
     def __call__(self, state: MotionState, spring: SpringDamper) -> Array:
-        """Returns the acceleration."""
+        """Returns the acceleration to add, shape (dof,) [m/s^2 or rad/s^2]."""
         evasion = np.zeros_like(state.velocity)
         velocity, to_center = state.velocity[:3], np.asarray(self.center, dtype=float) - state.point[:3]
         speed, distance = float(np.linalg.norm(velocity)), float(np.linalg.norm(to_center))
@@ -75,10 +75,10 @@ class ObstacleCoupling:
             return evasion
         heading = velocity / speed
         angle = math.acos(min(max(float(heading @ to_center) / distance, -1.0), 1.0))
-        if angle > 0.5 * math.pi:  # it has passed
+        if angle > 0.5 * math.pi:  # the motion has passed the ball
             return evasion
         away = heading * float(heading @ to_center) - to_center  # across the motion
-        if np.linalg.norm(away) < 1e-6 * distance:  # straight towards the centre: choose one side, always the same
+        if np.linalg.norm(away) < 1e-6 * distance:  # straight towards the centre: always choose the same side
             away = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
         seen = math.asin(min(self.radius_m / distance, 1.0))
         beside = max(angle - seen, 1.0 / STEEPNESS)

@@ -1,4 +1,4 @@
-"""Demonstrations: checked points over time, from arrays or from tables of bags."""
+"""Demonstrations: points over time, which are checked when they are made from arrays or from tables of a bag."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MIN_SAMPLES = 10
-"""Least number of samples; fewer are rejected."""
+"""Least number of samples; demonstrations with fewer samples are rejected."""
 MAX_GAP_SHARE = 0.1
-"""Largest share of the duration between two samples; a longer gap counts as a jump in time, and is rejected."""
+"""Largest time between two samples, as a fraction of the duration. A longer gap is rejected as a jump in time."""
 MAX_TURN_RAD = 1.5
-"""Largest rotation between two samples [rad]; a larger one counts as a jump, and is rejected."""
+"""Largest rotation between two samples [rad]. A larger rotation is rejected as a jump."""
 SPIKE_SHARE = 0.05
-"""Share of the extent of the positions beyond which a sample may count as a spike."""
+"""Least size of a spike, as a fraction of the extent of the positions. Smaller outliers are accepted."""
 SPIKE_TO_STEPS, SPIKE_TO_NOISE = 5.0, 10.0
-"""A spike is larger than the steps before and after it, and than the median of all samples, by these factors."""
+"""Least size of a spike, as a multiple of the steps around it, and as a multiple of all samples' median deviation.
+
+The deviation of a sample is its distance from the line between the samples before and after it.
+"""
 TRANSLATION = ("translation/x", "translation/y", "translation/z")
 ROTATION = ("rotation/x", "rotation/y", "rotation/z", "rotation/w")
 """Columns of a table of /tf, see docs/data.md."""
@@ -37,11 +40,11 @@ JOINT_PREFIX = "position/"
 
 @dataclass(frozen=True)
 class Demonstration:
-    """A demonstrated motion; made by `of` and the other class methods, which check it.
+    """A demonstrated motion. Make it with the class methods, such as `of`, which check the numbers.
 
     Attributes:
-        space: Names of its signals.
-        times: m times [s], the first 0, strictly increasing.
+        space: Names of the n positions, and whether points have an orientation.
+        times: m strictly increasing times; the first is 0 [s].
         points: m points, shape (m, n), or (m, n + 4) with orientations.
     """
 
@@ -67,12 +70,12 @@ class Demonstration:
         Args:
             times: m times [s].
             positions: m x n positions [m or rad].
-            quats_xyzw: m quaternions x, y, z, w, of either sign.
-            names: n names of the positions; by default x, y, z for three, and q0, q1, ... for others.
+            quats_xyzw: m quaternions x, y, z, w; signs are arbitrary. By default the motion has no orientations.
+            names: Names of the n positions. By default x, y, z for n = 3, otherwise q0, q1, ...
 
         Raises:
-            DemonstrationError: If sizes differ, there are fewer than 10 samples, a number is not finite, times repeat,
-                run back or jump, or positions or orientations jump.
+            DemonstrationError: If sizes differ, a number is not finite, there are fewer than 10 samples, times do not
+                increase or have a long gap, or positions or orientations jump.
         """
         stamps = checked_array(times, "times", 1)
         where = checked_array(positions, "positions", 2)
@@ -91,20 +94,22 @@ class Demonstration:
 
     @classmethod
     def of_points(cls, space: Space, times: ArrayLike, points: ArrayLike) -> Demonstration:
-        """Returns a checked demonstration of m points of a space at m times [s]; raises as `of` does."""
+        """Returns a checked demonstration of m points of a space at m times [s]; raises the same errors as `of`."""
         values, n = checked_array(points, "positions", 2), len(space.names)
         return cls.of(times, values[:, :n], values[:, n:] if space.has_orientation else None, space.names)
 
     @classmethod
     def of_frame(cls, table: pd.DataFrame, parent: str, child: str, orientation: bool = True) -> Demonstration:
-        """Returns the path of one TF frame in another.
+        """Returns the motion of the TF frame `child` in the frame `parent`, read from a table.
 
         Args:
-            table: A table of /tf as of `bag_to_dataframes`, with time as index.
-            orientation: Whether orientations are part of it.
+            table: Table of /tf from `bag_to_dataframes`; its index is time [s].
+            parent: Name of the reference frame.
+            child: Name of the moving frame.
+            orientation: Whether the demonstration includes orientations.
 
         Raises:
-            UnknownNameError: If the table has no such transform.
+            UnknownNameError: If the table does not have the transform.
             DemonstrationError: As for `of`.
         """
         rows = table[(table["parent"].str.strip("/") == parent) & (table["child"].str.strip("/") == child)]
@@ -116,11 +121,11 @@ class Demonstration:
 
     @classmethod
     def of_joints(cls, table: pd.DataFrame, joints: Sequence[str] | None = None) -> Demonstration:
-        """Returns the motion of joints.
+        """Returns the motion of joints, read from a table.
 
         Args:
-            table: A table of joint states as of `bag_to_dataframes`, with time as index.
-            joints: The joints, in this order; by default all.
+            table: Table of joint states from `bag_to_dataframes`; its index is time [s].
+            joints: Names of the joints, in the order of the demonstration's positions; by default all joints.
 
         Raises:
             UnknownNameError: If the table lacks a joint.
@@ -136,10 +141,10 @@ class Demonstration:
 
 
 def common_space(demonstrations: Sequence[Demonstration]) -> Space:
-    """Returns the space of some demonstrations.
+    """Checks that all demonstrations have the same space, and returns the space.
 
     Raises:
-        DemonstrationError: If there is none, or their signals differ.
+        DemonstrationError: If the list is empty, or the spaces differ.
     """
     if not demonstrations:
         raise DemonstrationError("demonstrations", "at least one", "none")
@@ -156,11 +161,12 @@ def _default_names(count: int) -> tuple[str, ...]:
 
 
 def checked_array(values: ArrayLike, subject: str, dimensions: int) -> Array:
-    """Returns numbers of a demonstration as an array, if they are finite.
+    """Converts numbers of a demonstration to an array, and checks that they are finite.
 
     Args:
-        subject: Name of the numbers in messages.
-        dimensions: Number of dimensions of the array.
+        values: The numbers.
+        subject: Name of the numbers in error messages.
+        dimensions: Required number of array dimensions.
 
     Raises:
         DemonstrationError: If the number of dimensions differs, or a number is not finite.
@@ -183,10 +189,10 @@ def _check_rows(subject: str, array: Array, times: Array) -> None:
 
 
 def check_increasing(times: Array, min_samples: int) -> None:
-    """Checks that times [s] increase strictly, and that there are enough.
+    """Checks that there are at least `min_samples` times, and that they increase strictly [s].
 
     Raises:
-        DemonstrationError: If there are too few, or one repeats or runs back.
+        DemonstrationError: If there are fewer times, or a time is not after the time before.
     """
     if len(times) < min_samples:
         raise DemonstrationError("times", f"at least {min_samples} samples", f"{len(times)}")
@@ -208,7 +214,8 @@ def _check_no_jump(times: Array) -> None:
 
 
 def _check_no_spike(times: Array, positions: Array) -> None:
-    """Rejects a sample far off the line between its neighbours while the motion around it is slow."""
+    """Rejects a motion with a spike: a sample far from the line between its neighbours, while the steps around the
+    three samples are small."""
     share = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
     line = positions[:-2] + share * (positions[2:] - positions[:-2])
     off = np.linalg.norm(positions[1:-1] - line, axis=1)

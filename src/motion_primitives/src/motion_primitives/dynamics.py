@@ -1,5 +1,5 @@
-"""Dynamics of movement primitives: a path, and a spring-damper for the deviation from it, with forcing term and
-couplings.
+"""Dynamics of movement primitives: a motion follows a path like a spring-damper, and a forcing term and couplings push
+the motion off the path.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from custom_ros_tools.transforms import Array
 from .space import Space, angular_velocity, turned
 
 TOLERANCE = 1e-3
-"""Largest distance from the goal that counts as reached [m or rad]."""
+"""Largest difference of a position from the goal at which the goal counts as reached [m or rad]."""
 TOLERANCE_RAD = math.radians(0.1)
-"""Largest angle from the goal that counts as reached [rad]."""
+"""Largest angle between the orientation and the goal at which the goal counts as reached [rad]."""
 FROM_START = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
-"""Quintic from 0 to 1, from rest to rest; coefficients of rising powers."""
+"""Coefficients (powers 0 to 5) of the quintic from 0 to 1 that starts and ends at rest."""
 COASTING = (0.0, 1.0, 0.0, -6.0, 8.0, -3.0)
-"""Quintic from 0 to 0, from velocity 1 to rest; acceleration is 0 at both ends."""
+"""Coefficients (powers 0 to 5) of the quintic from 0 to 0 that starts with velocity 1 and ends at rest. Its second
+derivative is 0 at both ends."""
 MIN_CHANGE_SHARE = 0.25
-"""Least duration of a change of the goal, as a share of the motion's duration."""
+"""Least duration of the transition to a new goal, as a fraction of the motion's duration."""
 
 
 class MotionState(NamedTuple):
     """State of a motion.
 
     Attributes:
-        time_s: Time since its start [s].
-        point: A point of its space.
-        velocity: Velocity [m/s or rad/s], shape (dof,).
+        time_s: Time since the start of the motion [s].
+        point: Present point, see `Space`.
+        velocity: Present velocity, shape (dof,) [m/s or rad/s].
     """
 
     time_s: float
@@ -43,11 +44,11 @@ class MotionState(NamedTuple):
 
 
 class SpringDamper(NamedTuple):
-    """Critically damped spring; its time scale is the duration.
+    """Critically damped spring, whose time scale is the duration of the motion.
 
     Attributes:
-        alpha: Damping; the stiffness is a quarter of its square, both for a duration of 1 s.
-        duration_s: The duration [s].
+        alpha: Damping for a duration of 1 s. The stiffness for a duration of 1 s is `alpha**2 / 4`.
+        duration_s: Duration of the motion [s].
     """
 
     alpha: float
@@ -65,16 +66,16 @@ class SpringDamper(NamedTuple):
 
 
 Coupling = Callable[[MotionState, SpringDamper], Array]
-"""Returns an acceleration [m/s^2 or rad/s^2], shape (dof,), for a state and the spring of the motion."""
+"""Function of the motion's state and spring that returns an acceleration to add, shape (dof,) [m/s^2 or rad/s^2]."""
 
 
 class Execution(ABC):
     """A motion that is executed step by step.
 
     Attributes:
-        space: Its signals.
-        state: Its present state.
-        goal: The last point, None if there is no goal.
+        space: Space of the motion's points.
+        state: Present state.
+        goal: Point where the motion should end; None for a motion without goal.
     """
 
     space: Space
@@ -84,56 +85,66 @@ class Execution(ABC):
     @property
     @abstractmethod
     def end_s(self) -> float:
-        """Planned time at the goal [s]."""
+        """Planned duration: time from the start to the goal [s]."""
 
     @abstractmethod
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Advances by a time step [s] and returns the new state.
+        """Advances the motion by one time step, and returns the new state.
 
         Args:
-            couplings: Functions of state and spring that return further accelerations.
+            dt_s: The time step [s].
+            couplings: Functions that return accelerations to add, see `Coupling`.
         """
 
     @abstractmethod
     def set_goal(self, goal: ArrayLike) -> None:
-        """Sets another goal from now on.
+        """Changes the goal of the running motion.
 
         Raises:
-            PlanError: If it is not a point of the space, or it is too late to change the goal of this primitive.
+            PlanError: If `goal` is not a point of the space, or the primitive cannot change its goal any more.
         """
 
     def miss(self) -> tuple[float, float]:
-        """Returns the largest distance from the goal [m or rad], and the angle from it [rad]; 0 without a goal."""
+        """Returns the present error to the goal; 0 and 0 for a motion without goal.
+
+        Returns:
+            Largest difference of a position [m or rad], and angle between the orientations [rad].
+        """
         return (0.0, 0.0) if self.goal is None else self.space.distance(self.state.point, self.goal)
 
     def is_at_goal(self, tolerance: float = TOLERANCE, tolerance_rad: float = TOLERANCE_RAD) -> bool:
-        """Returns whether the duration has passed and the goal is reached."""
+        """Returns whether the planned duration has passed, and the goal is reached.
+
+        Args:
+            tolerance: Largest difference of a position from the goal that counts as reached [m or rad].
+            tolerance_rad: Largest angle from the goal that counts as reached [rad].
+        """
         distance, angle_rad = self.miss()
         is_over = self.state.time_s >= self.end_s * (1.0 - 1e-9)
         return is_over and distance <= tolerance and angle_rad <= tolerance_rad
 
 
 class Path(Protocol):
-    """The path that a motion deviates from."""
+    """The nominal path of a motion, without forcing term and couplings."""
 
     end_s: float
-    """Time after which it is at rest [s]."""
+    """Time from which the path is at rest [s]."""
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,)."""
+        """Returns point and velocity, shape (dof,), at a time since the start."""
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the goal at a time of the motion."""
+        """Changes the path from `time_s` on such that it ends at a new goal."""
 
 
 class QuinticOffset(NamedTuple):
-    """A difference that is added to a path along a quintic.
+    """An offset that is added to a path: a difference times a quintic polynomial of time.
 
     Attributes:
-        start_s: Time at which it starts [s].
-        duration_s: How long it lasts [s].
+        start_s: Time at which the polynomial starts [s].
+        duration_s: Duration of the polynomial [s]. Before and after it, the value at its start or end applies.
         difference: The difference, shape (dof,).
-        quintic: Its share over the share of the duration, as coefficients of rising powers.
+        quintic: Coefficients (powers 0 to 5) of the polynomial, whose argument runs from 0 to 1 over the duration.
     """
 
     start_s: float
@@ -142,7 +153,7 @@ class QuinticOffset(NamedTuple):
     quintic: tuple[float, ...] = FROM_START
 
     def at(self, time_s: float) -> tuple[float, float]:
-        """Returns the share that is added, and its derivative by time [1/s]."""
+        """Returns the factor of `difference` at a time [s], and the factor's time derivative [1/s]."""
         u = min(max((time_s - self.start_s) / self.duration_s, 0.0), 1.0)
         _, c1, c2, c3, c4, c5 = self.quintic
         value = u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
@@ -151,12 +162,16 @@ class QuinticOffset(NamedTuple):
 
 
 class QuinticPath:
-    """A path from start to goal along a quintic, which arrives in time (as the goal of Muelling 2013, equation 6).
+    """A path from start to goal along a quintic, which arrives after the duration (cf. Muelling 2013, equation 6).
 
-    A new goal adds another quintic: velocity and acceleration stay continuous.
+    A new goal adds another quintic, so that velocity and acceleration stay continuous.
 
     Args:
-        velocity: Velocity at the start [m/s or rad/s], shape (dof,).
+        space: Space of the points.
+        duration_s: Duration of the path [s].
+        start: First point.
+        goal: Last point.
+        velocity: Velocity at the start, shape (dof,) [m/s or rad/s].
     """
 
     def __init__(self, space: Space, duration_s: float, start: Array, goal: Array, velocity: Array) -> None:
@@ -167,13 +182,17 @@ class QuinticPath:
             self._moves.append(QuinticOffset(0.0, duration_s, velocity * duration_s, COASTING))
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the goal; it is reached at the end, or after a quarter of the duration if that is later."""
+        """Changes the goal at `time_s` [s].
+
+        The path arrives at the new goal after the duration, or a quarter of the duration after `time_s` if that is
+        later.
+        """
         left_s = max(self._duration_s - time_s, MIN_CHANGE_SHARE * self._duration_s)
         self._moves.append(QuinticOffset(time_s, left_s, self._space.minus(goal, self._goal)))
         self._goal, self.end_s = goal, max(self.end_s, time_s + left_s)
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,)."""
+        """Returns point and velocity, shape (dof,), at a time since the start [s]."""
         point, velocity = self._start, np.zeros(self._space.dof)
         for move in self._moves:
             value, rate = move.at(time_s)
@@ -182,14 +201,20 @@ class QuinticPath:
 
 
 class PathExecution(Execution):
-    """A motion that deviates from a path: a spring pulls it back, a forcing term and couplings push it away.
+    """A motion that deviates from a path: a spring pulls it to the path, a forcing term and couplings push it away.
 
-    The deviation follows one linear equation for all signals, in one phase; orientations are rotation vectors. It is
-    that of Ijspeert 2013 (equation 2.1), with the path in place of the goal.
+    The deviation follows the same linear equation for all signals (Ijspeert 2013, equation 2.1, with the path in place
+    of the goal). Deviations of orientations are rotation vectors.
 
     Args:
-        forcing: Acceleration at a time [m/s^2 or rad/s^2], shape (dof,).
-        goal: Where the path ends, None if the motion has no goal.
+        space: Space of the points.
+        spring: The spring that pulls to the path.
+        path: The path.
+        forcing: Function of the time since the start [s] that returns an acceleration, shape (dof,) [m/s^2 or rad/s^2].
+        goal: Point where the path ends; None for a motion without goal.
+
+    Attributes:
+        deviation: Present deviation from the path, and its rate, both of shape (dof,).
     """
 
     def __init__(
@@ -207,11 +232,11 @@ class PathExecution(Execution):
 
     @property
     def end_s(self) -> float:
-        """Planned time at the goal [s]."""
+        """Planned duration [s]."""
         return self.path.end_s
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Advances by a time step, see `Execution`."""
+        """Advances the motion by one time step, see `Execution`."""
         spring = self.spring
 
         def acceleration(deviation: MotionState) -> Array:
@@ -231,12 +256,12 @@ class PathExecution(Execution):
         self.goal = checked
 
     def start_at(self, point: Array, velocity: Array) -> None:
-        """Starts at a point off the path, with a velocity."""
+        """Sets the initial state to a point that need not be on the path, with a velocity, shape (dof,)."""
         shift = self.space.minus(point, self.path.at(0.0)[0])
         self.start_beside(shift, self.space.shift_rate(shift, velocity))
 
     def start_beside(self, shift: Array, rate: Array) -> None:
-        """Starts at an offset from the path, shape (dof,), with a rate of the offset."""
+        """Sets the initial state to an offset from the path, and the offset's rate, both of shape (dof,)."""
         self.deviation = MotionState(0.0, shift, rate)
         self.state = self._moved(self.deviation)
 
@@ -248,7 +273,18 @@ class PathExecution(Execution):
 
 
 def deviated(space: Space, point: Array, velocity: Array, shift: Array, rate: Array) -> tuple[Array, Array]:
-    """Returns point and velocity of a motion offset from another one by `shift`, which changes at `rate`."""
+    """Adds an offset to the state of a motion.
+
+    Args:
+        space: Space of the points.
+        point: Point of the motion.
+        velocity: Velocity of the motion, shape (dof,).
+        shift: The offset, shape (dof,).
+        rate: Time derivative of the offset, shape (dof,).
+
+    Returns:
+        Point and velocity with the offset.
+    """
     if not space.has_orientation:
         return point + shift, velocity + rate
     n = len(space.names)
@@ -259,7 +295,14 @@ def deviated(space: Space, point: Array, velocity: Array, shift: Array, rate: Ar
 def integrated(
     space: Space, acceleration: Callable[[MotionState], Array], state: MotionState, dt_s: float
 ) -> MotionState:
-    """Returns the state a time step later, by the Runge-Kutta method of order 4 (of Munthe-Kaas, for orientations)."""
+    """Integrates a state over one time step with the Runge-Kutta method of order 4 (Munthe-Kaas for orientations).
+
+    Args:
+        space: Space of the points.
+        acceleration: Function of the state that returns the acceleration, shape (dof,).
+        state: State before the step.
+        dt_s: The time step [s].
+    """
     half_s = 0.5 * dt_s
 
     def slope(share_s: float, shift: Array, velocity: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Errors of demonstrations and of plans."""
+"""Errors about demonstrations and plans."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from custom_ros_tools.errors import InterfaceError
 
 @dataclass(eq=False)
 class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
-    """Invalid input.
+    """Base of the errors about invalid input.
 
     Attributes:
-        subject: The part that is wrong.
-        expected: Description of what is needed.
-        got: Description of what was given.
+        subject: Name of the invalid argument or part.
+        expected: Words for the valid input.
+        got: Words for the given input.
     """
 
     subject: str
@@ -24,14 +24,14 @@ class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
 
 
 class DemonstrationError(_UnexpectedInput):
-    """A demonstration, or a set of them, cannot be learned from.
+    """A primitive cannot learn from a demonstration, or from a set of demonstrations.
 
     The subject is `times`, `positions`, `orientations` or `demonstrations`.
     """
 
 
 class PlanError(_UnexpectedInput):
-    """A motion cannot be planned as requested: the subject is an argument that does not fit the primitive."""
+    """A motion cannot be planned as requested. The subject is the argument that does not fit the primitive."""
 
 
 @dataclass(eq=False)
@@ -39,10 +39,10 @@ class GoalNotReachedError(InterfaceError):
     """A planned motion does not end at its goal.
 
     Attributes:
-        distance: Largest distance of a position from its goal [m or rad].
-        angle_rad: Angle between the orientation and its goal [rad].
-        duration_s: Duration after which planning was given up [s].
-        tolerance: Largest distance that counts as reached [m or rad].
+        distance: Largest difference of a position from the goal [m or rad].
+        angle_rad: Angle between the orientation and the goal [rad].
+        duration_s: Duration of the motion when planning stopped [s].
+        tolerance: Largest difference that counts as reached [m or rad].
         tolerance_rad: Largest angle that counts as reached [rad].
     """
 

@@ -1,4 +1,4 @@
-"""Files of learned primitives: YAML that people read, and that is checked when it is read."""
+"""Saves learned primitives as readable YAML files, and loads and checks such files."""
 
 from __future__ import annotations
 
@@ -29,10 +29,12 @@ class PrimitiveFile(ConfigModel):
 
 
 def save(primitive: Primitive, path: str | Path) -> None:
-    """Writes a learned primitive; a file of this name is replaced atomically, or stays unchanged.
+    """Writes a learned primitive to a file.
+
+    An existing file is replaced atomically; if writing fails, it stays unchanged.
 
     Raises:
-        NotLearnedError: If it has learned nothing.
+        NotLearnedError: If the primitive has not learned yet.
         OSError: If the file cannot be written.
     """
     content = PrimitiveFile(
@@ -48,11 +50,11 @@ def save(primitive: Primitive, path: str | Path) -> None:
 
 
 def load(path: str | Path) -> Primitive:
-    """Reads a learned primitive.
+    """Reads a learned primitive from a file.
 
     Raises:
-        ConfigError: If the file cannot be read, or is wrong; it names file and key of each fault.
-        UnknownNameError: If there is no primitive of this type.
+        ConfigError: If the file cannot be read or is invalid; the error names file and key of each fault.
+        UnknownNameError: If the file names an unknown type of primitive.
     """
     file = str(path)
     content = PrimitiveFile.parse(load_config(file), file)

@@ -1,4 +1,4 @@
-"""Parameters of the node, and the schema of the YAML files that have them."""
+"""Parameters of the primitives node, and the JSON Schema of the YAML files with these parameters."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class SourceConfig(ConfigModel):
 
     @property
     def space(self) -> Space:
-        """The signals."""
+        """Space of the source's points."""
         if self.joints is not None:
             return Space(tuple(self.joints.names))
         return Space(POSE, self.tf is not None and self.tf.orientation)
@@ -103,7 +103,7 @@ class ObstacleConfig(ConfigModel):
     gain: Positive = Field(1000.0, description="Strength of the avoidance.")
 
     def obstacle(self) -> ObstacleCoupling:
-        """Returns the obstacle, at the origin."""
+        """Makes the obstacle coupling, with the ball's centre at the origin."""
         return ObstacleCoupling((0.0, 0.0, 0.0), self.radius, self.range, self.gain)
 
 
@@ -119,7 +119,7 @@ class CouplingConfig(ConfigModel):
     obstacles: ListOf[ObstacleConfig] = Field((), description="Balls to avoid.")
 
     def force(self, space: Space) -> ForceCoupling | None:
-        """Returns the coupling to forces, None without one."""
+        """Makes the coupling to forces; returns None if no `force_stiffness` is configured."""
         if self.force_stiffness is None:
             return None
         stiffness = [self.force_stiffness] * len(space.names)
@@ -168,10 +168,10 @@ SCHEMA = "primitives_node"
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file.
+    """Generates the JSON Schema file of this package, and returns the text by file path.
 
     Args:
-        root: The workspace.
+        root: Folder of the workspace.
     """
     path = root / f"src/motion_primitives/schema/{SCHEMA}.schema.json"
     return {path: schema_text(explained(json_schema(PrimitivesNodeConfig, SCHEMA)))}

@@ -1,4 +1,4 @@
-"""The interface of movement primitives."""
+"""Base class of movement primitives, and the motion plans that they return."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ from .errors import GoalNotReachedError, NotLearnedError, PlanError
 from .space import Space
 
 DT_S = 0.01
-"""Time between two points of a plan by default [s]."""
+"""Default time between two points of a plan [s]."""
 MAX_LONGER = 3.0
-"""Multiple of the requested duration after which an unreached goal counts as out of reach."""
+"""Multiple of the planned duration after which a goal that is still not reached counts as unreachable."""
 MIN_STEPS, MAX_STEPS = 20, 1_000_000
-"""Least and largest number of steps of a plan; other combinations of duration and time step are rejected."""
+"""Least and largest number of steps within a plan's duration. Time steps that give fewer steps are reduced; time
+steps that give more steps are rejected."""
 
 
 class ViaPoint(NamedTuple):
-    """A point that a motion passes.
+    """A point that a motion passes through.
 
     Attributes:
-        progress: Share of the duration, from 0 to 1.
+        progress: Time at which the motion passes the point, as a fraction of the duration.
         point: The point, see `Space`.
-        std: Standard deviation with which it is passed [m or rad].
+        std: Standard deviation of the passing motions from the point [m or rad].
     """
 
     progress: float
@@ -47,10 +48,11 @@ class MotionPlan:
     """A planned motion.
 
     Attributes:
-        space: Names of its signals.
-        times: m times [s] from 0 on.
+        space: Space of the points.
+        times: m times, starting at 0 [s].
         points: m points, see `Space`.
-        velocities: m velocities [m/s or rad/s], shape (m, dof); the last three are angular if there are orientations.
+        velocities: m velocities, shape (m, dof) [m/s or rad/s]; with orientations, the last three columns are the
+            angular velocity.
     """
 
     space: Space
@@ -60,17 +62,17 @@ class MotionPlan:
 
     @property
     def duration_s(self) -> float:
-        """Time of its last point [s]."""
+        """Time of the last point [s]."""
         return float(self.times[-1])
 
     @property
     def positions(self) -> Array:
-        """m x n positions [m or rad]."""
+        """The n positions of all m points, shape (m, n) [m or rad]."""
         return self.points[:, : len(self.space.names)]
 
     @property
     def quats_xyzw(self) -> Array | None:
-        """m unit quaternions x, y, z, w, None without orientations."""
+        """The unit quaternions x, y, z, w of all m points, shape (m, 4); None for a space without orientation."""
         return self.points[:, len(self.space.names) :] if self.space.has_orientation else None
 
 
@@ -85,13 +87,13 @@ class PrimitiveConfig(ConfigModel):
 
 
 class Primitive(ABC):
-    """A motion learned from demonstrations, and repeated with other starts, goals and durations.
+    """Base class of primitives, which learn a motion from demonstrations and repeat it with other starts and goals.
 
     Attributes:
-        Config: Model of its options.
-        Learned: Model of the learned data, for files.
-        config: Its options.
-        space: Its signals, after `learn`.
+        Config: Pydantic model of the options.
+        Learned: Pydantic model of the learned data, for files.
+        config: The options.
+        space: Space of the motion's points; available after `learn` or `restore`.
     """
 
     Config: ClassVar[type[PrimitiveConfig]] = PrimitiveConfig
@@ -103,25 +105,25 @@ class Primitive(ABC):
 
     @property
     def is_learned(self) -> bool:
-        """Whether it has learned or was loaded."""
+        """Whether the primitive has learned, or was loaded from a file."""
         return self._space is not None
 
     @property
     def space(self) -> Space:
-        """Its signals.
+        """Space of the motion's points.
 
         Raises:
-            NotLearnedError: If it has not learned yet.
+            NotLearnedError: If the primitive has not learned yet.
         """
         if self._space is None:
             raise NotLearnedError()
         return self._space
 
     def learn(self, demonstrations: Demonstration | Sequence[Demonstration]) -> Primitive:
-        """Learns from demonstrations, replaces earlier learned data, and returns itself.
+        """Learns from demonstrations, replaces all data learned before, and returns the primitive itself.
 
         Raises:
-            DemonstrationError: If their signals differ, or they do not suffice.
+            DemonstrationError: If the demonstrations have different spaces, or are unsuitable for the primitive.
         """
         given = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
         space = common_space(given)
@@ -137,17 +139,17 @@ class Primitive(ABC):
         via_points: Sequence[ViaPoint] = (),
         velocity: ArrayLike | None = None,
     ) -> Execution:
-        """Begins a motion, and returns it.
+        """Begins a motion, and returns the execution, which the caller advances step by step.
 
         Args:
-            start: First point; by default the mean of the demonstrations.
-            goal: Last point; by default the mean of the demonstrations. For a rhythmic primitive, the centre.
-            duration_s: Duration [s]; by default the mean of the demonstrations.
-            via_points: Points on the way, for primitives that support them.
-            velocity: Velocity at the start [m/s or rad/s], shape (dof,); by default rest.
+            start: First point; by default the demonstrations' mean first point.
+            goal: Last point, or centre of a rhythmic motion; by default the demonstrations' mean.
+            duration_s: Duration [s]; by default the demonstrations' mean.
+            via_points: Points that the motion passes through, for primitives that support via-points.
+            velocity: Velocity at the start, shape (dof,) [m/s or rad/s]; by default 0.
 
         Raises:
-            NotLearnedError: If it has not learned yet.
+            NotLearnedError: If the primitive has not learned yet.
             PlanError: If an argument is invalid.
         """
         space = self.space
@@ -174,20 +176,21 @@ class Primitive(ABC):
         tolerance: float = TOLERANCE,
         tolerance_rad: float = TOLERANCE_RAD,
     ) -> MotionPlan:
-        """Returns a whole motion; for the other arguments see `begin`.
+        """Plans a whole motion, from start to goal; for the first five arguments see `begin`.
 
-        It lasts for the duration, or longer if couplings or the type of the primitive delay the goal.
+        The plan lasts longer than the duration if the goal is reached later, because of couplings or of the type of the
+        primitive.
 
         Args:
-            dt_s: Time between two points [s]; it is reduced so that the duration is a multiple of it.
-            couplings: Functions of state and spring that return further accelerations.
-            tolerance: Largest distance from the goal that counts as reached [m or rad].
+            dt_s: Largest time between two points [s]. The actual time divides the duration into equal steps.
+            couplings: Functions that return accelerations to add, see `Coupling`.
+            tolerance: Largest difference of a position from the goal that counts as reached [m or rad].
             tolerance_rad: Largest angle from the goal that counts as reached [rad].
 
         Raises:
-            NotLearnedError: If it has not learned yet.
+            NotLearnedError: If the primitive has not learned yet.
             PlanError: If an argument is invalid.
-            GoalNotReachedError: If it is not at the goal after three times the duration.
+            GoalNotReachedError: If the goal is not reached after three times the duration.
         """
         execution = self.begin(start, goal, duration_s, via_points, velocity)
         if not 0.0 < dt_s < math.inf or execution.end_s / dt_s > MAX_STEPS:
@@ -207,17 +210,21 @@ class Primitive(ABC):
         """Returns the learned data, for files.
 
         Raises:
-            NotLearnedError: If it has not learned yet.
+            NotLearnedError: If the primitive has not learned yet.
         """
         if self._space is None:
             raise NotLearnedError()
         return self._learned()
 
     def restore(self, space: Space, learned: Any) -> None:
-        """Sets the learned data, as read from a file.
+        """Sets the learned data to the content of a file.
+
+        Args:
+            space: Space of the motion's points.
+            learned: The learned data, an instance of `Learned`.
 
         Raises:
-            ValueError: If sizes do not fit the space or the options.
+            ValueError: If sizes in the data do not fit the space or the options.
         """
         self._restore(space, learned)
         self._space = space
@@ -226,7 +233,7 @@ class Primitive(ABC):
 
     @abstractmethod
     def _learn(self, space: Space, demonstrations: Sequence[Demonstration]) -> None:
-        """Learns from demonstrations of one space; see `learn`."""
+        """Learns from demonstrations that all have the space `space`; see `learn`."""
 
     @abstractmethod
     def _begin(
@@ -237,7 +244,7 @@ class Primitive(ABC):
         via_points: Sequence[ViaPoint],
         velocity: Array,
     ) -> Execution:
-        """Returns a motion for checked arguments; see `begin`."""
+        """Begins a motion; `begin` has checked the arguments."""
 
     @abstractmethod
     def _learned(self) -> ConfigModel:
@@ -249,13 +256,15 @@ class Primitive(ABC):
 
 
 def check_shape(values: Any, shape: Mapping[str, int], subject: str) -> Array:
-    """Returns numbers of a file as an array.
+    """Converts numbers from a file to an array, and checks its shape.
 
     Args:
-        shape: Expected size of each dimension by its name.
+        values: The numbers.
+        shape: Expected size of each array dimension, by the dimension's name for messages.
+        subject: Name of the numbers in messages.
 
     Raises:
-        ValueError: If sizes differ.
+        ValueError: If the shape differs.
     """
     try:
         array = np.array(values, dtype=float)
@@ -268,10 +277,10 @@ def check_shape(values: Any, shape: Mapping[str, int], subject: str) -> Array:
 
 
 def no_via_points(via_points: Sequence[ViaPoint]) -> None:
-    """Rejects via-points; for primitives that do not support them.
+    """Raises an error if there are via-points. Primitives that do not support via-points call this function.
 
     Raises:
-        PlanError: If there is one.
+        PlanError: If the list is not empty.
     """
     if via_points:
         raise PlanError("via_points", "none, since this primitive does not support them", f"{len(via_points)}")

@@ -1,7 +1,7 @@
-"""The dynamic movement primitives of the authors' release, one for each dimension, for its old clients.
+"""Dynamic movement primitives as in the original `dmp` package, for old clients; one primitive for each dimension.
 
-The forcing term is stored as samples over the share of the duration, and interpolated linearly. For new code use
-`PRIMITIVES`, whose primitives also have orientations, end on time and are smooth.
+The forcing term is stored as samples over time, as a fraction of the duration, and interpolated linearly. New code
+should use `PRIMITIVES`, whose motions are smooth, end on time, and may include orientations.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .errors import DemonstrationError, PlanError
 MIN_SAMPLES = 3
 """Least number of samples of a demonstration."""
 LONGEST_S = 1000.0
-"""Duration after which a plan ends, even if it is not at its goal [s]."""
+"""Duration after which a plan ends, even if the goal is not reached [s]."""
 MAX_STEPS = 1_000_000
 """Number of integration steps after which a plan ends."""
 MIN_WEIGHTS = 2
@@ -36,9 +36,9 @@ class ReleaseDMP:
     Attributes:
         k_gain: Stiffness.
         d_gain: Damping.
-        weights: Weights of `num_bases` Gaussians that approximate the forcing term; used if there are no samples.
-        f_domain: Shares of the duration at which the forcing term is sampled, increasing.
-        f_targets: The forcing term there, divided by the phase.
+        weights: Weights of Gaussians that approximate the forcing term; used if `f_domain` is empty.
+        f_domain: Increasing times of the forcing term's samples, as fractions of the duration.
+        f_targets: Samples of the forcing term at these times, divided by the phase.
     """
 
     k_gain: float
@@ -62,7 +62,7 @@ class ReleaseDMP:
             raise PlanError("f_domain", "increasing numbers", "one that is not larger than the one before")
 
     def forcing(self, share: float) -> float:
-        """Returns the forcing term divided by the phase, at a share of the duration."""
+        """Returns the forcing term divided by the phase, at a time given as a fraction of the duration."""
         if self.f_domain:
             return float(np.interp(share, self.f_domain, self.f_targets))
         values = GaussianBasis.of(len(self.weights)).values(np.array(share))
@@ -73,10 +73,10 @@ class ReleasePlan(NamedTuple):
     """A planned motion of n dimensions.
 
     Attributes:
-        times: m times [s]; the first is the time step.
+        times: m times [s]; the first is one time step after the start.
         positions: m x n positions.
-        velocities: m x n velocities.
-        is_at_goal: Whether it ends at the goal.
+        velocities: m x n velocities, per second.
+        is_at_goal: Whether the motion ends at the goal.
     """
 
     times: Array
@@ -88,14 +88,17 @@ class ReleasePlan(NamedTuple):
 def learn(
     times: ArrayLike, positions: ArrayLike, k_gains: ArrayLike, d_gains: ArrayLike, num_bases: int
 ) -> tuple[list[ReleaseDMP], float]:
-    """Returns a primitive of each dimension, and the duration tau [s].
+    """Learns a primitive for each of n dimensions from one demonstration.
 
     Args:
-        times: m times [s], from 0 on.
+        times: m increasing times, not negative [s].
         positions: m x n positions.
-        k_gains: n stiffnesses.
-        d_gains: n dampings.
-        num_bases: Number of weights; 0 for none.
+        k_gains: Stiffness of each of the n primitives.
+        d_gains: Damping of each of the n primitives.
+        num_bases: Number of Gaussians to fit; below 2, no weights are computed.
+
+    Returns:
+        The n primitives, and the duration tau [s], which is the last time.
 
     Raises:
         DemonstrationError: If the demonstration has too few samples, times do not increase or sizes differ.
@@ -138,22 +141,22 @@ def plan(
     dt: float,
     integrate_iter: int,
 ) -> ReleasePlan:
-    """Returns a motion, by Euler's method.
+    """Plans a motion by integration with Euler's method.
 
-    It lasts at least tau, until it is at its goal, and at most 1000 s.
+    By default, the plan ends when the time tau has passed and the goal is reached, but after 1000 s at the latest.
 
     Args:
-        primitives: One of each of n dimensions.
+        primitives: One primitive for each of n dimensions.
         x_0: n start positions.
-        x_dot_0: n start velocities [1/s].
-        t_0: Time of the primitives at which it starts [s].
-        goal: n goals.
-        goal_thresh: Largest distance from the goal that counts as reached, for each dimension; entries of 0 and less
-            are ignored.
-        seg_length: Duration of the plan [s]; -1 until the goal.
-        tau: Duration [s].
+        x_dot_0: n start velocities, per second.
+        t_0: Time within the primitives at which the motion starts [s].
+        goal: n goal positions.
+        goal_thresh: For each dimension, the largest distance from the goal that counts as reached. Dimensions with an
+            entry of 0 or less are ignored.
+        seg_length: Duration of the plan [s]; 0 or less to plan until the goal is reached.
+        tau: Duration of the primitives [s].
         dt: Time between two points [s].
-        integrate_iter: Steps of integration between two points.
+        integrate_iter: Number of integration steps between two points.
 
     Raises:
         PlanError: If an argument is invalid.

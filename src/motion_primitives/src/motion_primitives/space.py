@@ -1,8 +1,9 @@
-"""Spaces of motions: positions of n signals, and optionally one orientation.
+"""Spaces of motions: n positions, and optionally one orientation.
 
-A point is an array of n positions, followed by the unit quaternion x, y, z, w if the space has an orientation. A
-difference of points, and a velocity, is an array of n numbers, followed by a rotation vector, or an angular velocity,
-about the fixed axes. Positions and orientation thus share formulas and phase.
+A point is an array of n positions. In a space with an orientation, the unit quaternion x, y, z, w follows. A difference
+between two points has n numbers, and a rotation vector if there is an orientation. A velocity has n numbers, and an
+angular velocity if there is an orientation. Rotation vectors and angular velocities are about the fixed axes. So the
+same formulas hold for positions and orientations.
 """
 
 from __future__ import annotations
@@ -20,38 +21,45 @@ from robot_model.geometry import normalized, quaternion_of, quaternion_product, 
 from .errors import PlanError
 
 QUATERNION = ("qx", "qy", "qz", "qw")
-"""Names of the numbers of an orientation."""
+"""Names of the four numbers of an orientation."""
 POSE = ("x", "y", "z")
-"""Names of the positions of a pose."""
+"""Names of the three positions of a pose."""
 ROUNDING = 1e-12
 MIN_NORM, MAX_NORM = 0.9, 1.1
-"""A quaternion with a length in this range is normalised; others are rejected."""
+"""A quaternion with a length in this range is normalised; other quaternions are rejected."""
 
 
 class Space(NamedTuple):
-    """Names of n positions, and whether there is an orientation, too."""
+    """Space of a motion's points.
+
+    Attributes:
+        names: Names of the n positions.
+        has_orientation: Whether points also have an orientation.
+    """
 
     names: tuple[str, ...]
     has_orientation: bool = False
 
     @property
     def dof(self) -> int:
-        """Length of a difference, and of a velocity."""
+        """Length of the arrays of differences and velocities: n, or n + 3 with an orientation."""
         return len(self.names) + 3 * self.has_orientation
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """Names of the numbers of a point."""
+        """Names of all numbers of a point: n, or n + 4 with an orientation."""
         return (*self.names, *QUATERNION) if self.has_orientation else self.names
 
     def point(self, values: ArrayLike, subject: str) -> Array:
-        """Returns a checked point; its quaternion gets length 1.
+        """Checks the numbers of a point, normalises its quaternion, and returns the point.
 
         Args:
+            values: The numbers of the point.
             subject: Name of the point in messages, such as `goal`.
 
         Raises:
-            PlanError: If the number of values differs, one is not finite or the quaternion's length is not 1.
+            PlanError: If there are too many or too few numbers, a number is not finite, or the quaternion's length is
+                not about 1.
         """
         try:
             point = finite_vector(values, len(self.point_names), subject).copy()
@@ -69,7 +77,7 @@ class Space(NamedTuple):
         return point
 
     def minus(self, end: Array, start: Array) -> Array:
-        """Returns the difference that leads from one point to another; orientations by the shorter rotation."""
+        """Returns the difference from `start` to `end`, shape (dof,), with the shorter rotation for orientations."""
         if not self.has_orientation:
             return end - start
         n = len(self.names)
@@ -77,7 +85,7 @@ class Space(NamedTuple):
         return np.array([*(end[:n] - start[:n]).tolist(), *rotation])
 
     def plus(self, start: Array, difference: Array) -> Array:
-        """Returns the point to which a difference leads."""
+        """Returns the point at the difference `difference`, shape (dof,), from `start`; inverts `minus`."""
         if not self.has_orientation:
             return start + difference
         n = len(self.names)
@@ -86,7 +94,14 @@ class Space(NamedTuple):
         return np.array([*(start[:n] + difference[:n]).tolist(), *quat])
 
     def shift_rate(self, shift: Array, velocity: Array) -> Array:
-        """Returns the rate of the difference from a fixed point at a velocity, shape (dof,)."""
+        """Converts a velocity to the time derivative of a difference, both of shape (dof,).
+
+        The two differ for orientations: the derivative of a rotation vector is not the angular velocity.
+
+        Args:
+            shift: Difference from a fixed point to the present point.
+            velocity: Velocity of the present point.
+        """
         n = len(self.names)
         if not self.has_orientation or not shift[n:].any():
             return velocity
@@ -97,13 +112,14 @@ class Space(NamedTuple):
         return np.concatenate([velocity[:n], turning])
 
     def rates(self, times: Array, points: Array) -> Array:
-        """Returns velocities by finite differences, shape (m, dof), of m points at m times [s]."""
+        """Computes velocities, shape (m, dof), by finite differences of m points at m times [s]."""
         steps = np.array([self.minus(after, before) for before, after in zip(points, points[1:])])
         path = np.vstack([np.zeros(self.dof), np.cumsum(steps, axis=0)])
         return np.asarray(np.gradient(path, times, axis=0))
 
     def distance(self, a: Array, b: Array) -> tuple[float, float]:
-        """Returns the largest distance of two positions [m or rad], and the angle between orientations [rad]."""
+        """Compares two points: returns the largest difference of a position [m or rad], and the angle between the
+        orientations, which is 0 for a space without orientation [rad]."""
         difference, n = self.minus(a, b), len(self.names)
         return float(np.abs(difference[:n]).max(initial=0.0)), math.hypot(*difference[n:].tolist())
 
@@ -116,11 +132,12 @@ class Space(NamedTuple):
 
 
 MEAN_ITERATIONS = 10
-"""Steps to the mean of orientations; each reduces the error by a large factor, unless they are half a turn apart."""
+"""Number of iterations for the mean of orientations. Each iteration reduces the error by a large factor, unless
+orientations are half a turn apart."""
 
 
 def angular_velocity(rotation: Array, rate: Array) -> Array:
-    """Returns the angular velocity [rad/s] at a rotation vector [rad] that changes at a rate [rad/s]."""
+    """Returns the angular velocity [rad/s] of an orientation given by a rotation vector [rad] and its rate [rad/s]."""
     angle = float(np.linalg.norm(rotation))
     small = angle < 1e-4
     first = 0.5 if small else (1.0 - math.cos(angle)) / angle**2
@@ -130,7 +147,7 @@ def angular_velocity(rotation: Array, rate: Array) -> Array:
 
 
 def turned(rotation: Array, vector: Array) -> Array:
-    """Returns a vector, turned by a rotation vector [rad] (Rodrigues' formula)."""
+    """Rotates a vector by a rotation vector [rad], with Rodrigues' formula."""
     angle = float(np.linalg.norm(rotation))
     small = angle < 1e-4
     first = 1.0 if small else math.sin(angle) / angle

@@ -1,4 +1,4 @@
-"""The primitives; a new one is a class in its own file and a line here."""
+"""The table of primitives. To add a primitive, write a class in a file of its own, and add a line to the table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from motion_primitives.primitive import Primitive

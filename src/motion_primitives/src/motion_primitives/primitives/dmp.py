@@ -28,9 +28,9 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space
 
 QUADRATURE_POINTS = 4001
-"""Number of points at which responses to basis functions are integrated (Simpson's rule)."""
+"""Number of points for numerical integration with Simpson's rule, see `DMP._rest_at_end`."""
 MAX_DEVIATION_RAD = 0.95 * math.pi
-"""Largest angle between a demonstrated orientation and the path [rad]; beyond it, the shorter rotation is ambiguous."""
+"""Largest angle between a demonstrated orientation and the path [rad]. Near pi, the shorter rotation is ambiguous."""
 
 
 class DMPConfig(PrimitiveConfig):
@@ -54,10 +54,17 @@ class LearnedDMP(ConfigModel):
 
 
 def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: MotionState) -> Array:
-    """Returns the acceleration of spring and damper [m/s^2 or rad/s^2], shape (dof,).
+    """Returns the acceleration of the spring-damper that pulls to the goal, shape (dof,) [m/s^2 or rad/s^2].
 
-    Ijspeert 2013, equation 2.1, for positions; Ude 2014, equation 16, for orientations. The goal pulls weakly at first
-    (Hoffmann 2009, equation 7), so that another goal does not make the motion jump.
+    Positions follow Ijspeert 2013, equation 2.1; orientations follow Ude 2014, equation 16. The goal pulls weakly at
+    first (Hoffmann 2009, equation 7), so that a different goal does not cause a jump at the start.
+
+    Args:
+        space: Space of the points.
+        spring: The spring-damper.
+        start: First point.
+        goal: Last point.
+        state: Present state of the motion.
     """
     phase = math.exp(-DECAY * state.time_s / spring.duration_s)
     distance = space.minus(goal, state.point) - phase * space.minus(goal, start)
@@ -65,7 +72,16 @@ def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: M
 
 
 class FixedGoalExecution(Execution):
-    """A motion attracted by a fixed goal and shaped by a forcing term; for arguments see `pull`."""
+    """A motion that is attracted by a fixed goal and shaped by a forcing term.
+
+    Args:
+        space: Space of the points.
+        spring: The spring-damper, see `pull`.
+        forcing: Function of the time since the start [s] that returns an acceleration, shape (dof,) [m/s^2 or rad/s^2].
+        start: First point.
+        goal: Last point.
+        velocity: Velocity at the start, shape (dof,) [m/s or rad/s].
+    """
 
     def __init__(
         self,
@@ -81,11 +97,11 @@ class FixedGoalExecution(Execution):
 
     @property
     def end_s(self) -> float:
-        """The duration [s]; the goal is reached some time after it."""
+        """Planned duration [s]. The goal is reached some time after it."""
         return self._spring.duration_s
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Advances by a time step, see `Execution`."""
+        """Advances the motion by one time step, see `Execution`."""
         spring, goal = self._spring, self.goal
         assert goal is not None
 
@@ -97,15 +113,15 @@ class FixedGoalExecution(Execution):
         return self.state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Changes the goal; the acceleration jumps."""
+        """Changes the goal, which causes a jump of the acceleration."""
         self.goal = self.space.point(goal, "goal")
 
 
 class DMP(Primitive):
     """A discrete dynamic movement primitive: it keeps the demonstrated shape with any start and goal.
 
-    Positions and orientations share equation and phase, see `PathExecution`. With a fixed attractor they are those of
-    Ijspeert 2013 and Ude 2014, see `FixedGoalExecution`.
+    The option `attractor` selects the equation. With `moving`, the motion is a `PathExecution`. With `fixed`, it is a
+    `FixedGoalExecution`, as in Ijspeert 2013 and Ude 2014. Positions and orientations have the same phase.
     """
 
     Config = DMPConfig
@@ -127,7 +143,16 @@ class DMP(Primitive):
         self._duration_s = float(np.mean([each.duration_s for each in demonstrations]))
 
     def _forces_beside_path(self, space: Space, demonstration: Demonstration, name: str) -> Array:
-        """Returns the forcing term at each sample, shape (m, dof), for a duration of 1 s."""
+        """Computes the forcing term for the moving attractor at each of m samples, for a duration of 1 s.
+
+        Args:
+            space: Space of the points.
+            demonstration: The demonstration.
+            name: Name of the demonstration in messages.
+
+        Returns:
+            Accelerations, shape (m, dof).
+        """
         points, progress = demonstration.points, demonstration.times / demonstration.duration_s
         path = QuinticPath(space, 1.0, points[0], points[-1], np.zeros(space.dof))
         shifts = np.array([space.minus(point, path.at(u)[0]) for u, point in zip(progress.tolist(), points)])
@@ -141,7 +166,11 @@ class DMP(Primitive):
         return np.asarray(np.gradient(rates, progress, axis=0) + spring.stiffness * shifts + spring.damping * rates)
 
     def _forces_to_goal(self, space: Space, demonstration: Demonstration) -> Array:
-        """Returns the forcing term at each sample, shape (m, dof), for a duration of 1 s and a fixed goal."""
+        """Computes the forcing term for the fixed attractor at each of m samples, for a duration of 1 s.
+
+        Returns:
+            Accelerations, shape (m, dof).
+        """
         points, progress = demonstration.points, demonstration.times / demonstration.duration_s
         rates = space.rates(progress, points)
         bends = np.gradient(rates, progress, axis=0)
@@ -150,10 +179,11 @@ class DMP(Primitive):
         return np.asarray(bends - [pull(space, spring, points[0], points[-1], state) for state in states])
 
     def _rest_at_end(self, basis: GaussianBasis) -> Array:
-        """Returns conditions on weights: the force is 0 at start and end, and the shape ends at rest at the goal.
+        """Returns four linear constraints on the weights, shape (4, k), see `fitted`.
 
-        A shape is the response of a critically damped spring to the forcing term; its value and rate at the end are
-        integrals over the forcing term.
+        The deviation from the path is the response of a critically damped spring to the forcing term. The constraints
+        make the deviation and its rate 0 at the end, and the forcing term 0 at start and end. Deviation and rate at the
+        end are integrals over the forcing term.
         """
         u = np.linspace(0.0, 1.0, QUADRATURE_POINTS)
         simpson = np.where(np.arange(len(u)) % 2, 4.0, 2.0)

@@ -20,27 +20,27 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space, angular_velocity
 
 MAX_ANGLE_RAD = 0.95 * math.pi
-"""Largest angle between a demonstrated orientation and the mean [rad]; beyond it, rotation vectors are ambiguous."""
+"""Largest angle between a demonstrated orientation and the mean [rad]. Near pi, rotation vectors are ambiguous."""
 PRIOR_SHARE = 0.1
-"""Standard deviation before any demonstration, as a share of the extent of the motion."""
+"""Standard deviation of the prior, as a fraction of the motion's extent."""
 PRIOR_LENGTH = 0.2
-"""Share of the duration over which a deviation from the mean persists, before any demonstration."""
+"""Correlation length of the prior over time, as a fraction of the duration."""
 MIN_EXTENT = 0.01
-"""Least extent of a motion for the share above [m or rad]."""
+"""Least extent of a motion; smaller extents are replaced by this value [m or rad]."""
 SAMPLES_OF_MEAN = 50
-"""Number of samples of each demonstration for the mean orientation."""
+"""Approximate number of samples of each demonstration that the mean orientation is computed from."""
 END_WEIGHT = 100.0
-"""Weight of the error at the first and the last sample, which keeps the demonstrated start and goal."""
+"""Weight of the error at the first and the last sample of a fit, so that the demonstrated start and goal are kept."""
 EXACT_STD = 1e-6
-"""Standard deviation with which start and goal are kept [m or rad]."""
+"""Standard deviation of exactly known points, such as start and goal [m or rad]."""
 LAST_CHANGE = 0.9
-"""Share of the duration up to which the goal can be changed."""
+"""Time up to which the goal can be changed, as a fraction of the duration."""
 LOOKS = np.linspace(0.0, 1.0, 201)
-"""Shares of the duration at which a motion is checked."""
+"""Times at which a motion is checked, as fractions of the duration."""
 MISSED_STDS = 3.0
-"""Number of its standard deviations beyond which a point counts as missed."""
+"""A known point counts as missed if its error exceeds this multiple of its standard deviation, plus the tolerance."""
 MAX_TURN_RAD = 2.0 * math.pi
-"""Angle from the mean orientation from which a motion is rejected [rad]: a whole turn."""
+"""Largest angle between a planned orientation and the mean orientation [rad]: one whole turn."""
 
 
 class ProMPConfig(PrimitiveConfig):
@@ -70,23 +70,23 @@ class LearnedProMP(ConfigModel):
 
 
 class WeightDistribution(NamedTuple):
-    """Normal distribution of the weights of d signals with k basis functions each, signal by signal.
+    """Normal distribution of the weights of d signals with k basis functions each.
 
     Attributes:
-        mean: d k means.
-        covariance: Their covariance, d k x d k.
+        mean: Mean of the weights, shape (d k,): first the k weights of the first signal, and so on.
+        covariance: Covariance of the weights, shape (d k, d k).
     """
 
     mean: Array
     covariance: Array
 
     def given(self, rows: Array, values: Array, variances: Array) -> WeightDistribution:
-        """Returns the distribution once some linear functions of the weights are known (Paraschos 2013, equation 5).
+        """Conditions the distribution on c observations, linear functions of the weights (Paraschos 2013, equation 5).
 
         Args:
-            rows: The functions, c x d k.
-            values: Their c values.
-            variances: Their c variances.
+            rows: Coefficients of the linear functions, shape (c, d k).
+            values: Observed values, shape (c,).
+            variances: Variances of the observations, shape (c,).
         """
         across = self.covariance @ rows.T
         gain = np.linalg.solve(rows @ across + np.diag(variances), across.T).T
@@ -95,14 +95,14 @@ class WeightDistribution(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A known point or rate of a motion at a share of the duration.
+    """A known point of a motion, or a known time derivative, to condition a distribution on.
 
     Attributes:
-        subject: Its name in messages.
-        progress: Share of the duration.
-        values: Coordinates, or their rates for a duration of 1 s, shape (dof,).
-        std: Standard deviation [m or rad].
-        is_rate: Whether it is a rate.
+        subject: Name for messages.
+        progress: Time at which the point is known, as a fraction of the duration.
+        values: Coordinates of the point, or their time derivatives for a duration of 1 s, shape (dof,).
+        std: Standard deviation of each value [m or rad].
+        is_rate: Whether `values` are time derivatives.
     """
 
     subject: str
@@ -113,14 +113,16 @@ class Known(NamedTuple):
 
 
 class MeanPath:
-    """The mean of a distribution of motions.
+    """The path of a ProMP: the mean motion of its distribution, conditioned on known points and on the goal.
 
     Args:
-        known: Points and rates that are known, in addition to the goal.
-        goal: The last point, None if it is one of the known points.
+        primitive: The primitive.
+        known: Known points and rates, in addition to the goal.
+        duration_s: Duration of the motion [s].
+        goal: Last point; None if `known` includes the last point.
 
     Raises:
-        PlanError: If a point is missed, or the motion is too far from the demonstrations.
+        PlanError: If the mean motion misses a known point, or is too far from the demonstrations.
     """
 
     def __init__(self, primitive: ProMP, known: Sequence[Known], duration_s: float, goal: Array | None) -> None:
@@ -128,7 +130,7 @@ class MeanPath:
         self._distribution = self._to(self._known, goal)
 
     def _to(self, known: Sequence[Known], goal: Array | None, progress: float = 0.0) -> WeightDistribution:
-        """Returns the checked distribution of the motions to a goal."""
+        """Conditions the distribution on known points and on a goal, and checks the mean motion from `progress` on."""
         primitive = self._primitive
         to_goal = [] if goal is None else [Known("goal", 1.0, primitive.coordinates(goal))]
         distribution = primitive.given(primitive.distribution, [*known, *to_goal])
@@ -136,15 +138,15 @@ class MeanPath:
         return distribution
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,)."""
+        """Returns point and velocity, shape (dof,), at a time since the start [s]."""
         point, velocity = self._primitive.mean_at(self._distribution, time_s / self.end_s)
         return point, velocity / self.end_s
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the goal: conditions the mean on its present state and the new goal.
+        """Changes the goal: conditions the distribution on the mean motion's present state and on the new goal.
 
         Raises:
-            PlanError: If it is too late, or if a new motion would be rejected.
+            PlanError: If more than 90 % of the duration have passed, or the new mean motion is invalid.
         """
         primitive, progress = self._primitive, time_s / self.end_s
         if progress > LAST_CHANGE:
@@ -162,7 +164,7 @@ class MeanPath:
 class ProMP(Primitive):
     """A probabilistic movement primitive: demonstrations and their variation, given start, goal and via-points.
 
-    Paraschos 2013; orientations are rotation vectors from the mean orientation.
+    Follows Paraschos 2013. Orientations are represented as rotation vectors from the demonstrations' mean orientation.
     """
 
     Config = ProMPConfig
@@ -187,7 +189,14 @@ class ProMP(Primitive):
         self._set(space, origin, duration_s, np.array(weights))
 
     def _set(self, space: Space, origin: Array, duration_s: float, weights: Array) -> None:
-        """Sets the learned data; `weights` has the shape (N, dof, k)."""
+        """Sets the learned data, and computes the distribution of the weights.
+
+        Args:
+            space: Space of the points.
+            origin: Point with the mean orientation; its positions are 0.
+            duration_s: Mean duration of the demonstrations [s].
+            weights: Weights of N demonstrations with k basis functions, shape (N, dof, k).
+        """
         self._origin, self._duration_s, self._weights = origin, duration_s, weights
         self._basis = TimeBasis.of(self.config.bases)
         self._dof = space.dof
@@ -204,7 +213,8 @@ class ProMP(Primitive):
         self.distribution = WeightDistribution(mean, (spread + prior * np.kron(scales, kernel)) / (count + prior))
 
     def _prior_stds(self, space: Space, weights: Array) -> Array:
-        """Returns a standard deviation for each signal: one for all positions, one for all angles."""
+        """Returns the prior's standard deviation for each signal, shape (dof,): equal for all positions, and equal for
+        all components of the rotation vector."""
         extents, n = np.ptp(weights, axis=1), len(space.names)
         parts = (part for part in (extents[:n], extents[n:]) if len(part))
         return np.concatenate([np.full(len(part), PRIOR_SHARE * max(part.max(), MIN_EXTENT)) for part in parts])
@@ -240,7 +250,7 @@ class ProMP(Primitive):
         return PathExecution(self.space, spring, path, lambda _: rest, path.at(duration)[0] if goal is None else goal)
 
     def given(self, distribution: WeightDistribution, known: Sequence[Known]) -> WeightDistribution:
-        """Returns a distribution conditioned on points and rates."""
+        """Conditions a distribution of weights on known points and rates."""
         rows = np.vstack([self.rows(each.progress, each.is_rate) for each in known])
         stds = np.array([max(each.std, EXACT_STD) for each in known])
         return distribution.given(rows, np.concatenate([each.values for each in known]), np.repeat(stds**2, self._dof))
@@ -248,11 +258,17 @@ class ProMP(Primitive):
     def check(
         self, distribution: WeightDistribution, known: Sequence[Known], duration_s: float, progress: float
     ) -> None:
-        """Checks the mean of a distribution from a share of the duration on.
+        """Checks the mean motion of a distribution.
+
+        Args:
+            distribution: Distribution of the weights.
+            known: Points that the motion should pass through; rates are ignored.
+            duration_s: Duration of the motion [s].
+            progress: Time at which the check begins, as a fraction of the duration.
 
         Raises:
-            PlanError: If it misses a known point, is farther from the demonstrations than the option `reach` permits,
-                or turns by more than a whole turn.
+            PlanError: If the mean motion misses a known point, leaves the range of positions that the option `reach`
+                permits, or turns from the mean orientation by more than a whole turn.
         """
         n = len(self.space.names)
         looks = LOOKS[LOOKS >= progress]
@@ -275,7 +291,7 @@ class ProMP(Primitive):
                 raise PlanError(each.subject, expected, f"a miss by {distance:.3g} and {angle:.3g} rad")
 
     def _check_reach(self, subject: str, path: Array, times_s: Array) -> None:
-        """Rejects positions, shape (n, m), at m times, if they are too far from the demonstrations."""
+        """Rejects positions, shape (n, m), at m times if they are too far from the demonstrated positions."""
         least, most, reach = self._least[: len(path)], self._most[: len(path)], self.config.reach
         room = reach * max(float((most - least).max()), MIN_EXTENT)
         beyond = np.maximum(least[:, None] - path, path - most[:, None])
@@ -286,18 +302,26 @@ class ProMP(Primitive):
             raise PlanError(subject, expected, f"{path[index, at]:.3g} at {times_s[at]:.3g} s")
 
     def rows(self, progress: float, is_rate: bool = False) -> Array:
-        """Returns the linear functions from all weights to the coordinates, or their rates, at a share of the
-        duration.
+        """Returns the matrix from all weights to the coordinates at a time, shape (dof, dof k).
+
+        Args:
+            progress: The time, as a fraction of the duration.
+            is_rate: Whether the matrix gives the time derivatives of the coordinates, for a duration of 1 s.
         """
         basis = self._basis.rates if is_rate else self._basis.values
         return np.kron(np.eye(self._dof), basis(np.array(progress)))
 
     def coordinates(self, point: Array) -> Array:
-        """Returns the coordinates of a point: positions, and a rotation vector from the mean orientation."""
+        """Converts a point to coordinates (dof,): positions, and rotation vector from the mean orientation."""
         return self.space.minus(point, self._origin)
 
     def mean_at(self, distribution: WeightDistribution, progress: float) -> tuple[Array, Array]:
-        """Returns point and velocity, for a duration of 1 s, of the mean of a distribution."""
+        """Returns the mean motion's point, and its velocity for a duration of 1 s, shape (dof,).
+
+        Args:
+            distribution: Distribution of the weights.
+            progress: Time as a fraction of the duration; after 1, the motion is at rest.
+        """
         weights, u = distribution.mean.reshape(self._dof, -1), np.array(min(progress, 1.0))
         coordinates, rates = weights @ self._basis.values(u), weights @ self._basis.rates(u)
         if progress > 1.0:
@@ -308,10 +332,11 @@ class ProMP(Primitive):
         return self.space.plus(self._origin, coordinates), rates
 
     def stds(self, progress: ArrayLike, distribution: WeightDistribution | None = None) -> Array:
-        """Returns standard deviations at m shares of the duration, shape (m, dof), of all its motions.
+        """Returns the standard deviations of the coordinates, shape (m, dof) [m or rad].
 
         Args:
-            distribution: By default that of the demonstrations; see `conditioned`.
+            progress: m times, as fractions of the duration.
+            distribution: Distribution of the weights, such as `conditioned` returns; by default the learned one.
         """
         k = len(self._basis.centers)
         covariance = (distribution or self.distribution).covariance.reshape(self._dof, k, self._dof, k)
@@ -320,10 +345,10 @@ class ProMP(Primitive):
         return np.asarray(np.sqrt(np.maximum(np.einsum("mk,dkl,ml->md", values, blocks, values), 0.0)))
 
     def conditioned(self, via_points: Sequence[ViaPoint]) -> WeightDistribution:
-        """Returns the distribution of the motions that pass some points.
+        """Returns the distribution of the weights of motions that pass through via-points.
 
         Raises:
-            PlanError: If one is not a point of the space.
+            PlanError: If a via-point is not a point of the space.
         """
         known = []
         for index, each in enumerate(via_points):

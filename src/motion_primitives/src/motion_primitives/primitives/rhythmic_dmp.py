@@ -21,11 +21,11 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space
 
 MIN_CORRELATION = 0.7
-"""Least autocorrelation at the period of a motion that counts as repeating."""
+"""Least autocorrelation, at a lag of one period, of a motion that counts as periodic."""
 MIN_CYCLES = 1.5
-"""Least number of periods in a demonstration whose period is not given."""
+"""Least number of periods in a demonstration if the option `period_s` is not set."""
 SETTLING_CYCLES, STEPS_PER_CYCLE = 2, 100
-"""Periods after which a motion is on its cycle, and steps of each for finding where the cycle starts."""
+"""Number of periods until a motion has settled on its limit cycle, and number of integration steps per period."""
 
 
 class RhythmicDMPConfig(PrimitiveConfig):
@@ -47,11 +47,16 @@ class LearnedRhythmicDMP(ConfigModel):
 
 
 class RhythmicExecution(PathExecution):
-    """A rhythmic motion, until its end.
+    """A rhythmic motion, which ends after a duration.
+
+    Args:
+        primitive: The primitive.
+        center: Centre of the motion.
+        duration_s: Duration of the motion [s].
 
     Attributes:
-        amplitude: Its amplitude, as a multiple of the demonstrated one; may be set at any time.
-        cycles: Number of cycles so far.
+        amplitude: Amplitude, as a multiple of the demonstrated amplitude. Callers may set it at any time.
+        cycles: Number of periods since the start.
     """
 
     def __init__(self, primitive: RhythmicDMP, center: Array, duration_s: float) -> None:
@@ -63,12 +68,12 @@ class RhythmicExecution(PathExecution):
 
     @property
     def end_s(self) -> float:
-        """Time of its end [s]."""
+        """Duration of the motion [s]."""
         return self._duration_s
 
     @property
     def period_s(self) -> float:
-        """Its period [s]; may be set at any time."""
+        """Period of the motion [s]. Callers may set it at any time."""
         return self.spring.duration_s
 
     @period_s.setter
@@ -76,13 +81,13 @@ class RhythmicExecution(PathExecution):
         self.spring = SpringDamper(self.spring.alpha, checked_period(period_s))
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
-        """Advances by a time step, see `Execution`."""
+        """Advances the motion by one time step, see `Execution`."""
         state = super().step(dt_s, couplings)
         self.cycles, self._counted_s = self._cycles_at(state.time_s), state.time_s
         return state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Moves the centre, within a quarter of a period."""
+        """Moves the centre to `goal` within the first period, or a quarter of a period if that is later."""
         super().set_goal(goal)
         self.goal = None
 
@@ -94,10 +99,10 @@ class RhythmicExecution(PathExecution):
 
 
 def checked_period(period_s: float) -> float:
-    """Returns a period [s].
+    """Checks a period [s], and returns it.
 
     Raises:
-        PlanError: If it is not above 0.
+        PlanError: If the period is not finite and above 0.
     """
     if not 0.0 < period_s < math.inf:
         raise PlanError("period", "a finite time above 0 s", f"{period_s}")
@@ -107,11 +112,11 @@ def checked_period(period_s: float) -> float:
 class RhythmicDMP(Primitive):
     """A rhythmic dynamic movement primitive: a periodic motion with any centre, period and amplitude.
 
-    It is the limit cycle of Ijspeert 2013 (equations 2.7 to 2.9).
+    The motion is a limit cycle, see Ijspeert 2013, equations 2.7 to 2.9.
 
     Attributes:
-        period_s: Period [s] of motions that begin from now on; that of the demonstrations at first.
-        amplitude: Their amplitude, as a multiple of the demonstrated one.
+        period_s: Period of motions that begin later [s]; after learning, the period of the demonstrations.
+        amplitude: Amplitude of motions that begin later, as a multiple of the demonstrated amplitude.
     """
 
     Config = RhythmicDMPConfig
@@ -123,7 +128,7 @@ class RhythmicDMP(Primitive):
 
     @property
     def period_s(self) -> float:
-        """Period of motions that begin from now on [s]."""
+        """Period of motions that begin later [s]."""
         return self._period_s
 
     @period_s.setter
@@ -131,7 +136,12 @@ class RhythmicDMP(Primitive):
         self._period_s = checked_period(period_s)
 
     def forcing(self, cycles: float, period_s: float) -> Array:
-        """Returns the forcing term [m/s^2 or rad/s^2] after a number of cycles, for an amplitude of 1."""
+        """Returns the forcing term for an amplitude of 1, shape (dof,) [m/s^2 or rad/s^2].
+
+        Args:
+            cycles: Number of periods since the start.
+            period_s: Period of the motion [s].
+        """
         return np.asarray(self._weights @ self._basis.values(np.array(cycles)) / period_s**2)
 
     def _learn(self, space: Space, demonstrations: Sequence[Demonstration]) -> None:
@@ -159,7 +169,7 @@ class RhythmicDMP(Primitive):
         self._find_start(space)
 
     def _find_start(self, space: Space) -> None:
-        """Finds start and initial velocity of the cycle, by integration until the motion has settled."""
+        """Finds start and initial velocity of the limit cycle: integrates the motion until it has settled."""
         self._space = space
         settling = RhythmicExecution(self, self._learned_center, self._period_s)
         settling.amplitude = 1.0
@@ -204,10 +214,10 @@ class RhythmicDMP(Primitive):
 
 
 def _period_of(space: Space, demonstration: Demonstration, center: Array) -> float:
-    """Returns the period of a demonstration [s]: the first peak of its autocorrelation, refined by a fit.
+    """Estimates the period of a demonstration [s]: the first peak of its autocorrelation, refined by a fit.
 
     Raises:
-        DemonstrationError: If it is not periodic.
+        DemonstrationError: If the demonstration is not periodic.
     """
     path = np.array([space.minus(point, center) for point in demonstration.points])
     duration_s, count = demonstration.duration_s, len(path)
@@ -234,7 +244,17 @@ def _period_of(space: Space, demonstration: Demonstration, center: Array) -> flo
 
 
 def _shift_of(basis: PeriodicBasis, cycle: Array, cycles: Array, path: Array) -> float:
-    """Returns the lead of a demonstration over a cycle as a share of the period, by the best fit."""
+    """Finds the phase shift with which a learned cycle fits best to a demonstration.
+
+    Args:
+        basis: The basis functions.
+        cycle: Weights of the learned cycle, shape (dof, k).
+        cycles: m times of the demonstration, as numbers of periods since its start.
+        path: m deviations of the demonstration from its centre, shape (m, dof).
+
+    Returns:
+        Time to add to `cycles`, as a fraction of the period.
+    """
 
     def error(shift: float) -> float:
         return float(np.sum((path - basis.values(cycles + shift) @ cycle.T) ** 2))

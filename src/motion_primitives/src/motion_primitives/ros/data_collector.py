@@ -1,4 +1,4 @@
-"""Recording of demonstrations, with the interface of the release's `dmp.data_collector`."""
+"""Records demonstrations, with the same interface as the original package's module `dmp.data_collector`."""
 
 import threading
 
@@ -12,18 +12,18 @@ from custom_ros_tools.transforms import Array
 
 
 class EmptyRecordingError(InterfaceError):
-    """A recording has no samples."""
+    """Samples were requested from an empty recording."""
 
     def __str__(self) -> str:
         return "nothing was recorded: expected samples between start and stop"
 
 
 class DMPDataCollector:
-    """Stores samples over time; a subclass adds them by `append` while `is_on`.
+    """Stores samples over time. Subclasses call `append` for each sample while `is_on` is true.
 
     Args:
-        zero_time: Whether times of `get` begin at 0.
-        interpolate: Number of samples of `get`, at equal times; None for the recorded samples.
+        zero_time: Whether the times that `get` returns begin at 0.
+        interpolate: Number of equally spaced samples that `get` interpolates. None: `get` returns the recorded samples.
     """
 
     def __init__(self, zero_time: bool = True, interpolate: int | None = None) -> None:
@@ -34,16 +34,16 @@ class DMPDataCollector:
         self.is_on = False
 
     def is_empty(self) -> bool:
-        """Returns whether there are no samples."""
+        """Returns whether the recording is empty."""
         return not self._times
 
     def reset(self) -> None:
-        """Forgets all samples."""
+        """Deletes all samples."""
         with self._lock:
             self._times, self._samples = [], []
 
     def start(self) -> None:
-        """Starts to record; earlier samples are kept."""
+        """Starts recording, and keeps earlier samples."""
         self.is_on = True
 
     def stop(self) -> None:
@@ -51,17 +51,22 @@ class DMPDataCollector:
         self.is_on = False
 
     def append(self, time_s: float, sample: list[float]) -> None:
-        """Adds a sample, if it is newer than the one before."""
+        """Adds a sample if it is newer than the last sample.
+
+        Args:
+            time_s: Time of the sample [s].
+            sample: The numbers.
+        """
         with self._lock:
             if not self._times or time_s > self._times[-1]:
                 self._times.append(time_s)
                 self._samples.append(sample)
 
     def get(self) -> tuple[Array, Array]:
-        """Returns N times [s] and samples, shape (dims, N).
+        """Returns N times [s], and N samples, shape (dims, N).
 
         Raises:
-            EmptyRecordingError: If there is none.
+            EmptyRecordingError: If the recording is empty.
         """
         with self._lock:
             times, samples = np.array(self._times), np.array(self._samples).T
@@ -73,21 +78,21 @@ class DMPDataCollector:
         return (times - times[0] if self._zero_time else times), samples
 
     def get_first(self) -> Array:
-        """Returns the first sample, shape (dims,); raises an EmptyRecordingError if there is none."""
+        """Returns the first sample, shape (dims,); raises an EmptyRecordingError if the recording is empty."""
         return self.get()[1][:, 0]
 
     def get_last(self) -> Array:
-        """Returns the last sample, shape (dims,); raises an EmptyRecordingError if there is none."""
+        """Returns the last sample, shape (dims,); raises an EmptyRecordingError if the recording is empty."""
         return self.get()[1][:, -1]
 
 
 class TFPositionDMPDataCollector(DMPDataCollector):
-    """Records the position of a TF frame in another [m].
+    """Records the position of a TF frame in another frame [m].
 
     Args:
-        parent: The reference frame.
-        child: The frame whose positions are recorded.
-        hz: Rate of samples [Hz]; a transform whose stamp has not changed is no sample.
+        parent: Name of the reference frame.
+        child: Name of the frame whose position is recorded.
+        hz: Rate at which TF is read [Hz]. Transforms are skipped until their stamp increases.
         zero_time: See `DMPDataCollector`.
         collect_x: Whether x is recorded.
         collect_y: Whether y is recorded.
@@ -116,5 +121,5 @@ class TFPositionDMPDataCollector(DMPDataCollector):
         message = self._tf.get_tf_msg(self._parent, self._child) if self.is_on else None
         if message is not None:
             position = self._tf.msg_to_pos(message)
-            stamp = message.header.stamp or rospy.Time.now()  # static transforms may have none
+            stamp = message.header.stamp or rospy.Time.now()  # static transforms may have stamp 0
             self.append(stamp.to_sec(), [float(position[index]) for index in self._axes])

@@ -1,4 +1,4 @@
-"""The release's services for movement primitives: the node `dmp_server`, and its client."""
+"""The node `dmp_server` and its client, with the services of the original package `dmp`."""
 
 from collections.abc import Sequence
 
@@ -26,13 +26,14 @@ from motion_primitives.errors import DemonstrationError
 from motion_primitives.release_dmp import ReleaseDMP, learn, plan
 
 Gains = float | Sequence[float]
-"""A gain for each dimension, or one for all."""
+"""One gain for each dimension, or one number for all dimensions."""
 
 
 class DMPServer:
-    """Learns primitives of one dimension each, and plans with the active ones.
+    """Learns primitives of one dimension each, and plans motions with the active primitives.
 
-    An invalid request fails with an error that names the field; the active primitives stay.
+    If a request is invalid, the service call fails with a message that names the field, and the active primitives do
+    not change. Only `set_active_dmp` logs the message instead, and answers `success=False`.
     """
 
     def __init__(self) -> None:
@@ -101,14 +102,17 @@ class DMPProcessor:
     def learn_dmp(
         self, t: ArrayLike, traj: ArrayLike, k: Gains, d: Gains, num_bases: int
     ) -> LearnDMPFromDemoResponse | None:
-        """Learns a primitive of each dimension; returns the answer of the service, None if it was refused.
+        """Learns a primitive for each dimension with the service `learn_dmp_from_demo`.
 
         Args:
             t: N times [s].
             traj: Positions, shape (dims, N).
             k: Stiffness.
             d: Damping.
-            num_bases: Number of weights.
+            num_bases: Number of Gaussians to fit, see `release_dmp.learn`.
+
+        Returns:
+            The response of the service; None if the service refused the request, which is logged.
         """
         samples = np.asarray(traj, dtype=float).T
         points = [DMPPoint(positions=row) for row in samples.tolist()]
@@ -132,11 +136,14 @@ class DMPProcessor:
         dt: float,
         integrate_iter: int,
     ) -> tuple[bool, Array | None, Array | None, Array | None]:
-        """Makes a learned primitive active, and plans; for the arguments see `release_dmp.plan`.
+        """Makes learned primitives active, and plans a motion with them.
+
+        Args:
+            dmp: Response of `learn_dmp`. For the other arguments, see `release_dmp.plan`.
 
         Returns:
-            Whether the plan ends at the goal, N times [s], positions and velocities of the shape (dims, N); None for
-            these three if the request was refused.
+            Four values: whether the plan ends at the goal, N times [s], N positions, and N velocities, both of shape
+            (dims, N). If a service refused the request, False and three times None.
         """
         lists = (np.asarray(each, dtype=float).tolist() for each in (pos0, vel0, goal, goal_thresh))
         x_0, x_dot_0, end, near = lists

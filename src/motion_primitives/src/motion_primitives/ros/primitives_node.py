@@ -40,23 +40,25 @@ from .signals import outputs_of, source_of
 
 NODE = "primitives_node"
 STATE_HZ = 10.0
-"""Rate of the state while nothing changes [Hz]."""
+"""Rate at which the state is published, in addition to each change of the mode [Hz]."""
 MAX_STEP_S, MAX_TICK_S = 0.01, 0.1
-"""Longest step of integration, and longest time by which a motion advances at once, even if the node is late [s]."""
+"""Longest integration step, and longest time by which a motion advances per tick, even if the tick is late [s]."""
 MAX_SAMPLES = 1_000_000
-"""Number of samples after which a recording ends."""
+"""Largest number of samples in a recording; later samples are ignored."""
 NAME = re.compile(r"[A-Za-z0-9_]+")
 IDLE, RECORDING, EXECUTING = "idle", "recording", "executing"
 
 Answer = tuple[bool, str]
-"""Success, and a message."""
+"""Response of a service: whether the request succeeded, and a message."""
 
 
 class PrimitivesNode:
-    """Learns a primitive, plans with it and executes it, by services; see docs/learning.md.
+    """Offers services that record demonstrations, learn a primitive, plan motions and execute them.
+
+    See docs/learning.md.
 
     Raises:
-        ConfigError: If the configuration is wrong.
+        ConfigError: If the configuration is invalid.
     """
 
     def __init__(self) -> None:
@@ -198,7 +200,7 @@ class PrimitivesNode:
         for index, name in enumerate(trajectory.space.names):
             lower, upper = self._config.bounds.get(name, (-math.inf, math.inf))
             column = trajectory.positions[:, index]
-            for value in (column[-1], column.min(), column.max()):  # an error in the goal is reported first
+            for value in (column[-1], column.min(), column.max()):  # the last point first: the goal may be wrong
                 if not lower <= value <= upper:
                     subject = f"goal: {name}" if value == column[-1] else name
                     raise PlanError(subject, f"positions from {lower:g} to {upper:g}", f"{value:.4g}")
@@ -283,7 +285,7 @@ class PrimitivesNode:
             output(state)
 
     def _end(self, message: str) -> None:
-        """Ends the execution; the last point is sent at rest."""
+        """Ends the execution, and sends the last point once more, with velocity 0."""
         assert self._execution is not None
         last = self._execution.state
         self._execution = None
@@ -315,7 +317,11 @@ class PrimitivesNode:
             )
 
     def _tried(self, action: Callable[[], str]) -> Answer:
-        """Returns the response of a service whose action returns a message, or raises an error."""
+        """Runs the action of a service, publishes the state, and returns the response.
+
+        Args:
+            action: Function that returns the message for success, or raises an error.
+        """
         with self._lock:
             try:
                 success, self._message = True, action()

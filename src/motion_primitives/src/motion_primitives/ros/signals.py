@@ -1,4 +1,4 @@
-"""Signals of demonstrations and of executed motions: TF, joints, bare numbers."""
+"""Sources of demonstrations (TF or joint states), and outputs of executed motions (TF, joint targets or numbers)."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ QUEUE_SIZE = 10
 
 
 class Source(Protocol):
-    """Reads points, now and from bags."""
+    """Reads points of demonstrations, live from ROS or from a bag."""
 
     def poll(self) -> None:
-        """Records a sample if there is a new one; called at the rate of the node."""
+        """Records a sample if a new transform is available. The node calls this method at its rate while recording."""
 
     def present(self) -> Array | None:
-        """Returns the present point, None if there is none yet."""
+        """Returns the present point; None before the first message."""
 
     def of_bag(self, path: str) -> Demonstration:
-        """Returns the demonstration in a bag; raises an InterfaceError if there is none."""
+        """Reads a demonstration from a bag; raises an InterfaceError if the bag does not contain the signals."""
 
 
 Record = Callable[[float, Array], None]
-"""Called with time [s] and point of each sample."""
+"""Function that is called with the time [s] and the point of each sample."""
 
 
 class TfSource:
-    """The pose of a TF frame; a transform whose stamp has not changed is no new sample."""
+    """Source that reads the pose of a TF frame. A transform is a new sample only if its stamp has increased."""
 
     def __init__(self, config: FrameSource, tf: TfInterface, record: Record) -> None:
         self._config, self._tf, self._record = config, tf, record
@@ -76,13 +76,13 @@ class TfSource:
         return None if found is None else found[1]
 
     def of_bag(self, path: str) -> Demonstration:
-        """Returns the demonstration in a bag, see `Source`."""
+        """Reads a demonstration from a bag, see `Source`."""
         table = bag_to_dataframes(path, TF)[TF]
         return Demonstration.of_frame(table, self._config.parent, self._config.child, self._config.orientation)
 
 
 class JointsSource:
-    """Positions of joints, from each joint state."""
+    """Source that reads joint positions from every joint state message."""
 
     def __init__(self, config: JointSource, record: Record) -> None:
         self._config, self._record = config, record
@@ -97,20 +97,26 @@ class JointsSource:
             self._record(stamp.to_sec(), point)
 
     def poll(self) -> None:
-        """Does nothing: each joint state is recorded when it arrives."""
+        """Does nothing, since each joint state is recorded when its message arrives."""
 
     def present(self) -> Array | None:
         """Returns the present point, see `Source`."""
         return self._present
 
     def of_bag(self, path: str) -> Demonstration:
-        """Returns the demonstration in a bag, see `Source`."""
+        """Reads a demonstration from a bag, see `Source`."""
         topic = rospy.resolve_name(self._config.topic)
         return Demonstration.of_joints(bag_to_dataframes(path, topic)[topic], self._config.names)
 
 
 def source_of(config: SourceConfig, tf: TfInterface, record: Record) -> Source:
-    """Returns the source of a configuration."""
+    """Makes the source that is configured: TF or joints.
+
+    Args:
+        config: The configuration.
+        tf: Interface to TF.
+        record: Function that the source calls with each sample.
+    """
     if config.joints is not None:
         return JointsSource(config.joints, record)
     assert config.tf is not None
@@ -118,11 +124,11 @@ def source_of(config: SourceConfig, tf: TfInterface, record: Record) -> Source:
 
 
 Output = Callable[[MotionState], None]
-"""Publishes a state."""
+"""Function that publishes the state of an executed motion."""
 
 
 def outputs_of(config: OutputConfig, space: Space, tf: TfInterface) -> list[Output]:
-    """Returns the outputs of a configuration."""
+    """Makes the outputs that are configured, see `OutputConfig`."""
     found: list[Output] = []
     if config.tf is not None:
         found.append(_frame(config.tf, tf))
