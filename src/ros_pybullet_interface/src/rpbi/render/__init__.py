@@ -1,5 +1,6 @@
-"""Camera images, made in a process of their own: PyBullet would block the simulator while it renders.
+"""Draws camera images in a process of its own, since PyBullet would block the simulator while it renders.
 
-`client` is the simulator's side. Everything else runs in the renderer process (`python -m rpbi.render`): it rebuilds
-the world from the load log (`mirror`), draws it (`renderers`) and passes the frames to a sink (`frame`).
+The module `client` runs in the simulator. The other modules run in the renderer process (`python -m rpbi.render`). That
+process rebuilds the world from the load log (`mirror`), draws it (`renderers`) and passes the frames to a sink
+(`frame`).
 """

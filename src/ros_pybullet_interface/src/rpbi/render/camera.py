@@ -1,9 +1,9 @@
-"""Pinhole cameras: the matrices for a renderer, K for ROS, and depth in metres.
+"""Pinhole cameras: projection and view matrices for a renderer, K for ROS, and depth in metres.
 
-Frames and pixels. The optical frame has x to the right, y down and z forward, as in ROS; the renderer's eye
-frame (OpenGL) has y up and looks along -z. Pixel coordinates are those of ROS and OpenCV: (u, v) = (0, 0) is
-the *centre* of the first pixel, the image spans [-0.5, width - 0.5] x [-0.5, height - 0.5], and so a camera
-without offset has its principal point at ((width - 1) / 2, (height - 1) / 2).
+The optical frame has x to the right, y down and z forward, as in ROS. The renderer's eye frame (OpenGL) has x to the
+right, y up and z backward. Pixel coordinates follow ROS and OpenCV: (u, v) = (0, 0) is the *centre* of the first pixel,
+and the image spans [-0.5, width - 0.5] x [-0.5, height - 0.5]. The principal point of a centred camera is therefore
+((width - 1) / 2, (height - 1) / 2).
 """
 
 import math
@@ -26,14 +26,14 @@ OPTICAL_TO_EYE = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Image size, opening and depth range of a pinhole camera with square pixels.
+    """Image size, field of view and depth range of a pinhole camera with square pixels.
 
     Attributes:
-        width_px: Columns of the image.
-        height_px: Rows of the image.
-        fov_deg: Vertical opening, from the upper edge of the first row to the lower edge of the last [deg].
+        width_px: Number of columns of the image.
+        height_px: Number of rows of the image.
+        fov_deg: Vertical field of view, from the upper edge of the first row to the lower edge of the last row [deg].
         near_m: Nearest depth that is drawn, along the optical axis [m].
-        far_m: Farthest depth [m], which is also the value of empty pixels.
+        far_m: Farthest depth that is drawn [m]; background pixels have this depth.
     """
 
     width_px: int = 640
@@ -44,7 +44,7 @@ class Intrinsics:
 
     @property
     def projection(self) -> Array:
-        """The 4x4 matrix from the eye frame to clip space, as OpenGL defines it."""
+        """The 4x4 OpenGL projection matrix, from the eye frame to clip space."""
         near, far = self.near_m, self.far_m
         scale = 1.0 / math.tan(math.radians(self.fov_deg) / 2.0)
         matrix = np.zeros((4, 4))
@@ -57,21 +57,21 @@ class Intrinsics:
 
     @property
     def K(self) -> Array:  # noqa: N802
-        """The 3x3 matrix from the optical frame to pixels, derived from what is really rendered."""
+        """The 3x3 camera matrix from the optical frame to pixels, derived from the projection matrix."""
         return camera_matrix(self.projection, self.width_px, self.height_px)
 
 
 def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
-    """Derives K from a projection matrix.
+    """Derives the camera matrix K from a projection matrix P.
 
-    A point (x, y, z) of the optical frame is (x, -y, -z) in the eye frame. Its clip coordinates divided by w
-    = z are (P00 x / z - P02, -P11 y / z - P12), where [-1, 1] spans the outer edges of the image and the
-    second grows upwards.
+    A point (x, y, z) in the optical frame is (x, -y, -z) in the eye frame. Dividing its clip coordinates by w = z gives
+    (P00 x / z - P02, -P11 y / z - P12). Both coordinates range from -1 to 1 between the outer edges of the image; the
+    second one points up.
 
     Args:
-        projection: 4x4 matrix from the eye frame to clip space; P00, P11, P02 and P12 matter.
-        width_px: Columns of the image.
-        height_px: Rows of the image.
+        projection: 4x4 matrix from the eye frame to clip space; only P00, P11, P02 and P12 are used.
+        width_px: Number of columns of the image.
+        height_px: Number of rows of the image.
 
     Returns:
         3x3 matrix; pixel (0, 0) is the centre of the first pixel.
@@ -84,12 +84,16 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
 
 
 def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
-    """Returns the pose of an optical frame [m] that looks from a position to a target, with the horizon level.
+    """Returns the pose in the world of an optical frame that looks at a target, with a level horizon.
 
-    A camera that looks straight up or down has the world's x axis to its right.
+    If the camera looks straight up or down, the world's x axis points to its right.
+
+    Args:
+        position: Position of the camera in the world, x, y, z [m].
+        target: Point in the world at the centre of the image, x, y, z [m].
 
     Raises:
-        ValueError: If both are the same, or one is not three finite numbers.
+        ValueError: If position and target are the same, or one of them is not three finite numbers.
     """
     eye = finite_vector(position, 3, "position")
     forward = finite_vector(target, 3, "target") - eye
@@ -106,7 +110,11 @@ def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
 
 
 def view_matrix(camera: geometry.Pose) -> Array:
-    """Returns the 4x4 matrix from the world to the eye frame, of the pose of an optical frame in the world."""
+    """Returns the 4x4 OpenGL view matrix, from the world to the eye frame.
+
+    Args:
+        camera: Pose of the optical frame in the world.
+    """
     rotation = np.reshape(pybullet.getMatrixFromQuaternion(camera.quat_xyzw), (3, 3))
     optical_from_world = np.eye(4)
     optical_from_world[:3, :3] = rotation.T
@@ -115,16 +123,16 @@ def view_matrix(camera: geometry.Pose) -> Array:
 
 
 def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> npt.NDArray[np.float32]:
-    """Turns a depth buffer into distances along the optical axis.
+    """Converts a depth buffer to distances along the optical axis.
 
-    This form keeps single precision: `1 - buffer` is exact for large depths.
+    The formula keeps single precision, since `1 - buffer` is exact for large depths.
 
     Args:
-        buffer: Depths as the renderer stores them, 0 at the near and 1 at the far plane, any shape.
-        intrinsics: The camera.
+        buffer: Depth buffer of the renderer, 0 at the near plane and 1 at the far plane, any shape.
+        intrinsics: Intrinsics of the camera, for its near and far plane.
 
     Returns:
-        Depths z of the optical frame [m], of the same shape.
+        Depths along z of the optical frame [m], same shape.
     """
     near, far = np.float32(intrinsics.near_m), np.float32(intrinsics.far_m)
     inverse = np.subtract(np.float32(1.0), buffer)
@@ -134,15 +142,15 @@ def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> 
 
 
 class DepthNoise(NamedTuple):
-    """Normally distributed noise of depths, the same at the same tick whatever was drawn before.
+    """Normally distributed noise of depths, which depends only on the seed and the tick.
 
-    Its standard deviation at depth z is `constant_m + growth_per_m z^2`: the error of triangulating cameras grows with
-    the square of the distance (K. Khoshelham and S. O. Elberink, Accuracy and Resolution of Kinect Depth Data for
+    The standard deviation at depth z is `constant_m + growth_per_m z^2`, since the error of triangulating cameras grows
+    with the square of the distance (K. Khoshelham and S. O. Elberink, Accuracy and Resolution of Kinect Depth Data for
     Indoor Mapping Applications, Sensors 12, 2012, eq. 11: 1.425e-3 / m for the Kinect).
 
     Attributes:
-        constant_m: Part of the standard deviation that is the same everywhere [m].
-        growth_per_m: Factor on the squared depth [1/m].
+        constant_m: Part of the standard deviation that does not depend on the depth [m].
+        growth_per_m: Factor of the squared depth in the standard deviation [1/m].
         seed: Seed, 0 or greater.
     """
 
@@ -154,10 +162,10 @@ class DepthNoise(NamedTuple):
         """Adds the noise of a tick to depths, in place.
 
         Args:
-            depth_m: Depths [m], any shape; those of empty pixels, `far_m`, stay as they are.
-            tick: The tick.
-            near_m: Nearest depth of the camera [m].
-            far_m: Farthest depth of the camera [m].
+            depth_m: Depths [m], any shape; background pixels, whose depth is `far_m`, do not change.
+            tick: Number of the tick.
+            near_m: Nearest depth of the camera [m]; results are clipped to it.
+            far_m: Farthest depth of the camera [m]; results are clipped to it.
         """
         generator = np.random.Generator(np.random.SFC64((self.seed, tick)))
         noise = generator.standard_normal(depth_m.shape, np.float32)
@@ -168,7 +176,7 @@ class DepthNoise(NamedTuple):
 
 
 class PointCloud:
-    """Turns the images of one camera into points, in place and all at once."""
+    """Converts the depth and colour images of one camera to points; all results share one array."""
 
     def __init__(self, intrinsics: Intrinsics) -> None:
         K = intrinsics.K
@@ -180,15 +188,16 @@ class PointCloud:
         self._rgb = self._points.view(np.uint8)[..., 12:]
 
     def of(self, depth_m: npt.NDArray[np.float32], colour: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-        """Returns the points of a frame.
+        """Converts a depth and a colour image to points.
 
         Args:
-            depth_m: Depths z [m], shape (height, width); the far plane where nothing is.
-            colour: Red, green and blue, shape (height, width, 3).
+            depth_m: Depths along the optical axis [m], shape (height, width); the far plane for background pixels.
+            colour: Red, green and blue from 0 to 255, shape (height, width, 3).
 
         Returns:
-            x, y, z in the optical frame [m] and the colour, whose four bytes are blue, green, red and 0 as PCL has
-            them; NaN in x, y and z where nothing is; shape (height, width, 4). The next call overwrites it.
+            x, y, z in the optical frame [m] and the packed colour of each pixel, shape (height, width, 4). For
+            background pixels, x, y and z are NaN. The bytes of the colour are blue, green, red and 0, as in PCL. The
+            next call overwrites the array.
         """
         z = self._points[..., 2]
         np.copyto(z, depth_m)

@@ -1,4 +1,7 @@
-"""Messages between simulator and renderer process, and the connection that carries them without waiting."""
+"""Messages between the simulator and the renderer process, and a non-blocking connection for them.
+
+The docstring of each message says who receives it.
+"""
 
 import pickle
 import select
@@ -14,36 +17,36 @@ from .frame import Camera, Demand
 
 
 class SetUp(NamedTuple):
-    """To the renderer, first of all: the cameras, and whether to try the fast renderer."""
+    """To the renderer, as the first message: the initial cameras, and whether to try the EGL renderer."""
 
     cameras: tuple[Camera, ...]
     use_egl: bool
 
 
 class CameraAdded(NamedTuple):
-    """To the renderer: there is another camera."""
+    """To the renderer: a camera was added."""
 
     camera: Camera
 
 
 class CameraRemoved(NamedTuple):
-    """To the renderer: a camera has gone."""
+    """To the renderer: the camera of this name was removed."""
 
     name: str
 
 
 class WorldChanged(NamedTuple):
-    """To the renderer: changes of the world since the last message."""
+    """To the renderer: new entries of the world's load log."""
 
     entries: tuple[LogEntry, ...]
 
 
 class DrawnScene(NamedTuple):
-    """To the renderer: a tick to draw.
+    """To the renderer: a scene to draw.
 
     Attributes:
-        sample: Where everything is.
-        body_ids: PyBullet's ids in the simulator by name, for the segmentation.
+        sample: States of all bodies and pose of the camera at one tick.
+        body_ids: PyBullet's body ids in the simulator, indexed by name, for the segmentation image.
     """
 
     sample: SceneSample
@@ -51,17 +54,17 @@ class DrawnScene(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """To the simulator: name of the renderer, `EGL` or `TinyRenderer`, with details."""
+    """To the simulator: the renderer is ready; its name is `EGL (DRIVER)` or `TinyRenderer`."""
 
     renderer: str
 
 
 class Alive(NamedTuple):
-    """To the simulator: the renderer works; twice a second, unless a frame takes longer."""
+    """To the simulator, twice a second: the renderer process is running; later if a frame takes longer to draw."""
 
 
 class SceneAccepted(NamedTuple):
-    """To the simulator: the scene of this camera is being drawn, the next one may come."""
+    """To the simulator: the renderer starts to draw the scene of this camera, and can receive the next scene."""
 
     camera: str
 
@@ -70,7 +73,7 @@ class Shown(NamedTuple):
     """To the simulator: the frame of a synchronous camera was passed to the sink, or has no viewers.
 
     Attributes:
-        camera: The camera.
+        camera: Name of the camera.
         stamp_ns: Stamp of the frame [ns].
     """
 
@@ -79,13 +82,13 @@ class Shown(NamedTuple):
 
 
 class Demanded(NamedTuple):
-    """To the simulator: demands by camera."""
+    """To the simulator: the demand for each camera's images, indexed by camera name; sent on changes."""
 
     demands: Mapping[str, Demand]
 
 
 class Report(NamedTuple):
-    """To the simulator: something for its log, at a level of `logging`."""
+    """To the simulator: a message for its log, with a level of the module `logging`."""
 
     level: int
     text: str
@@ -96,9 +99,10 @@ _CHUNK = 1 << 18
 
 
 class Channel:
-    """Sends and receives picklable objects over a connected stream socket, each with its length before it.
+    """Sends and receives picklable objects over a connected stream socket, without blocking.
 
-    Data that the other side has not received yet waits here; the sender has to bound it. It is for one thread.
+    Each object is preceded by its length. Data that the socket does not accept yet is buffered without limit, so the
+    sender must limit the amount. Only one thread may use a channel.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -110,14 +114,14 @@ class Channel:
         """Whether the other side has gone."""
 
     def send(self, item: Any) -> None:
-        """Sends an object, now or by a later `flush`."""
+        """Sends an object; data that the socket does not accept now is sent by a later `flush`."""
         data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
         self._outgoing += _LENGTH.pack(len(data))
         self._outgoing += data
         self.flush()
 
     def flush(self) -> None:
-        """Sends waiting data as far as the socket accepts it now."""
+        """Sends as much buffered data as the socket accepts now."""
         try:
             while self._outgoing and not self.closed:
                 del self._outgoing[: self._socket.send(self._outgoing)]
@@ -127,7 +131,7 @@ class Channel:
             self.closed = True
 
     def receive(self) -> list[Any]:
-        """Returns the objects that have come since the last time."""
+        """Returns the objects that have arrived since the last call."""
         try:
             while not self.closed:
                 data = self._socket.recv(_CHUNK)
@@ -140,12 +144,16 @@ class Channel:
         return self._pop_complete() if self._incoming else []
 
     def wait(self, timeout_s: float | None) -> None:
-        """Waits until there is something to receive, or to send on, up to a time [s]."""
+        """Waits until data has arrived, or buffered data can be sent.
+
+        Args:
+            timeout_s: Longest wait [s]; None waits without limit.
+        """
         if not self.closed:
             select.select([self._socket], [self._socket] if self._outgoing else [], [], timeout_s)
 
     def close(self) -> None:
-        """Ends the connection; the other side sees it."""
+        """Closes the connection, which the other side notices."""
         self.closed = True
         self._socket.close()
 

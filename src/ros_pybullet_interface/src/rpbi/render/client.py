@@ -1,4 +1,4 @@
-"""The simulator's side of the renderer process."""
+"""Starts the renderer process from the simulator, and exchanges messages with it."""
 
 import logging
 import os
@@ -36,22 +36,23 @@ LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
 STOP_TIMEOUT_S = 5.0
 SILENT_AFTER_S = 5.0
-"""Longest time without a message of a renderer that is up [s]; beyond it, it is reported."""
+"""Longest time without a message from a renderer that is ready [s]; beyond it, a warning is logged."""
 
 
 class RenderClient:
-    """Runs a renderer process and sends it scenes, waiting for it only on request.
+    """Runs the renderer process and sends scenes to it; only `wait` and `stop` wait for the process.
 
-    All methods are for the simulation thread. At most one scene per camera is under way; as long as the
-    renderer has not accepted it, newer ones replace each other here. The process starts with the first camera.
+    The process starts with the first camera. For each camera, at most one scene is on its way to the renderer; until
+    the renderer accepts that scene, only the newest further scene is kept. Only the simulation thread may call the
+    methods.
 
     Args:
-        cameras: The cameras that there are from the start.
-        load_log: The world's load log, which may grow at any time; the process gets all of it.
-        body_ids: Returns PyBullet's body ids by name.
-        sink: `module:factory` of the receiver of frames in the other process (see `frame.Sink`).
-        arguments: Further arguments of the process, for the sink.
-        use_egl: Whether to try the fast renderer at all.
+        cameras: The initial cameras.
+        load_log: The world's load log, which may grow at any time; the process gets all entries.
+        body_ids: Returns the simulator's PyBullet ids of all bodies, indexed by name.
+        sink: Factory of the object that receives frames in the renderer process, as `module:factory`; see `frame.Sink`.
+        arguments: Further command-line arguments of the process, for the sink.
+        use_egl: Whether to try the fast EGL renderer before the software renderer.
     """
 
     def __init__(
@@ -93,11 +94,14 @@ class RenderClient:
 
     @property
     def process_id(self) -> int | None:
-        """The renderer's process id, None while there is none."""
+        """Id of the renderer process; None while it is not running."""
         return None if self._process is None else self._process.pid
 
     def poll(self) -> None:
-        """Starts the process, receives its messages, and restarts it; call it at every pass of the loop."""
+        """Starts the process if necessary, also after a failure, and handles its messages.
+
+        Call this method in every pass of the simulation loop.
+        """
         if self._channel is None:
             if self._process is not None:
                 self._bury()
@@ -131,54 +135,64 @@ class RenderClient:
             self._channel.send(CameraRemoved(name))
 
     def knows_demand(self, name: str) -> bool:
-        """Returns whether the demand for a camera is known; only once the process is up."""
+        """Returns whether the renderer process has reported the demand for a camera's images."""
         return name in self._demands
 
     def has_shown(self, name: str, stamp_ns: int) -> bool:
-        """Returns whether the frame of that stamp, the last of a synchronous camera, was passed on."""
+        """Returns whether the newest frame of a synchronous camera that was passed to the sink has the given stamp.
+
+        A frame without viewers counts as passed to the sink.
+
+        Args:
+            name: The camera.
+            stamp_ns: Stamp of the scene [ns].
+        """
         return self._shown_ns.get(name) == stamp_ns
 
     @property
     def is_up(self) -> bool:
-        """Whether a process runs."""
+        """Whether the simulator is connected to a renderer process."""
         return self._channel is not None
 
     def wait(self, timeout_s: float) -> None:
-        """Waits for a message of the process up to a time [s]."""
+        """Waits for a message from the process, for at most `timeout_s`."""
         if self._channel is None:
             time.sleep(min(timeout_s, 0.01))
         else:
             self._channel.wait(timeout_s)
 
     def send(self, sample: SceneSample) -> None:
-        """Queues a scene to be drawn; a newer one replaces it if the renderer is not ready in time."""
+        """Sends a scene to the renderer; if the renderer has not accepted the last one, keeps the scene until then.
+
+        A newer scene of the same camera replaces a kept one.
+        """
         self._waiting[sample.name] = DrawnScene(sample, dict(self._body_ids()))
         self._send_waiting(sample.name)
 
     def serve_late(self) -> None:
-        """Draws the last scenes again for new viewers, while the world is stopped."""
+        """Sends the last scenes of cameras with new viewers to the renderer again, while the world is stopped."""
         for name, scene in self._last.items():
             if self._demands.get(name, NO_DEMAND).seen > self._served.get(name, 0):
                 self._waiting.setdefault(name, scene)
                 self._send_waiting(name)
 
     def forget_scenes(self) -> None:
-        """Drops the scenes that were not drawn yet or might be drawn again."""
+        """Drops the scenes that wait to be sent, and those kept for new viewers."""
         self._waiting.clear()
         self._last.clear()
 
     def forget_body(self, name: str) -> None:
-        """Removes a body from waiting scenes: the next of its name may be different."""
+        """Deletes a body from the stored scenes, since a later body of the same name may differ."""
         for scenes in (self._waiting, self._last):
             for camera, scene in scenes.items():
                 bodies = tuple(body for body in scene.sample.bodies if body.name != name)
                 scenes[camera] = scene._replace(sample=scene.sample._replace(bodies=bodies))
 
     def stop(self) -> bool:
-        """Ends the process, and waits for that for a moment.
+        """Ends the process, and kills it if it does not end within STOP_TIMEOUT_S.
 
         Returns:
-            False if it had to be killed.
+            False if the process was killed.
         """
         was_killed = False
         if self._channel is not None:
@@ -211,7 +225,11 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Reports a process that stops sending, and when it sends again."""
+        """Logs a warning when the process stops sending messages, and when it sends messages again.
+
+        Args:
+            is_heard: Whether a message has arrived, or the renderer is not ready yet.
+        """
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s
@@ -225,7 +243,7 @@ class RenderClient:
             log.warning("camera: %s: no images for %g s", self.fault, SILENT_AFTER_S)
 
     def _bury(self) -> None:
-        """Reports the end of the process, and decides when to restart it and with which renderer."""
+        """Logs that the process has ended, and decides when to restart it and whether to try EGL again."""
         assert self._process is not None
         code = self._process.poll()
         if code is None:
@@ -245,7 +263,7 @@ class RenderClient:
         self.renderer = self.fault = ""
 
     def _forget(self) -> None:
-        """Resets the data about the process."""
+        """Clears all data about the process, before a new process starts."""
         self.wanted = frozenset()
         self._demands: dict[str, Demand] = {}
         self._unread = LoadLogReader(self._log)

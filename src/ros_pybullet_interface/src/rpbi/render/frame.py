@@ -1,4 +1,4 @@
-"""Frames of the renderer process, and the demand for them."""
+"""Cameras and frames in the renderer process, the demand for images, and the interface of sinks."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .camera import DepthNoise, Intrinsics
 
 
 class Camera(NamedTuple):
-    """A camera for the renderer.
+    """A camera, as the renderer process needs it.
 
     Attributes:
-        name: Its unique name.
-        frame_id: TF frame of its optical frame.
-        intrinsics: Its intrinsics.
-        topic_name: Its name in topics, which need not be its own.
-        pointcloud: Whether point clouds may be asked for.
-        synchronous: Whether the simulation waits for its frames, so that none may be dropped.
-        noise: Noise of its depths, None for exact ones.
+        name: Unique name of the camera.
+        frame_id: Name of the camera's optical frame on TF.
+        intrinsics: Intrinsics of the camera.
+        topic_name: Name of the camera in topics, which may differ from `name`.
+        pointcloud: Whether the camera has a point cloud topic.
+        synchronous: Whether the simulation waits for every frame; otherwise frames may be dropped.
+        noise: Noise of the depth image; None for exact depths.
     """
 
     name: str
@@ -37,7 +37,12 @@ class Camera(NamedTuple):
 
     @classmethod
     def of(cls, config: RgbdSensorConfig, topic_name: str = "") -> Camera:
-        """Returns the camera that a YAML describes."""
+        """Returns the camera for a camera configuration.
+
+        Args:
+            config: Configuration from YAML.
+            topic_name: Name of the camera in topics.
+        """
         size = config.intrinsics
         noise = None
         if config.depth_noise_m or config.depth_noise_growth_per_m:
@@ -55,16 +60,15 @@ class Camera(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Images of a camera at one tick; None for those without demand.
+    """Images of a camera at one tick; images without demand are None.
 
     Attributes:
         camera: The camera.
-        tick: The tick shown.
-        stamp_ns: Its stamp [ns].
-        colour: Red, green and blue, shape (height, width, 3), uint8.
-        depth: Distance along the optical axis [m], shape (height, width), float32; the far plane where
-            nothing is.
-        segmentation: Body ids of the simulator, -1 where nothing is, shape (height, width), int32.
+        tick: Number of the tick.
+        stamp_ns: Stamp of the tick [ns].
+        colour: Red, green and blue from 0 to 255, shape (height, width, 3), uint8.
+        depth: Distances along the optical axis [m], shape (height, width), float32; the far plane for background.
+        segmentation: Body ids in the simulator, shape (height, width), int32; -1 for background.
     """
 
     camera: Camera
@@ -76,12 +80,12 @@ class Frame(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Demand for the images of a camera.
+    """The streams of a camera that have viewers.
 
     Attributes:
-        streams: Streams with viewers, out of `colour`, `jpeg` (which needs colour), `depth`, `segmentation`, `points`
-            (which need colour and depth) and `info`.
-        seen: Number of viewers so far; when it grows, one is new.
+        streams: Streams with viewers, a subset of `colour`, `jpeg`, `depth`, `segmentation`, `points` and `info`. For
+            `jpeg`, the colour image is drawn; for `points`, colour and depth.
+        seen: Number of viewers that have ever connected; an increase means that there is a new viewer.
     """
 
     streams: frozenset[str] = frozenset()
@@ -92,22 +96,22 @@ NO_DEMAND = Demand()
 
 
 class Sink(Protocol):
-    """Receives the frames, in the renderer process.
+    """Receives frames in the renderer process, for instance to publish or store them.
 
-    A sink is made by a factory: `--sink module:factory`.
+    The argument `--sink module:factory` names the function that creates the sink.
     """
 
     def add(self, camera: Camera) -> None:
-        """Prepares for the frames of a camera."""
+        """Prepares to receive the frames of a new camera."""
 
     def remove(self, name: str) -> None:
-        """Forgets a camera."""
+        """Handles the removal of a camera."""
 
     def demands(self) -> Mapping[str, Demand]:
-        """Returns the demands by camera name; cameras left out have none."""
+        """Returns the demand for each camera's images, indexed by camera name; missing cameras have no viewers."""
 
     def write(self, frame: Frame) -> None:
-        """Receives a frame; it must not block, unless the camera is synchronous."""
+        """Receives a frame; may block only if the camera is synchronous."""
 
     def close(self) -> None:
-        """Ends it."""
+        """Releases all resources of the sink."""

@@ -1,4 +1,4 @@
-"""The renderer's own copy of the world."""
+"""The renderer process's own copy of the world, in a PyBullet client without physics."""
 
 import logging
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -22,16 +22,17 @@ from .tessellation import FineShapes
 log = logging.getLogger(__name__)
 
 SHORTEST_STEP_S = 1e-9
-"""Length of a step with negligible motion [s]."""
+"""Length of a time step so short that bodies practically do not move [s]."""
 
 
 class SoftShapes:
     """Sets the shapes of soft bodies in a client without physics.
 
-    PyBullet draws a soft body as it was after the last step, so a new shape needs a step.
+    PyBullet draws a soft body in the shape that it had after the last step. A new shape therefore needs a step, which
+    is made so short that bodies practically do not move.
 
     Args:
-        pb: The client, whose world has just been set up.
+        pb: The client, right after its world was set up.
     """
 
     def __init__(self, pb: Client) -> None:
@@ -41,17 +42,17 @@ class SoftShapes:
             pb.setTimeStep(SHORTEST_STEP_S)
 
     def disable_physics(self, body: Body) -> None:
-        """Disables collisions and forces of a new body."""
+        """Disables the collisions and removes the anchors of a new body, if the world has soft bodies."""
         if self._pb.is_deformable:
             body.detach()
             for link in (-1, *body.joint_indices):
                 self._pb.setCollisionFilterGroupMask(body.body_id, link, 0, 0)
 
     def show(self, nodes: Sequence[tuple[Body, Sequence[Vector]]]) -> None:
-        """Moves the corners of soft bodies; rigid bodies must be placed afterwards.
+        """Moves the nodes of soft bodies; the caller must set the poses of rigid bodies afterwards.
 
         Args:
-            nodes: Soft bodies and the places of all of their simulated corners [m].
+            nodes: Each soft body, with the positions of all its simulated nodes in the world [m].
         """
         for body, places in nodes:
             self._pb.resetMeshData(body.body_id, places)
@@ -59,7 +60,10 @@ class SoftShapes:
 
 
 class Mirror:
-    """A world without physics, built from the load log and posed from scenes."""
+    """A copy of the simulator's world without physics.
+
+    Its bodies are built from the load log, and their poses are set from scenes.
+    """
 
     def __init__(self, pb: Client) -> None:
         self._pb = pb
@@ -71,11 +75,11 @@ class Mirror:
 
     @property
     def transparent(self) -> tuple[TransparentShape, ...]:
-        """The transparent shapes."""
+        """All transparent shapes of the world."""
         return self._transparency.shapes
 
     def apply(self, entry: LogEntry) -> None:
-        """Applies an entry of the load log; on failure, the body is missing in images."""
+        """Applies an entry of the load log; if that fails, logs a warning, and images do not show the body."""
         if entry.what == "physics":
             return  # no physics here
         if entry.what == "world":
@@ -94,11 +98,11 @@ class Mirror:
         self._transparency.update({body.body_id for body in self._bodies.values()})
 
     def close(self) -> None:
-        """Deletes the files that it made."""
+        """Deletes the mesh files that were written for simple shapes."""
         self._fine_shapes.close()
 
     def _as_drawn(self, entry: LogEntry) -> LogEntry:
-        """Returns the entry with the shape that is to be drawn."""
+        """Returns the entry with its visual shape replaced by the mesh to draw, see `FineShapes`."""
         if entry.what != "add":
             return entry
         kind, config = entry.arguments
@@ -109,7 +113,7 @@ class Mirror:
         return entry._replace(arguments=(kind, drawn))
 
     def show(self, states: Iterable[BodyState]) -> None:
-        """Sets all bodies to their states in the simulator."""
+        """Sets all bodies to the given states of the simulator."""
         states = tuple(states)
         soft = [state for state in states if state.nodes and state.name in self._bodies]
         if any(self._shown.get(state.name) != state for state in soft):
@@ -120,13 +124,13 @@ class Mirror:
                 self.pose(state)
 
     def frame(self, renderer: Renderer, scene: DrawnScene, camera: Camera, streams: Collection[str]) -> Frame:
-        """Returns the frame of a camera for a scene.
+        """Sets the bodies to the states of a scene, draws the images of a camera, and returns them.
 
         Args:
             renderer: Renderer of this world's client.
-            scene: Poses of everything.
+            scene: States of all bodies, and pose of the camera.
             camera: The camera.
-            streams: Streams to draw, see `Demand`.
+            streams: Streams to draw, see `Demand`; for `info` alone, no images are drawn.
         """
         sample, intrinsics = scene.sample, camera.intrinsics
         frame = Frame(camera, sample.tick, sample.stamp_ns)
@@ -147,7 +151,7 @@ class Mirror:
         return frame._replace(**images)
 
     def pose(self, state: BodyState) -> None:
-        """Sets a rigid body to its state in the simulator."""
+        """Sets a rigid body to a given state of the simulator."""
         body = self._bodies.get(state.name)
         shown = self._shown.get(state.name)
         if body is None or shown == state:
@@ -165,14 +169,14 @@ class Mirror:
     def to_simulator_ids(
         self, body_ids: npt.NDArray[np.int32], simulator_ids: Mapping[str, int]
     ) -> npt.NDArray[np.int32]:
-        """Translates a segmentation from this client's body ids to the simulator's.
+        """Translates a segmentation image from this client's body ids to the simulator's.
 
         Args:
-            body_ids: Ids in this client, -1 where nothing is; any shape.
-            simulator_ids: Ids in the simulator, by name.
+            body_ids: Body ids in this client, -1 for background; any shape.
+            simulator_ids: Body ids in the simulator, indexed by name.
 
         Returns:
-            Ids in the simulator, -1 where nothing is or where the simulator has no such body; same shape.
+            Body ids in the simulator, same shape; -1 for background and for bodies that the simulator lacks.
         """
         own = {body.body_id: simulator_ids.get(name, -1) for name, body in self._bodies.items()}
         table = np.full(max(own, default=-1) + 2, -1, np.int32)

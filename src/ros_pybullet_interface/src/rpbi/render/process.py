@@ -31,17 +31,23 @@ from .renderers import Renderer, open_renderer
 log = logging.getLogger(__name__)
 
 DEMAND_PERIOD_S = 0.05
-"""Period of checks for viewers of the images [s]."""
+"""Period of checks which images have viewers [s]."""
 
 ALIVE_PERIOD_S = 0.5
-"""Period of messages that the renderer works [s]."""
+"""Period of the message `Alive` [s]."""
 
 STUCK_AFTER_S = 300.0
-"""Longest pass of the loop [s]; beyond it, a driver perhaps hangs, and the process ends itself."""
+"""Longest pass of the loop [s]; beyond it, a driver probably hangs, and the process ends itself."""
 
 
 class RenderProcess:
-    """Serves the simulator until it ends; once up, at a lower priority if requested."""
+    """Draws scenes for the simulator until the simulator ends.
+
+    Args:
+        channel: Connection to the simulator.
+        make_sink: Creates the object that receives the frames.
+        gives_way: Whether to lower the process's priority after the start.
+    """
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:
         self._channel = channel
@@ -64,13 +70,13 @@ class RenderProcess:
         }
 
     def run(self) -> None:
-        """Works until the simulator has closed the connection or ended."""
+        """Handles messages until the simulator closes the connection or ends."""
         try:
             while not self._channel.closed and os.getppid() == self._parent:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
                 messages = self._channel.receive()
                 if self._gives_way and self._sink is not None and not self._channel.closed:
-                    yield_to_simulator()  # not before it is up: on a busy machine that would take long
+                    yield_to_simulator()  # only after the start, which would take long at low priority
                     self._gives_way = False
                 for message in messages:
                     self._do[type(message)](message)
@@ -94,7 +100,7 @@ class RenderProcess:
 
     def _add(self, camera: Camera) -> None:
         assert self._renderer is not None and self._sink is not None
-        if camera.synchronous:  # physics waits for it, so it keeps its priority
+        if camera.synchronous:  # the simulation waits for its images, so the process keeps its priority
             self._gives_way = False
             run_normally(os.getpid(), self._nice)
         try:
@@ -115,7 +121,7 @@ class RenderProcess:
             self._mirror.apply(entry)
 
     def _show(self, scene: DrawnScene) -> None:
-        """Draws a scene for the streams that have viewers."""
+        """Draws the streams of a scene that have viewers, and passes the frame to the sink."""
         sample = scene.sample
         self._channel.send(SceneAccepted(sample.name))
         assert self._sink is not None
@@ -147,12 +153,12 @@ class RenderProcess:
 
 
 class ReportHandler(logging.Handler):
-    """Sends what is logged here to the simulator's log."""
+    """Sends the log messages of the renderer process to the simulator's log."""
 
     def __init__(self, channel: Channel) -> None:
         super().__init__(logging.INFO)
         self._channel = channel
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Sends a record."""
+        """Sends a log message."""
         self._channel.send(Report(record.levelno, self.format(record)))

@@ -1,4 +1,4 @@
-"""The renderers of PyBullet: the fast one by EGL, and the one in plain software that always works."""
+"""The two renderers of PyBullet: a fast one that uses OpenGL through EGL, and a software renderer that always works."""
 
 import importlib.util
 import logging
@@ -20,13 +20,13 @@ log = logging.getLogger(__name__)
 
 
 class TransparentShape(NamedTuple):
-    """A shape that is neither opaque nor invisible.
+    """A visual shape that is neither opaque nor invisible.
 
     Attributes:
-        body_id: Its body in the renderer's client.
-        link_index: Its link, -1 for the base.
-        shape_index: Its place among the shapes of that link.
-        rgba: Its colour and opacity, each from 0 to 1.
+        body_id: Id of the shape's body in the renderer's client.
+        link_index: PyBullet's index of the shape's link, -1 for the base.
+        shape_index: Index of the shape within the link.
+        rgba: Colour and opacity, each from 0 to 1.
     """
 
     body_id: int
@@ -36,9 +36,10 @@ class TransparentShape(NamedTuple):
 
 
 class Transparency:
-    """Tracks the transparent shapes of bodies that are added and removed.
+    """Lists the transparent shapes of the bodies in a client, while bodies are added and removed.
 
-    PyBullet's EGL plugin still reports the shapes of removed bodies, before those of later bodies with the same id.
+    For a body whose id was used before, PyBullet's EGL plugin also reports the shapes of the removed body, before those
+    of the new one. This class skips them.
     """
 
     def __init__(self, pb: Client) -> None:
@@ -49,7 +50,11 @@ class Transparency:
         """All transparent shapes."""
 
     def update(self, body_ids: set[int]) -> None:
-        """Updates the set of bodies."""
+        """Updates the list of transparent shapes for a new set of bodies.
+
+        Args:
+            body_ids: Ids of all bodies that exist now.
+        """
         for body_id in self._shapes_of.keys() - body_ids:
             del self._shapes_of[body_id]
             self._stale[body_id] = len(self._pb.getVisualShapeData(body_id))
@@ -70,16 +75,17 @@ class Transparency:
 
 Shapes = Sequence[TransparentShape]
 _LINK_SHIFT = 24
-"""Shift of the link in PyBullet's number of a body and a link: `body + ((link + 1) << 24)`."""
+"""Bit position of the link in PyBullet's segmentation values, which are `body + ((link + 1) << 24)`."""
 
 
 class Drawing(NamedTuple):
-    """Buffers that PyBullet drew.
+    """Images that PyBullet has drawn.
 
     Attributes:
-        rgba: Shape (height, width, 4), uint8.
-        depth_buffer: Shape (height, width), float32; 0 at the near and 1 at the far plane.
-        body_ids: Ids in the client that drew, -1 where nothing is; int32. Without meaning if not asked for.
+        rgba: Colour and alpha from 0 to 255, shape (height, width, 4), uint8.
+        depth_buffer: Depth, 0 at the near plane and 1 at the far plane, shape (height, width), float32.
+        body_ids: Body ids in the renderer's client, -1 for background, shape (height, width), int32. Undefined if
+            `draw` was called without `segmentation`.
     """
 
     rgba: npt.NDArray[np.uint8]
@@ -88,21 +94,21 @@ class Drawing(NamedTuple):
 
 
 class Renderer(Protocol):
-    """Draws the bodies of its client.
+    """Draws the bodies of a PyBullet client.
 
-    A transparent shape tints what is behind it in the colours; depth and segmentation are of the shape itself, so that
-    all images of a frame show the same bodies.
+    In the colour image, objects behind a transparent shape are visible through it. The depth and segmentation images
+    show the transparent shape itself.
 
     Attributes:
-        name: Its name, for people.
-        pb: The client, empty at first.
+        name: Name of the renderer, for logs and diagnostics.
+        pb: The client, which is empty at first.
     """
 
     name: str
     pb: Client
 
     def make_room(self, intrinsics: Intrinsics) -> None:
-        """Prepares for a camera that is new."""
+        """Prepares to draw images of a new camera's size."""
 
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
@@ -110,19 +116,19 @@ class Renderer(Protocol):
         """Draws the image of a camera.
 
         Args:
-            intrinsics: The camera.
-            camera: Pose of its optical frame in the world.
-            segmentation: Whether to draw body ids, in a second pass.
-            transparent: The transparent shapes, which need a second pass too.
+            intrinsics: Intrinsics of the camera.
+            camera: Pose of the camera's optical frame in the world.
+            segmentation: Whether to draw body ids.
+            transparent: All transparent shapes in the client.
         """
 
 
 class TinyRenderer:
     """PyBullet's software renderer.
 
-    It samples each pixel at its upper left corner, not at its centre, and the rows a pixel lower, so its
-    image would be half a pixel to the right and up of that by K. The projection is shifted by as much the
-    other way.
+    PyBullet samples each pixel at its upper left corner instead of its centre, and each row one pixel too low. The
+    image would therefore be shifted half a pixel to the right and half a pixel up from the image that K describes.
+    `draw` shifts the projection by the same amount in the opposite direction.
     """
 
     name = "TinyRenderer"
@@ -136,10 +142,10 @@ class TinyRenderer:
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
-        """Draws the image of a camera; segmentation costs nothing extra here.
+        """Draws the image of a camera.
 
-        It draws transparent shapes as if they were opaque, so they are blended with a second image without them. Glass
-        behind glass does not show.
+        The renderer draws transparent shapes as if they were opaque. This method therefore draws a second image without
+        them and blends both. A transparent shape behind another one is not visible.
         """
         projection = intrinsics.projection
         projection[0, 2] += 1.0 / intrinsics.width_px
@@ -168,12 +174,15 @@ class TinyRenderer:
 
 
 class EglRenderer:
-    """OpenGL without a screen, on the graphics card or, by Mesa's llvmpipe, on all cores.
+    """Draws with OpenGL without a screen: on the graphics card, or on all processor cores with Mesa's llvmpipe.
 
-    All its calls must come from the thread that made it.
+    Only the thread that created the object may call its methods.
+
+    Args:
+        cameras: The initial cameras, at least one; the largest determines the size of the drawing surface.
 
     Raises:
-        EglError: If it cannot be loaded or does not draw as it should. Some failures end the process instead.
+        EglError: If EGL cannot be loaded or draws a wrong test image. Some failures end the process instead.
     """
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
@@ -194,10 +203,10 @@ class EglRenderer:
         _check(self)
 
     def make_room(self, intrinsics: Intrinsics) -> None:
-        """Makes the surface that is drawn to large enough.
+        """Enlarges the drawing surface, if it is too small for a camera.
 
         Raises:
-            EglError: If EGL has none of that size.
+            EglError: If EGL cannot create a surface of that size.
         """
         width_px, height_px = max(self._width_px, intrinsics.width_px), max(self._height_px, intrinsics.height_px)
         if (width_px, height_px) != (self._width_px, self._height_px):
@@ -209,8 +218,8 @@ class EglRenderer:
     ) -> Drawing:
         """Draws the image of a camera.
 
-        The colours' pass leaves transparent shapes out of the depth buffer, that of the segmentation does not, and what
-        it leaves there can be read.
+        PyBullet's colour pass does not write transparent shapes to the depth buffer, but its segmentation pass does.
+        With transparent shapes, the depth is therefore read after the segmentation pass.
         """
         both = segmentation or bool(transparent)
         flags = 0 if both else self.pb.ER_NO_SEGMENTATION_MASK
@@ -222,7 +231,12 @@ class EglRenderer:
 
 
 def open_renderer(cameras: Sequence[Camera], use_egl: bool = True) -> Renderer:
-    """Returns the fastest renderer that works, with a client of its own."""
+    """Creates the fastest renderer that works on this machine, with its own PyBullet client.
+
+    Args:
+        cameras: The initial cameras; without cameras, the software renderer is used.
+        use_egl: Whether to try EGL.
+    """
     if use_egl and cameras:
         try:
             return EglRenderer(cameras)
@@ -242,14 +256,14 @@ def _draw(pb: Client, intrinsics: Intrinsics, projection: Any, camera: Pose, **o
 
 
 def _check(renderer: Renderer, distance_m: float = 1.0) -> None:
-    """Renders a red wall that fills the view, and checks the image."""
+    """Draws a red wall that fills the view, and raises an EglError if the image is wrong."""
     pb = renderer.pb
     shape = pb.createVisualShape(pb.GEOM_BOX, halfExtents=[1.0, 1.0, 0.1], rgbaColor=[1.0, 0.0, 0.0, 1.0])
     wall = pb.createMultiBody(0.0, -1, shape, [0.0, 0.0, distance_m + 0.1])
     intrinsics = Intrinsics(width_px=64, height_px=48, near_m=0.1, far_m=10.0)
     drawing = renderer.draw(intrinsics, Pose())
     pb.removeBody(wall)
-    renderer.draw(intrinsics, Pose())  # else the wall's shadow is in the next image, the first that anybody sees
+    renderer.draw(intrinsics, Pose())  # otherwise the next image would show the wall's shadow
     red, green, blue = drawing.rgba[..., :3].reshape(-1, 3).mean(axis=0)
     problem: str | None = None
     if not (drawing.body_ids == wall).all():
