@@ -1,4 +1,4 @@
-"""Joints of a robot as PyBullet has them, and the couplings of mimic joints."""
+"""Joints of a robot with PyBullet's indices, and couplings of mimic joints."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
 
 
 _COUPLING_EFFORT = 1e6
-"""Largest effort by which a joint is made to follow another [N m or N]."""
+"""Largest effort of the constraint that makes a mimic joint follow its leader [N m or N]."""
 _COUPLING_ERP = 1.0
-"""Share of an error that is corrected in a step, relative to that of other joints."""
+"""Error reduction parameter of this constraint: share of the position error that is corrected in a step."""
 
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint, as the URDF describes it.
+    """A joint as PyBullet has read it from the URDF.
 
     Attributes:
         index: PyBullet's index of the joint and of its child link.
         name: Name of the joint.
         type: PyBullet's joint type.
         link: Name of the child link.
-        lower: Lower position limit [rad or m], -inf if there is none.
-        upper: Upper position limit [rad or m], inf if there is none.
-        max_effort: Largest torque or force [N m or N], inf if there is none.
-        max_velocity: Largest speed [rad/s or m/s], inf if there is none.
+        lower: Lower position limit [rad or m]; -inf without a limit.
+        upper: Upper position limit [rad or m]; inf without a limit.
+        max_effort: Largest torque or force [N m or N]; inf without a limit.
+        max_velocity: Largest speed [rad/s or m/s]; inf without a limit.
     """
 
     index: int
@@ -53,7 +53,10 @@ class Joint:
 
     @classmethod
     def from_info(cls, info: Sequence) -> Joint:
-        """Returns a joint from PyBullet's `getJointInfo`; 0 and inverted ranges mean that there is no limit."""
+        """Returns a joint from the result of PyBullet's `getJointInfo`.
+
+        Effort 0, velocity 0, and a lower limit that is not below the upper limit mean that there is no limit.
+        """
         limited = info[8] < info[9]
         return cls(
             index=info[0],
@@ -78,25 +81,25 @@ class Joint:
 
     @property
     def is_revolute(self) -> bool:
-        """Whether it turns about one axis."""
+        """Whether the joint turns about one axis, with or without limits."""
         return self.type == pybullet.JOINT_REVOLUTE
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it does not move at all."""
+        """Whether the joint is fixed."""
         return self.type == pybullet.JOINT_FIXED
 
     @property
     def unit(self) -> str:
-        """Unit of its position."""
+        """Unit of the joint's position: `m` or `rad`."""
         return "m" if self.type == pybullet.JOINT_PRISMATIC else "rad"
 
     def allows(self, position: float) -> bool:
-        """Returns whether a position [rad or m] is within the limits, rounding errors of limits in degrees aside."""
+        """Returns whether a position [rad or m] is within the limits, with a tolerance for rounded limits."""
         return self.lower - LIMIT_ROUNDING <= position <= self.upper + LIMIT_ROUNDING
 
     def nearest_allowed(self, position: float) -> float:
-        """Returns the position within the limits that is nearest to one [rad or m]."""
+        """Returns a position [rad or m], clipped to the limits."""
         return min(max(position, self.lower), self.upper)
 
     def limit_violation(self, position: float) -> str:
@@ -106,17 +109,17 @@ class Joint:
 
     @property
     def is_driven(self) -> bool:
-        """Whether it has one axis that a motor can move."""
+        """Whether the joint is revolute or prismatic, so that a motor can move it."""
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
 
 
 class Coupling(NamedTuple):
-    """Relation of a joint to the one that it follows: its position is `multiplier` times the leader's, plus `offset`.
+    """Relation of a mimic joint to its leader: position = multiplier * (position of the leader) + offset.
 
     Attributes:
-        leader: Index of the joint that it follows, which follows no other.
-        multiplier: Its velocity over that of the leader.
-        offset: Its position where that of the leader is 0 [rad or m].
+        leader: PyBullet's index of the leader, which is not a mimic joint itself.
+        multiplier: Ratio of the mimic joint's velocity to the leader's velocity.
+        offset: Position of the mimic joint when the leader's position is 0 [rad or m].
     """
 
     leader: int
@@ -125,21 +128,23 @@ class Coupling(NamedTuple):
 
 
 class JointModel:
-    """The joints of one robot, by index and by name.
+    """The joints of one robot, accessible by PyBullet's index and by name.
 
     Args:
-        joints: All joints in PyBullet's index order.
-        base_joints: Number of the first joints, which move its base and are not the robot's own.
-        mimics: Mimic joints by name.
+        joints: All joints in the order of PyBullet's indices.
+        base_joints: Number of joints at the beginning of `joints` that move the robot's base. These joints are not part
+            of the robot itself.
+        mimics: Mimic joints, indexed by name.
 
     Attributes:
-        own: All of its own joints.
-        moving: Those that have one axis.
-        couplings: Couplings of mimic joints, by index.
-        driven: Those of one axis that are no mimic joints: motors drive them.
+        joints: All joints, including the joints that move the base.
+        own: Joints of the robot itself.
+        moving: The revolute and prismatic joints in `own`.
+        couplings: Couplings of mimic joints, indexed by PyBullet's joint index.
+        driven: The joints in `moving` that are not mimic joints, so that motors drive them.
 
     Raises:
-        ValueError: If a joint cannot follow another; it names the joint.
+        ValueError: If a mimic joint cannot follow its leader; the message names the joint.
     """
 
     def __init__(
@@ -156,12 +161,12 @@ class JointModel:
 
     @cached_property
     def by_driven(self) -> AffineMap:
-        """The map from the driven joints to those that have one axis."""
+        """Affine map from positions of the joints in `driven` to positions of the joints in `moving`."""
         names, driven = ([joint.name for joint in joints] for joints in (self.moving, self.driven))
         return AffineMap.of(names, driven, self._mimics)
 
     def __getitem__(self, name: str) -> Joint:
-        """Returns a joint by name.
+        """Returns the joint with a given name.
 
         Raises:
             UnknownNameError: If the robot has no such joint.
@@ -172,7 +177,7 @@ class JointModel:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
     def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
-        """Returns the coupling of a joint to the joint that it finally follows."""
+        """Returns the coupling of a mimic joint to its leader, the last joint in a chain of mimic joints."""
         leader, multiplier, offset = followed(name, mimics)
         if leader not in self._by_name or not self[leader].is_driven:
             movable = ", ".join(joint.name for joint in self.moving)
@@ -182,7 +187,10 @@ class JointModel:
         return Coupling(self[leader].index, multiplier, offset)
 
     def effort_limit(self, joint: Joint) -> float:
-        """Returns the largest effort of a joint's motor [N m or N], which works for the joints that follow it, too."""
+        """Returns the largest effort of a driven joint's motor [N m or N].
+
+        The motor also drives the mimic joints that follow the joint, so their largest efforts are added.
+        """
         return joint.max_effort + sum(
             abs(multiplier) * self.joints[index].max_effort
             for index, (leader, multiplier, _) in self.couplings.items()
@@ -190,7 +198,16 @@ class JointModel:
         )
 
     def with_mimic_joints(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
-        """Returns positions by joint index, with those of the joints that follow them; velocities without `offsets`."""
+        """Adds the values of mimic joints to values of their leaders.
+
+        Args:
+            positions: Values of joints, indexed by PyBullet's joint index: positions [rad or m], or with `offsets`
+                False velocities.
+            offsets: Whether to add the offsets of couplings, which apply to positions only.
+
+        Returns:
+            The given values and the values of the mimic joints that follow these joints.
+        """
         followers = {
             index: multiplier * positions[leader] + (offset if offsets else 0.0)
             for index, (leader, multiplier, offset) in self.couplings.items()
@@ -199,13 +216,17 @@ class JointModel:
         return {**positions, **followers}
 
     def resolve(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Checks values of joints and returns them by joint index.
+        """Checks values of joints, and returns the values of driven joints indexed by PyBullet's joint index.
 
-        Fixed joints and mimic joints are accepted but not driven.
+        Values of other joints, such as fixed joints and mimic joints, are accepted but left out of the result.
+
+        Args:
+            names: Names of the joints.
+            values: Value of each joint, in the order of `names`.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If lengths differ, a joint is named twice or a value is not finite.
+            ValueError: If lengths differ, a joint is named twice, or a value is not finite or too large.
         """
         if len(names) != len(values):
             raise ValueError(f"expected one value for each of the {len(names)} joints named, got {len(values)}")
@@ -223,11 +244,11 @@ class JointModel:
         return resolved
 
     def resolve_driven(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Does the same as `resolve`, and refuses joints that no motor can move.
+        """Checks and converts values as `resolve` does, and also requires that at least one joint is driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: If lengths differ, a joint is named twice or cannot be driven, or a value is not finite.
+            ValueError: See `resolve`; also if joints are named, but all of them are not driven.
         """
         resolved = self.resolve(names, values)
         if names and not resolved:
@@ -240,16 +261,20 @@ class JointModel:
         return joint.type_name if coupling is None else f"follows '{self.joints[coupling.leader].name}'"
 
     def check_limits(self, positions: Mapping[int, float]) -> None:
-        """Checks positions [rad or m] by joint index.
+        """Checks that positions [rad or m], indexed by PyBullet's joint index, are within the joint limits.
 
         Raises:
-            ValueError: If one is outside its joint's limits; it names all that are.
+            ValueError: If a position is outside the limits; the message names all such positions.
         """
         if beyond := self.limit_violations(positions):
             raise ValueError("; ".join(beyond))
 
     def limit_violations(self, positions: Mapping[int, float]) -> list[str]:
-        """Returns a message about each position [rad or m], by joint index, that is outside its joint's limits."""
+        """Returns a message for each position outside the limits of its joint.
+
+        Args:
+            positions: Positions [rad or m], indexed by PyBullet's joint index.
+        """
         return [
             self.joints[index].limit_violation(position)
             for index, position in positions.items()
@@ -258,10 +283,12 @@ class JointModel:
 
 
 def couple(pb: Client, body_id: int, couplings: Mapping[int, Coupling]) -> None:
-    """Makes joints follow others in PyBullet from now on, as if by gears; their own motors are disabled.
+    """Makes mimic joints follow their leaders in PyBullet by gear constraints, and disables the mimic joints' motors.
 
     Args:
-        couplings: The coupling of each, by joint index.
+        pb: Client of the body.
+        body_id: PyBullet's id of the body.
+        couplings: Couplings, indexed by PyBullet's index of the mimic joint.
     """
     for index, (leader, multiplier, offset) in couplings.items():
         pb.setJointMotorControl2(body_id, index, pybullet.VELOCITY_CONTROL, force=0.0)

@@ -214,16 +214,23 @@ def flags_for(joints: int, flags: int) -> int:
 
     Args:
         joints: Number of joints in the URDF.
-        flags: Flags asked for.
+        flags: Flags to which the flag may be added.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
-    """Sets the moments of inertia of links for which the URDF has none or impossible ones, and scales them for a scaled
-    body.
+    """Completes the moments of inertia of a body that was loaded with the URDF's moments of inertia.
 
-    Logs warnings of moments of inertia that are impossible or far too large.
+    Lets PyBullet guess missing or impossible moments, and scales the others if the body is scaled. Logs a warning for
+    moments that are impossible or far too large.
+
+    Args:
+        pb: Client of the body.
+        name: Name of the body, for messages.
+        body_id: PyBullet's id of the body.
+        without: Names of the links that do not have an `<inertial>` element.
+        scaling: Scale of the body, `globalScaling` of PyBullet's `loadURDF`.
     """
     links = {index: pb.getJointInfo(body_id, index)[12] for index in range(pb.getNumJoints(body_id))}
     unusable, too_large = [], []

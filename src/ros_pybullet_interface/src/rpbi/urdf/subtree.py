@@ -1,4 +1,4 @@
-"""The links below a joint: their momentum, mass, and forces of contacts."""
+"""Momentum, mass and contact forces of all links below a joint."""
 
 from typing import Any, NamedTuple
 
@@ -7,19 +7,19 @@ from rpbi.engine.client import Client
 from rpbi.geometry import rotated, rotated_back
 
 LinkStates = tuple[Any, ...]
-"""Result of PyBullet's `getLinkStates` for the subtree's links, with velocities."""
+"""Result of PyBullet's `getLinkStates` with velocities, for the links of a subtree."""
 
 
 class Momentum(NamedTuple):
-    """Momentum of a subtree; all vectors have world axes.
+    """Momentum of a subtree, in world axes.
 
     Attributes:
-        origin: Origin of the first link's URDF frame [m].
-        quat_xyzw: Orientation of that frame.
-        origin_velocity: Velocity of that origin [m/s].
+        origin: Position of the origin of the first link's URDF frame in the world [m].
+        quat_xyzw: Orientation of the first link's URDF frame in the world.
+        origin_velocity: Velocity of `origin` [m/s].
         linear: Linear momentum [kg m/s].
-        angular: Angular momentum about that origin [kg m^2/s].
-        mass_moment: Mass times lever from that origin to the centre of mass [kg m].
+        angular: Angular momentum about `origin` [kg m^2/s].
+        mass_moment: Mass times the vector from `origin` to the centre of mass [kg m].
     """
 
     origin: Vector
@@ -31,13 +31,16 @@ class Momentum(NamedTuple):
 
 
 class Subtree:
-    """A link of a jointed body and all links below it.
+    """A link of a body with joints, and all links below this link in the kinematic tree.
 
     Args:
-        first_link: PyBullet's index of the link, and of the joint above it.
+        pb: Client of the body.
+        body_id: PyBullet's id of the body.
+        first_link: PyBullet's index of the first link, which is also the index of the joint above it.
 
     Attributes:
-        links: PyBullet's indices of its links.
+        links: PyBullet's indices of the subtree's links.
+        mass_kg: Mass of the subtree [kg].
     """
 
     def __init__(self, pb: Client, body_id: int, first_link: int) -> None:
@@ -50,20 +53,20 @@ class Subtree:
         self.update_dynamics()
 
     def update_dynamics(self) -> None:
-        """Reads the present masses and inertias of the links."""
+        """Reads the present masses and inertias of the links from PyBullet."""
         infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self.links]
         self._inertias = tuple((float(info[0]), info[2]) for info in infos)
         self.mass_kg = sum(mass for mass, _ in self._inertias)
 
     def states(self) -> LinkStates:
-        """Returns poses and velocities of the links."""
+        """Reads the present poses and velocities of the links from PyBullet."""
         states: LinkStates = self._pb.getLinkStates(
             self._body_id, self.links, computeLinkVelocity=1, computeForwardKinematics=1
         )
         return states
 
     def momentum(self, states: LinkStates) -> Momentum:
-        """Returns the momentum of the subtree in one of its states."""
+        """Returns the momentum of the subtree for given poses and velocities of its links."""
         origin, quat = states[0][4], states[0][5]
         linear = angular = mass_moment = (0.0, 0.0, 0.0)
         for (mass, inertia), (centre, inertial_quat, _, _, _, _, velocity, turning) in zip(self._inertias, states):
@@ -78,17 +81,21 @@ class Subtree:
         return Momentum(origin, quat, origin_velocity, linear, angular, mass_moment)
 
     def contact_wrench(self, origin: Vector) -> tuple[Vector, Vector]:
-        """Returns force [N] and moment about a point [N m], in world axes, of contacts with other links and bodies.
+        """Returns the total force [N] and moment [N m] that contacts exert on the subtree, in world axes.
 
-        They are the normal and sliding friction forces of the last step. PyBullet does not report rolling and spinning
-        friction, nor contacts with soft bodies.
+        Contacts with other links and bodies in the last step are counted, with normal and sliding friction forces.
+        PyBullet does not report rolling and spinning friction, nor contacts with soft bodies.
+
+        Args:
+            origin: Reference point of the moment, in the world [m].
         """
         force = moment = (0.0, 0.0, 0.0)
         body_id, links = self._body_id, self.links
         touching = self._pb.getContactPoints(body_id)
         if not any(touch[3] in links or (touch[2] == body_id and touch[4] in links) for touch in touching):
             return force, moment
-        # For one body, PyBullet turns normals towards it, but not friction; for all bodies, it turns nothing.
+        # If asked for the contacts of one body, PyBullet turns normals towards this body, but not friction directions.
+        # If asked for the contacts of all bodies, PyBullet turns neither.
         for touch in self._pb.getContactPoints():
             first = touch[1] == body_id and touch[3] in links
             second = touch[2] == body_id and touch[4] in links

@@ -1,4 +1,4 @@
-"""Warnings about the places of bodies and TF frames: bodies that are far away, overlap, rest on planes or roll away."""
+"""Warnings about poses of bodies and about TF frames, for instance of bodies that overlap or are far away."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,17 +19,17 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from .world import World
 
 MAX_NAMES = 3
-"""Bodies or links that a warning names; it counts the others."""
+"""Largest number of bodies or links that a warning names; further ones are only counted."""
 FAR_M = 100.0
-"""Distance from the origin, along an axis, beyond which a position is probably in millimetres."""
+"""Largest plausible coordinate of a position [m]; a larger one was probably given in millimetres."""
 TOUCHING_M = 1e-3
-"""Bodies that overlap by less only touch: PyBullet has margins around meshes."""
+"""Depth up to which overlapping bodies count as touching [m], since PyBullet adds margins to meshes."""
 HANGING_M = 0.02
-"""Gap below a body of mass 0 beyond which it hangs in the air."""
+"""Smallest gap below a body of mass 0 for a warning that the body hangs in the air [m]."""
 MAX_FALL_M = 100.0
-"""Height above a plane from which a body is expected to fall onto it."""
+"""Largest height above a plane from which a body is expected to fall onto the plane [m]."""
 LEVEL = 0.9999
-"""Cosine of the largest slope that counts as level."""
+"""Cosine of the largest slope at which a surface counts as level."""
 PLANE_ADVICE = (
     "planes lose contact points of what slides on them, and forces chatter; use a box, such as {shapeType: GEOM_BOX, "
     "halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
@@ -40,7 +40,7 @@ _ROUND = {pybullet.GEOM_SPHERE, pybullet.GEOM_CAPSULE}
 
 
 def place_warnings(world: World) -> Iterator[Problem]:
-    """Yields a warning for each body or frame that is probably not where it is meant to be."""
+    """Yields a warning for each body or TF frame whose pose is probably not intended."""
     yield from _Frames(world).warnings()
     yield from _far(world)
     yield from _overlaps(world)
@@ -69,7 +69,7 @@ def _far_message(position: Sequence[float]) -> str:
 
 
 def _rolling(world: World) -> Iterator[Problem]:
-    """Yields a warning for each ball or capsule that nothing stops on a level floor."""
+    """Yields a warning for each ball or capsule that can roll endlessly, without rolling friction, on a level floor."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     floors = [body for body in placed if is_still(body, -1) and _shape_kinds(body) in _FLAT]
     for body in placed:
@@ -86,7 +86,7 @@ def _rolling(world: World) -> Iterator[Problem]:
 
 
 def _hanging(world: World) -> Iterator[Problem]:
-    """Yields a warning for each URDF object of mass 0 that hangs in the air, where PyBullet holds it."""
+    """Yields a warning for each URDF object that hangs in the air because its mass is 0."""
     for item in world.loaded.objects:
         body, load = world.bodies[item.config.name], getattr(item.config, "loadURDF", None)
         if load is None or load.useFixedBase or not _has_place(world, body) or body.joint_indices:
@@ -101,7 +101,7 @@ def _hanging(world: World) -> Iterator[Problem]:
 
 
 def _overlaps(world: World) -> Iterator[Problem]:
-    """Yields a warning for each pair of bodies that penetrate each other, unless nothing can push them apart."""
+    """Yields a warning for each pair of overlapping bodies that PyBullet will push apart."""
     for one, other in _neighbours([body for body in world.bodies.values() if _has_place(world, body)]):
         points = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
         depths = {(point[3], point[4]): -point[8] for point in sorted(points, key=lambda point: -point[8])}
@@ -113,7 +113,7 @@ def _overlaps(world: World) -> Iterator[Problem]:
 
 
 def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
-    """Yields the pairs of bodies whose bounding boxes meet."""
+    """Yields the pairs of bodies whose bounding boxes overlap."""
     links = [[body.pb.getAABB(body.body_id, index) for index in (-1, *body.joint_indices)] for body in bodies]
     lower = np.array([np.min([box[0] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
     upper = np.array([np.max([box[1] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
@@ -123,7 +123,7 @@ def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _planes(world: World) -> Iterator[Problem]:
-    """Yields a warning for each plane on which bodies rest at the start, or onto which they fall."""
+    """Yields a warning for each plane on which bodies rest, or will rest after a fall."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     for plane in placed:
         if _shape_kinds(plane) != {pybullet.GEOM_PLANE}:
@@ -136,7 +136,7 @@ def _planes(world: World) -> Iterator[Problem]:
 
 
 def _shape_kinds(body: Body) -> set[int]:
-    """Returns PyBullet's kinds of all collision shapes of a body; in maximal coordinates PyBullet reports none."""
+    """Returns PyBullet's types of all collision shapes of a body; an empty set for a body in maximal coordinates."""
     if body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES:
         return set()
     links = (-1, *body.link_indices)
@@ -144,15 +144,18 @@ def _shape_kinds(body: Body) -> set[int]:
 
 
 def _needs_points(body: Body) -> bool:
-    """Returns whether a body can fall and slide, and rests on more than one contact point, as all but balls do."""
+    """Returns whether a body can fall, and rests on several contact points; this is assumed of all shapes but balls."""
     return not is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
 
 
 def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool:
-    """Returns whether a plane carries a body against gravity, now or once it has fallen.
+    """Returns whether a body rests on a plane or floor, or will rest on it after a fall.
 
     Args:
-        level: Least cosine of the slope.
+        world: The world.
+        plane: The plane, or another body that can be a floor.
+        body: The body that may rest on `plane`.
+        level: Smallest cosine of the slope at the nearest point of `plane`; 0 accepts every slope.
     """
     points = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
     if not points:
@@ -168,7 +171,7 @@ def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool
 
 
 def _has_place(world: World, body: Body) -> bool:
-    """Returns whether a body has collisions, and its place does not depend on a TF frame of another node."""
+    """Returns whether a body is rigid, has collisions, and does not follow a TF frame of another node."""
     is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
     return body.has_physics and not body.is_soft and is_placed
 
@@ -182,7 +185,7 @@ def _are_still(one: Body, other: Body, link: int, other_link: int) -> bool:
 
 
 class _Frames:
-    """The TF frames that a world publishes, and those that it follows."""
+    """The TF frames that a world publishes, and the TF frames that its bodies and cameras follow."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -190,7 +193,7 @@ class _Frames:
         self._followed = {slot: each for slot, each in world.inputs.items() if isinstance(each, PoseInput)}
 
     def warnings(self) -> Iterator[Problem]:
-        """Yields a warning for each frame that is needed but not published, or is published twice."""
+        """Yields a warning for each followed or parent frame that is not published, and each frame published twice."""
         main = self._world.loaded.file
         for index, each in enumerate(self._world.config.poses):
             key = f"poses[{index}]"
@@ -206,14 +209,14 @@ class _Frames:
                 yield Problem(file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
-        """Returns the body to which a frame belongs by its name, if that body can publish frames."""
+        """Returns the body in the frame's name, `rpbi/BODY/...`, if this body can publish frames; otherwise None."""
         parts = frame.split("/")
         body = self._world.bodies.get(parts[1]) if len(parts) > 1 and parts[0] == "rpbi" else None
         can_publish = isinstance(body, JointedBody) or hasattr(getattr(body, "config", None), "broadcast_hz")
         return body if can_publish else None
 
     def _links_on_tf(self, body: Body) -> set[str]:
-        """Returns the frames of a body, also those that robot_state_publisher makes of its joint states."""
+        """Returns the frames of a body, including frames that robot_state_publisher computes from joint states."""
         frames: set[str] = set()
         for sensor in self._world.sensors_of(body.name):
             if isinstance(sensor, LinkPoseSensor):
@@ -223,7 +226,7 @@ class _Frames:
         return frames
 
     def _missing(self, tf_id: str) -> str | None:
-        """Returns the problem of a frame that is needed, None if it is published."""
+        """Returns a message if a needed frame is not published by this world; None if it is published."""
         frame = self._world.config.without_prefix(tf_id)
         missing = f"nothing here publishes the TF frame '{tf_id}'"
         if frame in self._published:
@@ -241,19 +244,23 @@ class _Frames:
 
 
 def file_of(world: World, name: str) -> str:
-    """Returns the file of a body or camera."""
+    """Returns the name of the configuration file of a body or camera."""
     files = {item.config.name: item.file for item in world.loaded.objects}
     return {**files, **{camera.config.name: camera.file for camera in world.loaded.cameras}}[name]
 
 
 def some(names: Sequence[str]) -> str:
-    """Returns the first names as text, with the number of the others."""
+    """Returns the first `MAX_NAMES` names as text, followed by the number of further names."""
     more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
     return ", ".join(names[:MAX_NAMES]) + more
 
 
 def is_still(body: Body, link: int) -> bool:
-    """Returns whether a link is static: a fixed base, and all links fixed to it."""
+    """Returns whether a link never moves.
+
+    This is the case if the body has no physics, or if the base is fixed or has mass 0 and the link is the base or
+    connected to it by fixed joints.
+    """
     if body.is_soft:
         return False
     if not body.has_physics:

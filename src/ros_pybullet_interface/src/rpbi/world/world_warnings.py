@@ -1,4 +1,4 @@
-"""Warnings of probable mistakes in a world that can be built; those about values in YAML files and URDFs."""
+"""Warnings about probable mistakes in a valid world, such as implausible values in YAML files and URDFs."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,26 +19,26 @@ from .place_warnings import file_of, is_still, place_warnings, some
 from .world import World
 
 CONCAVE_SHARE = 0.05
-"""Share of a mesh's volume that its convex hull may add without a warning."""
+"""Largest increase of a mesh's volume by its convex hull without a warning, relative to the mesh's volume."""
 HALF_TURN, FULL_TURN = 3.2, 6.4
-"""Largest angles [rad] that may be meant as a half turn and as a full turn."""
+"""Angles slightly above a half turn and a full turn [rad], to allow for rounded values."""
 ROUND = 0.01
-"""Largest distance from a whole multiple of 15 degrees, as a share of it."""
+"""Largest distance of an angle from a multiple of 15 degrees [15 degrees] at which the angle counts as round."""
 FRACTIONS = 3
-"""Number of fractions among a robot's angles, none beyond a half turn, from which they are taken for radians."""
+"""Smallest number of non-integer angles at which a robot's angles, if all up to a half turn, are taken for radians."""
 LARGEST_LIMIT, LARGEST_DEG = 12.6, 360.0
-"""Limits of revolute joints are within the first [rad]; beyond the second, they mean no limit."""
+"""Largest plausible limit of a revolute joint [rad], and largest limit that may be degrees; larger means no limit."""
 ARM_JOINTS = 4
-"""Number of joints in a row from which a robot with a single chain counts as an arm."""
+"""Smallest number of joints in a chain at which a robot with a single joint on its base counts as an arm."""
 
 
 def world_warnings(world: World) -> list[Problem]:
-    """Returns probable mistakes in a world that has made no step yet."""
+    """Returns all warnings about a world that has not been stepped yet."""
     return [*place_warnings(world), *value_warnings(world)]
 
 
 def value_warnings(world: World) -> Iterator[Problem]:
-    """Yields a warning for each value that is probably not meant."""
+    """Yields a warning for each value in YAML files and URDFs that is probably a mistake."""
     yield from _gravity(world)
     yield from _masses(world)
     yield from _hulls(world)
@@ -83,7 +83,7 @@ def _masses(world: World) -> Iterator[Problem]:
 
 
 def _moving_no_mass(document: UrdfDocument) -> list[str]:
-    """Returns the joints that move links whose mass is 0, and no others."""
+    """Returns the names of the joints below which all links have mass 0."""
     below = _joints_below(document)
 
     def is_massless(link: str) -> bool:
@@ -94,7 +94,7 @@ def _moving_no_mass(document: UrdfDocument) -> list[str]:
 
 
 def _joints_below(document: UrdfDocument) -> dict[str, list[Edge]]:
-    """Returns the joints that hang on each link."""
+    """Returns the joints whose parent is a given link, indexed by the link's name."""
     below: dict[str, list[Edge]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge)
@@ -138,7 +138,7 @@ def _topics(world: World) -> Iterator[Problem]:
 
 
 def _efforts(world: World, item: ObjectConfig, config: RobotConfig) -> Iterator[Problem]:
-    """Yields a warning for motors whose effort in the URDF is 0, by which most authors mean no effort."""
+    """Yields a warning for motors with effort 0 in the URDF: it means no limit, but most authors mean no effort."""
     document = UrdfDocument(config.loadURDF.fileName)
     joints = Joint.all_of(world.pb, world.bodies[config.name].body_id)
     free = {joint.name for joint in joints if joint.is_driven and joint.max_effort == math.inf}
@@ -155,7 +155,7 @@ def _efforts(world: World, item: ObjectConfig, config: RobotConfig) -> Iterator[
 
 
 def _loose_arm(world: World, item: ObjectConfig, config: RobotConfig) -> Iterator[Problem]:
-    """Yields a warning for an arm, a robot with a single chain of joints on its base, that nothing fixes."""
+    """Yields a warning for an arm (see `_is_arm`) that is not fixed to the world or to another body."""
     held = {each.child.partition("/")[0] for each in world.config.attachments}
     is_loose = not is_still(world.bodies[config.name], -1) and config.planar_base is None and config.name not in held
     if is_loose and any(world.pb.gravity) and _is_arm(UrdfDocument(config.loadURDF.fileName)):
@@ -165,7 +165,10 @@ def _loose_arm(world: World, item: ObjectConfig, config: RobotConfig) -> Iterato
 
 
 def _is_arm(document: UrdfDocument) -> bool:
-    """Returns whether one revolute joint hangs on the base, with `ARM_JOINTS` or more in a row from there."""
+    """Returns whether a robot is an arm.
+
+    An arm has a single moving joint on its base, which is not prismatic and begins a chain of ARM_JOINTS or more.
+    """
     below = _joints_below(document)
     base, first = [document.root_link()], []
     for link in base:
@@ -198,7 +201,10 @@ def _start_angles(world: World, item: ObjectConfig, config: RobotConfig) -> Iter
 
 
 def _are_radians(angles: Sequence[float]) -> bool:
-    """Returns whether none is beyond a half turn, and one is a multiple of 15 degrees or three have fractions."""
+    """Returns whether angles that should be degrees look like radians.
+
+    They do if all are within a half turn in radians, and one is a multiple of 15 degrees or FRACTIONS are not integer.
+    """
     if max(map(abs, angles), default=0.0) > HALF_TURN:
         return False
     steps = [abs(angle) / math.radians(15.0) for angle in angles]
@@ -207,7 +213,7 @@ def _are_radians(angles: Sequence[float]) -> bool:
 
 
 def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> Iterator[Problem]:
-    """Yields a warning for the first rotation, and the first limit, of a URDF that are far more than a turn."""
+    """Yields a warning for the first `rpy` angle and the first joint limit of a URDF that look like degrees."""
     key, expected = "loadURDF.fileName", "looks like degrees: expected [rad]"
     for owner, tag, name, text, _ in document.attributes():
         if (tag, name) == ("origin", "rpy") and any(FULL_TURN < abs(n) <= LARGEST_DEG for n in numbers_in(text)):
@@ -221,7 +227,7 @@ def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> It
 
 
 def _views(world: World) -> Iterator[Problem]:
-    """Yields a warning for angles of poses and cameras in the wrong unit."""
+    """Yields a warning for each angle of a pose or camera that seems to be in the wrong unit."""
     main = world.loaded.file
     for index, pose in enumerate(world.config.poses):
         if pose.rpy is not None and max(map(abs, pose.rpy)) > FULL_TURN:
