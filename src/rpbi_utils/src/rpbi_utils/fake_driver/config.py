@@ -26,7 +26,7 @@ from custom_ros_tools.schema import (
 )
 
 ROBOTS = ("kuka_iiwa", "kuka_lwr", "panda")
-"""Robots whose limits are in `{rpbi_utils}/configs/stand_in`."""
+"""Names of the robots whose limits are in `{rpbi_utils}/configs/stand_in`."""
 
 Angle = Annotated[float, Unit("rad or m")]
 PositiveAngle = Annotated[Positive, Unit("rad or m")]
@@ -90,10 +90,10 @@ class FakeDriverConfig(ConfigModel):
     noise: NoiseConfig = Field(NoiseConfig(), description="Noise and delay of the published states.")
 
     def load_limits(self) -> dict[str, DriverJointLimits]:
-        """Returns the limits of each joint, by its name in the simulator, in the order of the driver.
+        """Returns the limits, keyed by the joints' names in the simulator, in the order of the driver's joints.
 
         Raises:
-            ConfigError: If they cannot be read or are wrong; it has everything that is.
+            ConfigError: If the limits cannot be read or are invalid.
         """
         if "." not in self.limits and self.limits not in ROBOTS:
             raise ConfigError([Problem("~config", "limits", str(UnknownNameError("robot", self.limits, ROBOTS)))])

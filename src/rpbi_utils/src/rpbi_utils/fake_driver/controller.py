@@ -1,4 +1,4 @@
-"""Emulated controller of a robot: it checks commands against limits, and stops when one is violated."""
+"""Emulates a robot's controller, which checks commands against limits and stops the robot at a violation."""
 
 from __future__ import annotations
 
@@ -14,19 +14,23 @@ from .config import DriverJointLimits, FakeDriverConfig
 RATE_WINDOW_S = 1.0
 """Time over which the rate of commands is measured [s]."""
 REST_SHARE = 0.02
-"""Share of its limit below which a velocity counts as rest when commands end."""
+"""Velocity up to which a joint counts as at rest when commands end, as a share of the joint's velocity limit."""
 EFFORT_SHARE = 0.999
-"""Share of its limit at which an effort counts as saturated; motors do not exceed the limit, except by rounding."""
+"""Effort from which a motor counts as saturated, as a share of the motor's limit.
+
+Less than 1 because of rounding: motors never exceed the limit itself.
+"""
 MAX_CYCLE_S = 0.05
-"""Longest time that a reflex stop advances between two cycles [s]; the rest is dropped on a slow machine."""
+"""Longest time by which one cycle advances a reflex stop [s]. On a slow machine, longer cycles count as this time."""
 SPACING_GAIN = 0.05
-"""Share of the deviation of a command's arrival that shifts its time for the motors, nominally one cycle after the
-last.
+"""Share of a command's lateness that is added to the time of its set point.
+
+Lateness is measured from the nominal time, which is one cycle after the previous set point.
 """
 MAX_GAP_S = 0.2
-"""Pause after which a command counts from its arrival [s]."""
+"""Lateness of a command above which the command's arrival becomes the time of its set point [s]."""
 MIN_SPACING = 0.5
-"""Least spacing of commands for the motors, as a share of a cycle."""
+"""Shortest time between two set points, as a share of a cycle."""
 
 Vector = tuple[float, ...]
 
@@ -40,14 +44,14 @@ class Mode(IntEnum):
 
 
 class Reflex(NamedTuple):
-    """Reason of a stop of the controller.
+    """Reason why the controller stopped the robot.
 
     Attributes:
-        check: The check that failed.
-        joint: The joint, by its name in the simulator; empty if it is none in particular.
-        value: The value; 0 if it is no number.
-        limit: The allowed value; 0 if it is no number.
-        what: The same in words.
+        check: Name of the check that failed, such as `velocity`.
+        joint: Name of the joint in the simulator; empty if the check does not concern a single joint.
+        value: Value that failed the check; 0 if there is no finite value.
+        limit: Limit that the value violates; 0 if the check has no numeric limit.
+        what: Description of the violation in words.
     """
 
     check: str
@@ -63,7 +67,7 @@ class Reflex(NamedTuple):
 
 @dataclass
 class Counters:
-    """Counts since the start; peaks are shares of the limits since the last recovery."""
+    """Counts of events since the start. `peaks` are the largest values since the last recovery, as shares of limits."""
 
     commands: int = 0
     ignored: int = 0
@@ -73,7 +77,7 @@ class Counters:
 
 
 class _Motion(NamedTuple):
-    """A command with the derivatives that lead to it."""
+    """A commanded position, with velocity and acceleration from finite differences to the previous commands."""
 
     position: Vector
     velocity: Vector
@@ -81,11 +85,12 @@ class _Motion(NamedTuple):
 
 
 class SetPoint(NamedTuple):
-    """Position of the motors at a time.
+    """Position that the motors are to have at a time.
 
     Attributes:
-        time_s: By the clock of the commands [s]. Commands with uneven arrivals are spaced nearly one cycle apart.
-        position: [rad or m].
+        time_s: Time by the clock of the commands [s]. Set points are nearly one cycle apart, even if commands arrive
+            unevenly.
+        position: Joint positions [rad or m].
     """
 
     time_s: float
@@ -95,13 +100,13 @@ class SetPoint(NamedTuple):
 class RobotController:
     """Checks each command, forwards valid ones unchanged, and stops the robot at the first violation of a limit.
 
-    A command counts as one cycle, `1/command_hz`, after the previous one, whenever it arrives; derivatives are finite
-    differences over that time. Rate and time-out of the commands are checked separately.
+    Velocity, acceleration and jerk are finite differences over one cycle, `1/command_hz`, even if commands arrive
+    unevenly. The rate and the time-out of the commands are checked separately.
 
     Args:
-        config: The configuration.
-        limits: Limits of each joint, in the order of all vectors here.
-        position: Initial position of the robot [rad or m].
+        config: Configuration of the controller.
+        limits: Limits, keyed by joint name. All vectors of joint values have the same order.
+        position: Initial joint positions [rad or m].
     """
 
     def __init__(
@@ -122,18 +127,22 @@ class RobotController:
 
     @property
     def is_braking(self) -> bool:
-        """Whether a reflex stop is in progress."""
+        """Whether the robot is still decelerating in a reflex stop."""
         return self.mode is Mode.REFLEX and any(self._sent.velocity)
 
     @property
     def set_point(self) -> Vector:
-        """Position at which the motors hold the robot, or to which they drive it [rad or m]."""
+        """Joint positions that the motors currently hold or drive to [rad or m]."""
         return self._sent.position
 
     def command(self, now_s: float, position: Sequence[float]) -> None:
-        """Processes the positions of a command [rad or m], with its arrival by the caller's clock [s].
+        """Checks a command and queues it for the motors. An invalid command triggers a reflex.
 
-        An invalid one triggers a reflex; during a reflex, commands are ignored and counted.
+        During a reflex, commands are only counted.
+
+        Args:
+            now_s: Arrival of the command, by the caller's clock [s].
+            position: Commanded joint positions [rad or m].
         """
         if self.mode is Mode.REFLEX:
             self.counters.ignored += 1
@@ -153,22 +162,22 @@ class RobotController:
         self._waiting.append((now_s + delay_s, self._planned_s + delay_s, motion))
 
     def refuse_command(self, what: str) -> None:
-        """Processes an invalid command, for instance one that lacks a joint; `what` is the reason."""
+        """Triggers a reflex because of a malformed command, for instance without a joint. `what` is the reason."""
         if self.mode is Mode.REFLEX:
             self.counters.ignored += 1
         else:
             self._stop(Reflex("command_invalid", "", 0.0, 0.0, what))
 
     def cycle(self, now_s: float, position: Sequence[float], effort: Sequence[float]) -> list[SetPoint]:
-        """Runs a cycle of the motors.
+        """Checks the measured state, advances a reflex stop, and returns the new set points.
 
         Args:
-            now_s: The time, by the clock of the commands [s].
-            position: Measured positions of the joints [rad or m].
+            now_s: Present time, by the clock of the commands [s].
+            position: Measured joint positions [rad or m].
             effort: Measured efforts of the motors [N m or N].
 
         Returns:
-            New set points, in order.
+            Set points that have become due since the last cycle, oldest first.
         """
         last_s, self._last_cycle_s = self._last_cycle_s, now_s
         if self.mode is not Mode.REFLEX:
@@ -184,10 +193,10 @@ class RobotController:
         return points
 
     def recover(self, position: Sequence[float]) -> str | None:
-        """Ends a reflex; returns the reason if it cannot, None if it could.
+        """Ends a reflex. Returns None on success, otherwise the reason for the refusal.
 
         Args:
-            position: Positions of the joints, at which the robot is held then [rad or m].
+            position: Measured joint positions, which become the set point [rad or m].
         """
         if self.mode is not Mode.REFLEX:
             return "there is no reflex to recover from"
@@ -200,7 +209,7 @@ class RobotController:
         self._motion = self._sent = self._at_rest(position)
         return None
 
-    # Judging
+    # Checks
 
     def _invalid(self, position: Sequence[float]) -> Reflex | None:
         if len(position) != len(self._names):
@@ -212,7 +221,7 @@ class RobotController:
         return None
 
     def _note_arrival(self, now_s: float) -> Reflex | None:
-        """Counts a command; returns the fault of the rate of commands, if any."""
+        """Records the arrival of a command; returns a reflex if commands arrive at a wrong rate."""
         config, arrivals_s = self._config, self._arrivals_s
         if self.mode is Mode.IDLE:
             arrivals_s.clear()
@@ -236,7 +245,7 @@ class RobotController:
         return self._beyond_limits(motion.position, self._sent.position)
 
     def _refuse(self, motion: _Motion) -> Reflex | None:
-        """Returns the first limit that the step to a command violates."""
+        """Returns a reflex for the first limit that the step to a command violates; None if all limits are kept."""
         last = self._motion.position
         for name, limits, start, end in zip(self._names, self._limits, last, motion.position):
             step = 3.0 * limits.velocity * self._cycle_s if limits.step is None else limits.step
@@ -260,7 +269,7 @@ class RobotController:
         return None
 
     def _beyond_limits(self, position: Vector, last: Vector) -> Reflex | None:
-        """Returns a reflex if a joint leaves its limits; a joint outside may only return."""
+        """Returns a reflex if a joint leaves its position limits. A joint already outside may not move further out."""
         for name, limits, value, before in zip(self._names, self._limits, position, last):
             if not min(limits.lower, before) <= value <= max(limits.upper, before):
                 limit = limits.lower if value < limits.lower else limits.upper
@@ -287,7 +296,7 @@ class RobotController:
         return None
 
     def _silent(self, now_s: float) -> Reflex | None:
-        """Returns a reflex if commands have ceased during a motion; at rest they may."""
+        """Returns a reflex if commands have stopped while the robot moves. At rest, ends the motion, without a reflex."""
         if self.mode is not Mode.MOVE or now_s - self._arrivals_s[-1] <= self._config.timeout_s or self._waiting:
             return None
         shares = [abs(v) / limits.velocity for v, limits in zip(self._motion.velocity, self._limits)]
@@ -297,7 +306,7 @@ class RobotController:
         age_s, limit_s = now_s - self._arrivals_s[-1], self._config.timeout_s
         return Reflex("command_timeout", "", age_s, limit_s, f"no command for {age_s:.3g} s, while it moves")
 
-    # Moving
+    # Motion
 
     def _after(self, position: Vector) -> _Motion:
         last = self._motion
@@ -314,14 +323,14 @@ class RobotController:
         self._waiting.clear()
 
     def _planned(self, now_s: float) -> float:
-        """Returns the time for the motors of a command that arrives now [s]: nearly a cycle after the one before."""
+        """Returns the set point's time of a command that arrives now [s]: nearly one cycle after the previous time."""
         planned_s = self._planned_s + self._cycle_s
         if now_s - planned_s > MAX_GAP_S:
             return now_s
         return max(planned_s + SPACING_GAIN * (now_s - planned_s), self._planned_s + MIN_SPACING * self._cycle_s)
 
     def _brake(self, now_s: float, cycle_s: float) -> list[SetPoint]:
-        """Decelerates every joint by its acceleration; returns the new set point, none at rest."""
+        """Decelerates every joint at its acceleration limit. Returns the new set point; an empty list at rest."""
         if not self.is_braking:
             return []
         position, velocity = [], []

@@ -1,4 +1,4 @@
-"""Measured states of an emulated robot: delayed and with noise."""
+"""Emulates a robot's measured joint states, with delay and noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .config import NoiseConfig
 
 
 class Measurement:
-    """Delays states and adds noise to them; equal states at equal times result in equal measurements."""
+    """Delays joint states and adds noise. The same states at the same times result in the same measurements."""
 
     def __init__(self, config: NoiseConfig) -> None:
         self._config = config
@@ -19,7 +19,10 @@ class Measurement:
         self._waiting: deque[tuple[float, JointValues]] = deque()
 
     def observe(self, now_s: float, state: JointValues) -> JointValues | None:
-        """Adds the state at a time [s]; returns the newest one older than the delay, None if there is none yet."""
+        """Queues the state at time `now_s` [s], and returns the newest state that is older than the delay, with noise.
+
+        Returns None if no further state has become older than the delay since the last call.
+        """
         self._waiting.append((now_s + self._config.delay_s, state))
         known = None
         while self._waiting and self._waiting[0][0] <= now_s:

@@ -1,4 +1,4 @@
-"""`stand_in_node.py`: an emulated driver, whose robot is simulated by a simulator in the same namespace."""
+"""`stand_in_node.py`: emulates a robot's driver. A simulator in the same namespace simulates the robot."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from .measurement import Measurement
 
 QUEUE_SIZE = 100
 STATE_HZ = 20.0
-"""Rate at which the driver's state is published while it stays the same [Hz]."""
+"""Rate at which an unchanged driver state is published [Hz]. Changes are published at once."""
 
 
 class FakeDriver:
-    """Emulates the controller of the robot in the simulator of its namespace, with the topics of a driver.
+    """Offers the topics of a robot's driver, and emulates the controller between these topics and a simulated robot.
 
     Raises:
         ConfigError: If the configuration is wrong.
@@ -68,7 +68,7 @@ class FakeDriver:
         self._command(lambda: JointValues.of(self._driver_names.values(), message.data))
 
     def _command(self, read: Callable[[], JointValues]) -> None:
-        """Processes a command, in the driver's names and units."""
+        """Passes a command to the controller; `read` returns the command with the driver's joint names and units."""
         with self._lock:
             if self._controller is None:
                 self._warn("command", "ignored: the robot in the simulator has not said where it is")
@@ -84,7 +84,7 @@ class FakeDriver:
             self._report_changes()
 
     def _cycle(self, message: JointState) -> None:
-        """Runs a cycle with the state of the simulated robot."""
+        """Runs a controller cycle with a joint state of the simulated robot; publishes targets and measurements."""
         try:
             values = values_in(message).in_order(tuple(self._limits))
         except (InterfaceError, ValueError) as error:
@@ -106,7 +106,7 @@ class FakeDriver:
                 self._publish_state()
 
     def _recover(self, _: TriggerRequest) -> TriggerResponse:
-        """Ends a reflex stop; the next command begins a motion where the robot stands."""
+        """Service callback that ends a reflex stop. The next command has to begin at the robot's present position."""
         with self._lock:
             if self._controller is None:
                 return TriggerResponse(False, "the robot in the simulator has not said where it is")

@@ -32,11 +32,11 @@ from .limits import MotionLimitsConfig
 
 AXES = ("x", "y", "z")
 MIN_NORM = 1e-6
-"""Least length of a quaternion; shorter ones count as zero."""
+"""Norm below which a quaternion counts as zero."""
 MAX_CONSUMING_HZ = 200.0
-"""Largest rate of targets [Hz]."""
+"""Upper limit of the parameter `consuming_freq` [Hz]."""
 ROWS_OF = {"theta": 1, "euler": 3, "quat": 4, "axis_angle": 3}
-"""Number of rows of a planned rotation."""
+"""Number of rows that a planned rotation takes, keyed by `rotation_repr`."""
 
 _LowerCase = BeforeValidator(lambda value: value.lower() if isinstance(value, str) else value)
 
@@ -66,7 +66,7 @@ class TranslationConfig(ConfigModel):
     translation_z_index: Count | None = optional("Row of z.")
 
     def axis(self, name: str) -> tuple[float | None, int | None]:
-        """Returns constant [m] and row of an axis."""
+        """Returns the constant value [m] and the row of the axis `x`, `y` or `z`; None for a missing value or row."""
         return getattr(self, f"translation_{name}"), getattr(self, f"translation_{name}_index")
 
 
@@ -89,18 +89,18 @@ class RotationConfig(ConfigModel):
 
     @property
     def rows(self) -> range:
-        """The rows of the waypoints that have it."""
+        """Rows of the waypoints that hold the orientation; empty for a constant orientation."""
         if self.rotation_repr == "none" or not self.rotation_vec_index:
             return range(0)
         return range(self.rotation_vec_index[0], self.rotation_vec_index[0] + ROWS_OF[self.rotation_repr])
 
     @property
     def is_path(self) -> bool:
-        """Whether orientations are interpolated, rather than angles."""
+        """Whether the rows are interpolated together as an orientation, rather than one by one as numbers."""
         return self.rotation_repr in ("quat", "axis_angle") or (self.rotation_repr != "none" and self.shortest_path)
 
     def quat(self, values: Sequence[float]) -> Quaternion:
-        """Returns the orientation x, y, z, w of the values of its rows.
+        """Returns the orientation x, y, z, w for the values of its rows, in the representation `rotation_repr`.
 
         Raises:
             WaypointError: If a quaternion is zero.
@@ -173,12 +173,17 @@ class MotionDimensions(ConfigModel):
 
     @property
     def scalar_rows(self) -> tuple[int, ...]:
-        """Rows that are interpolated as numbers, each by itself."""
+        """Rows that are interpolated one by one as numbers."""
         path = self.rotation.rows if self.rotation.is_path else ()
         return tuple(row for row in range(self.number) if row not in path)
 
     def pose(self, scalars: Sequence[float], quat_xyzw: Quaternion | None) -> Pose:
-        """Returns the frame's pose from the values of `scalar_rows` and the orientation on the path, if it is one."""
+        """Returns the frame's pose.
+
+        Args:
+            scalars: Values of `scalar_rows`.
+            quat_xyzw: Orientation on the path; None to compute the orientation from `scalars` or constants.
+        """
         assert self.trans is not None
         values = dict(zip(self.scalar_rows, scalars))
         axes = (self.trans.axis(axis) for axis in AXES)

@@ -1,4 +1,4 @@
-"""`interpolation_node.py`: waypoints as smooth targets, of a TF frame or of joints."""
+"""`interpolation_node.py`: turns waypoints into smooth targets for a TF frame or for joints."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from .waypoints import Waypoints, read_waypoints, waypoint_matrix
 NAME = "ros_Traj_interface"
 WAYPOINTS = "ros_pybullet_interface/waypt_traj"
 STREAMING = "/stream_interpolated_motion_flag"
-"""Parameter that pauses the motion while it is not true."""
+"""Name of the parameter that pauses the motion while its value is not true."""
 LOOKS_HZ = 5.0
-"""Rate at which that parameter is checked [Hz of wall time]."""
+"""Rate at which the parameter `STREAMING` is checked [Hz of wall time]."""
 MORE = 1.5
-"""Least ratio of a peak without limit to the last reported one for another report."""
+"""Factor by which a peak without a limit has to exceed the last reported peak to be reported again."""
 QUEUE_SIZE = 100
 NS_PER_S = 1_000_000_000
 
 
 class InterpolationNode:
-    """Publishes a motion through the waypoints that arrive, sample by sample in ROS time.
+    """Receives waypoints, and publishes the samples of a motion through the waypoints in ROS time.
 
     Raises:
         ConfigError: If parameters or the motion's file are wrong.
@@ -55,12 +55,12 @@ class InterpolationNode:
         self._limits = _limits_of(config)
         self._interpolator = Interpolator(config, self._limits)
         self._unlimited: dict[str, float] = {}
-        """The largest peaks without limit that were reported, by the key of the limit."""
+        """Last reported peaks without a limit, keyed by the name of the missing limit."""
         self._arrived: deque[tuple[rospy.Time, Waypoints] | None] = deque()
-        """Waypoints that the next tick adds; None ends the motion."""
+        """Waypoints for the next tick, with their arrival times. An entry None ends the motion."""
         self._last: Float64MultiArray | None = None
         self._epoch: rospy.Time | None = None
-        """Zero of the interpolator's time, near it so that floats are exact."""
+        """ROS time of the interpolator's time 0. Small times keep the precision of floats."""
         self._now_s = 0.0
         self._moves, self._is_streaming = False, True
         self._warn = ThrottledWarning()
@@ -84,7 +84,7 @@ class InterpolationNode:
                 self._tick(rospy.Time.now())
                 rate.sleep()
         except rospy.ROSException:
-            if not rospy.core.is_shutdown_requested():  # its topic is closed already
+            if not rospy.core.is_shutdown_requested():  # during a shutdown, the topic is closed already
                 raise
 
     def _on_waypoints(self, message: Float64MultiArray) -> None:
@@ -150,7 +150,7 @@ class InterpolationNode:
             self._warn_of_no_limits(added.peaks.without_limit(self._limits))
 
     def _warn_of_no_limits(self, peaks: dict[str, float]) -> None:
-        """Warns of peaks without limit, unless similar peaks were reported before."""
+        """Warns of peaks without a limit, unless similar peaks were reported before."""
         if all(peak <= MORE * self._unlimited.get(key, 0.0) for key, peak in peaks.items()):
             return
         self._unlimited |= peaks
@@ -162,7 +162,7 @@ class InterpolationNode:
         self._interpolator.forget()
 
     def _report(self) -> None:
-        """Logs when a motion begins from rest, and when it ends."""
+        """Logs the start of a motion from rest, and the end of a motion."""
         plan = self._interpolator.plan
         moves = plan is not None and self._now_s < plan.scalars.end_s + self._interpolator.delay_s
         if moves != self._moves:
@@ -170,7 +170,7 @@ class InterpolationNode:
             rospy.loginfo("the motion %s", "begins" if moves else "has ended")
 
     def _reset(self, _: TriggerRequest) -> TriggerResponse:
-        """Ends the motion; the next one begins at its first waypoint, independently of the target."""
+        """Service callback that ends the motion. The next motion begins at its first waypoint without a transition."""
         self._arrived.append(None)
         return TriggerResponse(True, "the motion ends; the next one begins at its first waypoint")
 
@@ -182,7 +182,7 @@ class InterpolationNode:
 
 
 def _limits_of(config: WaypointMotionConfig) -> MotionLimitsConfig:
-    """Returns the limits of a motion; missing velocities of joints are those of `robot_description`, if it has them."""
+    """Returns the limits of a motion. Takes missing velocity limits of joints from `robot_description`, if possible."""
     limits, joints = config.interpolation.limits, config.motion_dimensions.joint_names
     parameter = rospy.resolve_name(ROBOT_DESCRIPTION)
     if joints is None or limits.velocity is not None or not rospy.has_param(parameter):
@@ -209,7 +209,7 @@ def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy
 
 
 def _joint_publisher(config: WaypointMotionConfig) -> Callable[[rospy.Time, TargetSample], None]:
-    """Returns a function that publishes the positions and velocities of a sample."""
+    """Returns a function that publishes the joint positions and velocities of a sample."""
     topic, names = config.communication.publisher.joint_topic, config.motion_dimensions.joint_names
     publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 

@@ -1,4 +1,4 @@
-"""Motion of a target through waypoints, replanned while it moves."""
+"""Moves a target through waypoints. New waypoints may change the motion while the target moves."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .rotation import RotationKnot, RotationPath, angular_rates
 from .waypoints import Array, Waypoints, estimated_rates
 
 MAX_TRIES = 50
-"""Largest number of iterations that slow a motion down until it keeps its limits."""
+"""Largest number of iterations that slow a motion down to its limits."""
 KEPT = 1.0 + 1e-9
-"""Factor up to which a motion is not slowed down, for rounding."""
+"""Factor up to which a motion is not slowed down, to tolerate rounding errors."""
 LEAST_STRETCH = 1.02
-"""Least factor by which it is then slowed down."""
+"""Smallest factor by which one iteration slows a motion down."""
 ROUNDING_S = 1e-9
-"""Time by which a sample may be in the future, for rounding [s]."""
+"""Time by which a sample may be in the future, to tolerate rounding errors [s]."""
 
 
 class TargetSample(NamedTuple):
     """The target at one time.
 
     Attributes:
-        time_s: Its time [s].
-        state: Values of the rows that are numbers, with their derivatives.
-        pose: Pose of the frame; None for joints.
+        time_s: Time of the sample [s].
+        state: Values, velocities and accelerations of the scalar rows.
+        pose: Pose of the target frame; None for targets of joints.
     """
 
     time_s: float
@@ -40,12 +40,12 @@ class TargetSample(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A motion.
+    """A planned motion.
 
     Attributes:
-        scalars: The rows that are numbers.
-        path: The orientation, if it is a path.
-        knots_s: Times of its waypoints [s].
+        scalars: Trajectory of the scalar rows.
+        path: Path of the orientation; None if the orientation is constant or part of the scalar rows.
+        knots_s: Times of the waypoints [s].
     """
 
     scalars: Trajectory
@@ -53,24 +53,24 @@ class Plan(NamedTuple):
     knots_s: tuple[float, ...]
 
     def spliced(self, new: Plan, at_s: float) -> Plan:
-        """Returns this plan until a time [s], continued by another one."""
+        """Returns a plan that follows this plan until time `at_s` [s], and the plan `new` afterwards."""
         path = None if self.path is None or new.path is None else self.path.spliced(new.path, at_s)
         kept = tuple(time_s for time_s in self.knots_s if time_s <= at_s)
         return Plan(self.scalars.spliced(new.scalars, at_s), path, (*kept, *(t for t in new.knots_s if t > at_s)))
 
     def since(self, time_s: float) -> Plan:
-        """Returns the same plan without the parts before a time [s]."""
+        """Returns this plan without the parts before a time [s]."""
         path = None if self.path is None else self.path.since(time_s)
         return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
 
 
 class Added(NamedTuple):
-    """Answer to new waypoints.
+    """Result of planning a motion through new waypoints.
 
     Attributes:
         peaks: Peaks of the new motion.
-        stretch: Factor by which it was slowed down; 1 if it was not.
-        excess: The limit that it would have exceeded most.
+        stretch: Factor by which the motion was slowed down; 1 for an unchanged motion.
+        excess: Limit that the motion would exceed most without being slowed down.
     """
 
     peaks: Peaks
@@ -79,23 +79,25 @@ class Added(NamedTuple):
 
 
 class Interpolator:
-    """Samples of a motion that new waypoints may change at any time.
+    """Plans a motion through waypoints and returns samples of the motion. New waypoints may arrive at any time.
 
-    Samples are at the times of a grid with steps of `inter_dt`, from the first waypoint on, and at the very end. New
-    waypoints take over after the protected samples, with the position and velocity of that moment; waypoints before
-    the next sample are left out. Without interpolation, samples are the waypoints.
+    Samples lie on a time grid with steps of `inter_dt` from the first waypoint on. The last sample is at the end of
+    the motion. Without interpolation, the samples are the waypoints, and limits are ignored.
 
-    A motion that exceeds a limit takes longer: the times between its waypoints grow by one factor, or it is refused.
-    Without interpolation, limits do not count.
+    New waypoints leave the next `nochange_window_length` samples unchanged. After these samples, the new motion begins
+    with the old motion's position and velocity. New waypoints before the first changed sample are ignored.
+
+    A motion that exceeds a limit is refused or slowed down. To slow it down, all times between its waypoints are
+    multiplied by the same factor.
 
     All times are seconds of one clock, which must not go back.
 
     Args:
-        config: The motion.
-        limits: In place of those of the configuration.
+        config: Description of the motion.
+        limits: Limits that replace the limits in `config`; None to use the limits in `config`.
 
     Attributes:
-        delay_s: Time that pauses have taken [s]; the plan is later than its waypoints by it.
+        delay_s: Total duration of all pauses [s]. The plan runs later than the waypoints' times by this delay.
     """
 
     def __init__(self, config: WaypointMotionConfig, limits: MotionLimitsConfig | None = None) -> None:
@@ -103,23 +105,23 @@ class Interpolator:
         self._limits = limits or config.interpolation.limits
         self._plan: Plan | None = None
         self._grid_s = 0.0
-        """A time on the grid."""
+        """Time of one point of the sample grid [s]."""
         self._sent_s = -math.inf
-        """Time of the newest sample that was returned."""
+        """Time of the newest sample that was returned [s]."""
         self.delay_s = 0.0
         self._paused_s: float | None = None
 
     @property
     def plan(self) -> Plan | None:
-        """The present plan, None if there is none."""
+        """The present plan; None before the first waypoints and after `forget`."""
         return self._plan
 
     def add(self, waypoints: Waypoints, now_s: float) -> Added:
-        """Plans a motion through waypoints, whose times are those of the clock.
+        """Plans a motion through waypoints, whose times are seconds of the clock.
 
         Raises:
-            WaypointError: If all of them are over, or before the end of the protected samples, or if the motion cannot
-                keep its limits; the old plan stays.
+            WaypointError: If all waypoints are in the past or too early to change a sample, or if the motion cannot
+                keep its limits. The old plan then remains in use.
         """
         lead_s = self._own_s(now_s) - now_s
         now_s += lead_s
@@ -147,7 +149,7 @@ class Interpolator:
         return added
 
     def newest(self, now_s: float) -> TargetSample | None:
-        """Returns the newest sample up to a time [s] if there is one that has not been returned, else None."""
+        """Returns the newest sample up to a time [s]; None if this sample was already returned or does not exist."""
         plan = self._plan
         if plan is None or self._paused_s is not None:
             return None
@@ -169,20 +171,20 @@ class Interpolator:
             self._paused_s = None
 
     def forget(self) -> None:
-        """Ends the motion; the next one begins at its first waypoint, independently of the target."""
+        """Ends the motion. The next motion begins at its first waypoint, without a transition from the target."""
         self._plan, self._sent_s = None, -math.inf
 
     def _own_s(self, now_s: float) -> float:
-        """Returns the time of the plan, which does not advance during pauses."""
+        """Converts a time of the clock to the time of the plan [s], which does not advance during pauses."""
         return (now_s if self._paused_s is None else self._paused_s) - self.delay_s
 
     def _on_grid(self, time_s: float) -> float:
-        """Returns the newest time of the grid."""
+        """Returns the last point of the sample grid up to a time [s]."""
         steps = math.floor((time_s - self._grid_s + ROUNDING_S) / self._config.inter_dt)
         return self._grid_s + steps * self._config.inter_dt
 
     def _sample_time(self, plan: Plan, now_s: float) -> float | None:
-        """Returns the time of the newest sample; None before the first one."""
+        """Returns the time of the newest sample [s]; None before the first sample."""
         if not self._config.use_interpolation:
             return max((each for each in plan.knots_s if each <= now_s + ROUNDING_S), default=None)
         end_s, time_s = plan.scalars.end_s, self._on_grid(now_s)
@@ -205,10 +207,10 @@ class Interpolator:
         first: int = 0,
         after: tuple[float, Plan] | None = None,
     ) -> tuple[Plan, Added]:
-        """Returns the plan of `_through`, slowed down as much as limits need.
+        """Returns the plan of `_through`, slowed down until it keeps the limits.
 
         Raises:
-            WaypointError: If the motion exceeds a limit that it is not to be slowed down for, or cannot be.
+            WaypointError: If the motion exceeds a limit and must not, or cannot, be slowed down enough.
         """
         start_s, stretch, asked = times_s[0] if after is None else after[0], 1.0, Excess()
         for _ in range(MAX_TRIES):
@@ -235,11 +237,13 @@ class Interpolator:
         first: int = 0,
         after: tuple[float, Plan] | None = None,
     ) -> Plan:
-        """Returns the plan through waypoints from the first one on.
+        """Returns the plan through the waypoints from index `first` on.
 
         Args:
-            times_s: Their times [s].
-            after: A time before the first one [s], and the plan that is followed until then.
+            waypoints: All waypoints.
+            times_s: Times of all waypoints [s], in place of the times in `waypoints`.
+            first: Index of the first waypoint to pass through.
+            after: Time at which the new motion begins [s], and the old plan, which is followed until then.
         """
         method = self._config.method if self._config.use_interpolation else "linear"
         scalars = _scalar_knots(waypoints, times_s, method)[first:]
@@ -248,7 +252,7 @@ class Interpolator:
         if after is None:
             return Plan(Trajectory.through(scalars), RotationPath.through(path) if path else None, knots_s)
         from_s, old = after
-        if method == "linear":  # so that the velocity does not jump here either
+        if method == "linear":  # otherwise the velocity would jump at the first waypoint
             scalars[0] = scalars[0]._replace(velocity=Trajectory.through(scalars).sample(knots_s[0]).velocity)
             if path:
                 path[0] = path[0]._replace(rate=RotationPath.through(path).sample(knots_s[0]).rate)
@@ -278,7 +282,7 @@ def _scalar_knots(waypoints: Waypoints, times_s: tuple[float, ...], method: str)
 
 
 def _estimated_accelerations(times_s: tuple[float, ...], values: Array, rates: Array) -> Array:
-    """Returns the means of the accelerations of the cubics before and after each inner point, zero at both ends."""
+    """Estimates accelerations: at inner points the mean of both adjacent cubics' accelerations, at the ends zero."""
     accelerations = np.zeros_like(values)
     h = np.diff(times_s)[:, np.newaxis]
     slopes = np.diff(values, axis=0) / h

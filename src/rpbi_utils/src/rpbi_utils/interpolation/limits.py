@@ -1,4 +1,4 @@
-"""Limits of a motion through waypoints: its peaks, and the factor by which it is slowed down to keep the limits."""
+"""Computes the peak speeds and accelerations of a motion, and the factor that slows the motion down to its limits."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rpbi.control.trajectories.trajectory import Trajectory
 from .rotation import RotationPath
 
 POINTS = np.linspace(0.0, 1.0, 65)
-"""Shares of a segment at which peaks of numbers are evaluated; they are at most 0.1 % higher in between."""
+"""Shares of a segment at which peaks of scalar rows are evaluated. In between, peaks are at most 0.1 % higher."""
 TURN_POINTS = 17
 """Number of points of a segment at which peaks of orientations are evaluated."""
 MARGIN = 1e-3
-"""Margin to a limit, as a share of it."""
+"""Margin between a peak and its limit, as a share of the peak."""
 UNITS = {
     "velocity": "m/s or rad/s",
     "acceleration": "m/s^2 or rad/s^2",
@@ -52,7 +52,7 @@ class MotionLimitsConfig(ConfigModel):
         """Checks the limits against the number of rows and the method of interpolation.
 
         Raises:
-            KeyedError: If a list has another length, or lines are to keep an acceleration.
+            KeyedError: If a list has another length, or if an acceleration limit is given for the method `linear`.
         """
         for key in ("velocity", "acceleration"):
             value = getattr(self, key)
@@ -68,8 +68,8 @@ class Excess(NamedTuple):
     """The limit that a motion exceeds most.
 
     Attributes:
-        stretch: Factor by which its times have to grow; at most 1 if all limits are kept.
-        text: Limit and peak in words; empty without limits.
+        stretch: Factor by which the motion's duration has to grow; at most 1 if the motion keeps all limits.
+        text: The limit and the motion's peak in words; empty without limits.
     """
 
     stretch: float = 0.0
@@ -80,10 +80,10 @@ class Peaks(NamedTuple):
     """Largest speeds and accelerations of a motion.
 
     Attributes:
-        velocity: Speed of each row that is interpolated as a number [m/s or rad/s], shape (S,).
-        acceleration: Acceleration of each of these rows [m/s^2 or rad/s^2], shape (S,).
-        angular_velocity: Angular speed of an orientation that is interpolated as one [rad/s].
-        angular_acceleration: Its angular acceleration [rad/s^2].
+        velocity: Largest speed of each scalar row [m/s or rad/s], shape (S,).
+        acceleration: Largest acceleration of each scalar row [m/s^2 or rad/s^2], shape (S,).
+        angular_velocity: Largest angular speed of the orientation path [rad/s]; 0 without a path.
+        angular_acceleration: Largest angular acceleration of the orientation path [rad/s^2]; 0 without a path.
     """
 
     velocity: NDArray[np.float64]
@@ -93,7 +93,7 @@ class Peaks(NamedTuple):
 
     @classmethod
     def of(cls, scalars: Trajectory, path: RotationPath | None) -> Peaks:
-        """Returns the peaks of numbers and orientation from their first to their last knot."""
+        """Returns the peaks of the scalar rows and the orientation path between the first and the last knot."""
         ends = [*(each.start_s for each in scalars.segments[1:]), scalars.end_s]
         rows = np.array([each.polynomials for each in scalars.segments])  # segments x S x 6
         spans = np.array(
@@ -107,7 +107,7 @@ class Peaks(NamedTuple):
         return cls(_largest(rates), _largest(bends), *_turning(path))
 
     def excess(self, limits: MotionLimitsConfig) -> Excess:
-        """Returns the limit that is exceeded most."""
+        """Returns the limit that the peaks exceed most, or come closest to."""
         worst = Excess()
         for key, power in zip(self._fields, (1.0, 0.5, 1.0, 0.5)):
             limit, peaks = getattr(limits, key), np.atleast_1d(getattr(self, key))
@@ -122,13 +122,13 @@ class Peaks(NamedTuple):
         return worst
 
     def without_limit(self, limits: MotionLimitsConfig) -> dict[str, float]:
-        """Returns the peaks that no limit bounds, by the key of the limit."""
+        """Returns the peaks of quantities without a limit, keyed by the name of the missing limit."""
         peaks = {key: float(np.max(getattr(self, key), initial=0.0)) for key in self._fields}
         return {key: peak for key, peak in peaks.items() if getattr(limits, key) is None and peak > 0.0}
 
 
 def _largest(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the largest magnitude of each row, shape (S,)."""
+    """Returns the largest magnitude of each row, shape (S,), from values of shape (segments, S, points)."""
     return np.asarray(np.abs(values).max(axis=(0, 2), initial=0.0))
 
 

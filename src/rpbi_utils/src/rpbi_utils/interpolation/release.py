@@ -1,7 +1,8 @@
-"""Interpolation of whole series of numbers, under the names and with the arguments of the authors' release.
+"""Interpolates complete series of numbers. Names and arguments are those of the authors' release.
 
-All functions return times and samples. Samples are exactly `1/sample_freq` apart, from the first time on, and the last
-one is at the last time. Times may begin anywhere.
+The functions `interpolate_...` return sample times [s] and samples. From the first time on, samples are
+`1/sample_freq` [s] apart. The last sample is at the last time, after a step that may be shorter. The first time need
+not be 0.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from rpbi.control.trajectories.polynomial import derivative, quintic
 Array = NDArray[np.float64]
 Samples = tuple[Array, Array]
 ROUNDING = 1e-9
-"""Share of a step by which the last one may be shorter without a sample of its own."""
+"""Longest last step that is merged into the step before, as a share of a step."""
 
 
 def sample_times(start_s: float, end_s: float, step_s: float) -> Array:
-    """Returns the times [s] from a start in equal steps, and the end, to which the last step may be shorter.
+    """Returns times [s] in equal steps from the start, and the end. The last step may be shorter.
 
     Raises:
         ValueError: If the step is not positive.
@@ -35,12 +36,18 @@ def sample_times(start_s: float, end_s: float, step_s: float) -> Array:
 
 
 def interpolate_linearly_quaternions(time_seq: ArrayLike, quat_seq: ArrayLike, sample_freq: float = 100) -> Samples:
-    """Interpolates K quaternions x, y, z, w, shape (4, K), at constant angular velocities; samples: shape (N, 4)."""
+    """Interpolates K quaternions x, y, z, w, shape (4, K), with constant angular velocity between two quaternions.
+
+    The samples have the shape (N, 4).
+    """
     return _rotations(Slerp, time_seq, quat_seq, sample_freq)
 
 
 def interpolate_cubic_quaternions(time_seq: ArrayLike, quat_seq: ArrayLike, sample_freq: float = 100) -> Samples:
-    """Interpolates K quaternions x, y, z, w, shape (4, K), with continuous accelerations; samples: shape (N, 4)."""
+    """Interpolates K quaternions x, y, z, w, shape (4, K), with continuous angular acceleration.
+
+    The samples have the shape (N, 4).
+    """
     return _rotations(RotationSpline, time_seq, quat_seq, sample_freq)
 
 
@@ -52,7 +59,7 @@ def interpolate_cubic_hermite_spline(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Interpolates K values and their derivatives by cubics; shapes (K,) or (K, S)."""
+    """Interpolates K values with K given derivatives by cubic polynomials. Both have the shape (K,) or (K, S)."""
     curve = CubicHermiteSpline(time_seq, pos_seq, dpos_seq)
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -65,7 +72,7 @@ def interpolate_poly_fit(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Samples the polynomial of an order that is nearest to K values; it passes through them if the order is K - 1."""
+    """Samples the polynomial of order `poly_order` that fits K values best, by least squares."""
     curve = np.poly1d(np.polyfit(np.asarray(time_seq, float), np.asarray(pos_seq, float), poly_order))
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -78,7 +85,7 @@ def interpolate_interp1d(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Interpolates K values by a kind of `scipy.interpolate.interp1d`: linear, nearest, quadratic, cubic ..."""
+    """Interpolates K values by `scipy.interpolate.interp1d`. Its `kind` may be linear, nearest, quadratic or cubic."""
     curve = interp1d(time_seq, pos_seq, kind=kind)
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -90,7 +97,7 @@ def interpolate_cubic_spline(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Interpolates K values, shape (K,) or (K, S), with continuous accelerations."""
+    """Interpolates K values, shape (K,) or (K, S), by a cubic spline with continuous accelerations."""
     return _sampled(CubicSpline(time_seq, pos_seq), time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
 
@@ -102,7 +109,7 @@ def interpolate_cubic_hermite_spline_source_code(
     plot_flag: bool = False,
     plot_title: str = "PositionVsTime",
 ) -> Samples:
-    """Interpolates K values, shape (K,), with the smoothed slopes of `TCubicHermiteSpline`."""
+    """Interpolates K values, shape (K,), by a `TCubicHermiteSpline`, which averages the derivatives of neighbours."""
     spline = TCubicHermiteSpline()
     spline.Initialize(list(zip(*(np.asarray(each).tolist() for each in (time_seq, pos_seq, derpos_seq)))), 0)
     return _sampled(
@@ -113,7 +120,7 @@ def interpolate_cubic_hermite_spline_source_code(
 def plot_interpol_results(
     intertime_seq: ArrayLike, interpos_seq: ArrayLike, time_seq: ArrayLike, pos_seq: ArrayLike, plot_title: str
 ) -> None:
-    """Opens a window with samples and the values that they interpolate."""
+    """Opens a window that plots the samples as a line and the given values as points."""
     import matplotlib.pyplot as plt  # only plots need it
 
     plt.figure()
@@ -126,13 +133,13 @@ def plot_interpol_results(
 def poly5(
     x_seq: Sequence[float], v_seq: Sequence[float], a_seq: Sequence[float], t_seq: Sequence[float], tc: float
 ) -> tuple[float, float, float]:
-    """Returns position, velocity and acceleration at time `tc` [s] of the quintic between two states.
+    """Returns position, velocity and acceleration at time `tc` [s] on the quintic polynomial between two states.
 
     Args:
-        x_seq: Two positions.
-        v_seq: Two velocities.
-        a_seq: Two accelerations.
-        t_seq: Their times [s].
+        x_seq: Position at the start and at the end.
+        v_seq: Velocity at the start and at the end.
+        a_seq: Acceleration at the start and at the end.
+        t_seq: Time of the start and of the end [s].
     """
     curve = quintic(t_seq[1] - t_seq[0], *x_seq, *v_seq, *a_seq)
     values = (
@@ -143,7 +150,7 @@ def poly5(
 
 
 class TCubicHermiteSpline:
-    """A cubic spline through key points of time, value and derivative, whose slopes are means of neighbours' ones."""
+    """Cubic spline through key points. Its slope at a key point is a mean of the neighbours' given derivatives."""
 
     FINITE_DIFF, CARDINAL = 0, 1
     ZERO, GRAD, CYCLIC = 0, 1, 2
@@ -163,11 +170,13 @@ class TCubicHermiteSpline:
         """Sets the key points.
 
         Args:
-            data: K times [s], values and derivatives, in any order.
-            tan_method: Slope of an inner point: FINITE_DIFF, the mean of the derivatives of both neighbours and, twice,
-                its own; CARDINAL, the mean of both neighbours, times 1 - `c`.
-            end_tan: Slope of both ends: ZERO; GRAD, the mean with the neighbour, times `m`; CYCLIC, that of an inner
-                point, the ends being the same one.
+            data: K key points, each with time [s], value and derivative, in any order.
+            tan_method: Slope at an inner point. FINITE_DIFF: mean of the derivatives at both neighbours and at the
+                point, which counts twice. CARDINAL: mean of the derivatives at both neighbours, times 1 - `c`.
+            end_tan: Slope at both ends. ZERO: 0. GRAD: mean of the derivatives at the end and its neighbour, times
+                `m`. CYCLIC: slope of an inner point, as if both ends were the same point.
+            c: Tension of CARDINAL.
+            m: Factor of GRAD.
         """
         times_s, values, given = (list(column) for column in zip(*sorted(map(tuple, data))))
         d = np.asarray(given, dtype=float)
@@ -184,24 +193,29 @@ class TCubicHermiteSpline:
         self._times_s, self._curve = times_s, CubicHermiteSpline(times_s, values, slopes)
 
     def FindIdx(self, t: float, idx_prev: int = 0) -> int:  # noqa: N802
-        """Returns the number of the key point before a time [s], -1 if there is none."""
+        """Returns the index of the last key point up to a time [s]; -1 before the first key point."""
         return bisect_right(self._times_s, t) - 1
 
     def Evaluate(self, t: float) -> float:  # noqa: N802
-        """Returns the value at a time [s]; beyond the ends, the value there."""
+        """Returns the value at a time [s]. Before the first and after the last key point, the value is constant."""
         if self._curve is None:
             raise ValueError("expected key points by Initialize, got none")
         return float(self._curve(np.clip(t, self._times_s[0], self._times_s[-1])))
 
     def PhaseInfo(self, t: float) -> tuple[float, float]:  # noqa: N802
-        """Returns the number of whole periods before a time [s], and the time within its own."""
+        """Returns the number of complete periods before a time [s], and the corresponding time in the first period."""
         start, end = self._times_s[0], self._times_s[-1]
         periods, rest = divmod(t - start, end - start)
         return periods, start + rest
 
     def EvaluateC(self, t: float, pi: tuple[float, float] | None = None) -> float:  # noqa: N802
-        """Returns the value at a time [s] of the periodic curve; each period begins at the last value of the one
-        before.
+        """Returns the value of the periodically continued curve at a time [s].
+
+        Each period begins at the last value of the previous period.
+
+        Args:
+            t: Time [s].
+            pi: Result of `PhaseInfo(t)`; None to compute the result.
         """
         periods, within = self.PhaseInfo(t) if pi is None else pi
         first, last = self.Evaluate(self._times_s[0]), self.Evaluate(self._times_s[-1])

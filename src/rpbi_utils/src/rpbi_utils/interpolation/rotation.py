@@ -1,9 +1,9 @@
-"""Paths of orientations: between two knots, polynomials of the rotation vector from the first one.
+"""Paths of orientations. Between two knots, the rotation vector relative to the first knot is a polynomial of time.
 
 With a rotation R(t) = exp(phi(t)) R0, the angular velocity in fixed axes is J(phi) phi', with the left Jacobian
-J(phi) = 1 + a [phi] + b [phi]^2, a = (1 - cos |phi|)/|phi|^2, b = (|phi| - sin |phi|)/|phi|^3. At phi = 0, J is 1. A
-polynomial of phi has any given orientation, angular velocity and angular acceleration at both ends. It has no singular
-orientation, as long as two knots are less than a whole turn apart.
+J(phi) = 1 + a [phi] + b [phi]^2, a = (1 - cos |phi|)/|phi|^2, b = (|phi| - sin |phi|)/|phi|^3. At phi = 0, J is 1.
+The polynomial phi(t) can meet any orientation, angular velocity and angular acceleration at both ends. The
+parametrization has no singular orientation as long as two knots are less than a full turn apart.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from robot_model.geometry import (
 from rpbi.control.trajectories.trajectory import DesiredState, Knot, Trajectory
 
 SMALL_RAD = 1e-3
-"""Angle below which series replace the quotients of the Jacobian [rad]."""
+"""Angle below which series expansions replace the quotients in the Jacobian [rad]."""
 
 
 class RotationState(NamedTuple):
-    """Orientation and its motion at one time.
+    """Orientation, angular velocity and angular acceleration at one time.
 
     Attributes:
         quat_xyzw: Orientation x, y, z, w.
@@ -52,10 +52,10 @@ class RotationKnot(NamedTuple):
     """An orientation that a path passes through.
 
     Attributes:
-        time_s: When [s].
+        time_s: Time of the knot [s].
         quat_xyzw: Orientation x, y, z, w.
-        rate: Angular velocity in fixed axes [rad/s]; None if it is left open.
-        acceleration: Angular acceleration in fixed axes [rad/s^2]; None if it is left open.
+        rate: Angular velocity in fixed axes [rad/s]; None if it is not prescribed.
+        acceleration: Angular acceleration in fixed axes [rad/s^2]; None if it is not prescribed.
     """
 
     time_s: float
@@ -68,9 +68,9 @@ class RotationSegment(NamedTuple):
     """The segment between two knots.
 
     Attributes:
-        start_s: Where it begins [s].
-        base: Orientation from which it turns, x, y, z, w.
-        turn: Rotation vector from there, in fixed axes [rad].
+        start_s: Time of the first knot [s].
+        base: Orientation of the first knot, x, y, z, w.
+        turn: Rotation vector relative to `base` over time, in fixed axes [rad].
     """
 
     start_s: float
@@ -81,13 +81,12 @@ class RotationSegment(NamedTuple):
 class RotationPath:
     """Orientations through knots; immutable.
 
-    Two knots are joined by the shorter rotation: with a constant angular velocity if one of them has an orientation
-        alone, by a
-    cubic if both have angular velocities, by a quintic if both have angular accelerations as well. Before the first
-    knot and after the last it rests.
+    Two knots are joined by the shorter rotation. The rotation vector is linear in time if one of the knots has only an
+    orientation, cubic if both knots have angular velocities, and quintic if both also have angular accelerations.
+    Before the first knot and after the last knot, the orientation is constant.
 
     Attributes:
-        segments: In the order of time.
+        segments: Segments between the knots, in the order of time.
         end_s: Time of the last knot [s].
         goal: Orientation of the last knot, x, y, z, w.
     """
@@ -100,9 +99,9 @@ class RotationPath:
 
     @classmethod
     def through(cls, knots: Sequence[RotationKnot]) -> RotationPath:
-        """Returns the path through knots, at least one, with strictly increasing times and unit quaternions."""
+        """Returns the path through at least one knot. Times must increase strictly; quaternions must have norm 1."""
         knots = list(knots)
-        for i, after in enumerate(knots[1:]):  # the same rotation, by numbers that do not jump
+        for i, after in enumerate(knots[1:]):  # q and -q are the same rotation: avoids jumps of the numbers
             if math.fsum(p * q for p, q in zip(knots[i].quat_xyzw, after.quat_xyzw)) < 0.0:
                 x, y, z, w = after.quat_xyzw
                 knots[i + 1] = after._replace(quat_xyzw=(-x, -y, -z, -w))
@@ -110,7 +109,7 @@ class RotationPath:
         return cls(segments, knots[-1].time_s, knots[-1].quat_xyzw)
 
     def sample(self, time_s: float) -> RotationState:
-        """Returns the state at a time [s]."""
+        """Returns orientation, angular velocity and angular acceleration at a time [s]."""
         if time_s >= self.end_s or not self.segments:
             return RotationState(self.goal)
         if time_s < self._starts[0]:
@@ -119,20 +118,20 @@ class RotationPath:
         return _turned(segment.base, segment.turn.sample(time_s))
 
     def spliced(self, new: RotationPath, at_s: float) -> RotationPath:
-        """Returns this path until a time [s], and another one, which begins there, from then on."""
+        """Returns a path that follows this path until `at_s` [s], and then the path `new`, which begins at `at_s`."""
         kept = [each for each in self.segments if each.start_s < at_s]
         if self.end_s < at_s:
             kept.append(_resting(self.end_s, self.goal, at_s))
         return RotationPath([*kept, *new.segments], new.end_s, new.goal)
 
     def since(self, time_s: float) -> RotationPath:
-        """Returns the same path without the segments that are over at a time [s]."""
+        """Returns this path without the segments that end before a time [s]."""
         first = max(bisect_right(self._starts, time_s) - 1, 0)
         return RotationPath(self.segments[first:], self.end_s, self.goal)
 
 
 def angular_rates(times_s: Sequence[float], quats_xyzw: Sequence[Quaternion]) -> list[Vector]:
-    """Returns smooth angular velocities at K orientations, in fixed axes [rad/s]; zero at both ends."""
+    """Estimates smooth angular velocities at K orientations, in fixed axes [rad/s]. They are zero at both ends."""
     h = [after - before for before, after in zip(times_s, times_s[1:])]
     pairs = zip(quats_xyzw, quats_xyzw[1:])
     slopes = [scaled(1.0 / h[i], rotation_between(*pair)) for i, pair in enumerate(pairs)]
@@ -180,7 +179,7 @@ def _with_jacobian(phi: Vector, v: Vector) -> Vector:
 
 
 def _without_jacobian(phi: Vector, v: Vector) -> Vector:
-    """Returns the inverse of J(phi) times v; |phi| is at most pi."""
+    """Returns J(phi)^-1 v, for |phi| up to pi."""
     angle = norm(phi)
     half = 0.5 * angle
     c = 1.0 / 12.0 if angle < SMALL_RAD else (1.0 - half * math.cos(half) / math.sin(half)) / angle**2
@@ -189,7 +188,7 @@ def _without_jacobian(phi: Vector, v: Vector) -> Vector:
 
 
 def _jacobian_rate(phi: Vector, rate: Vector) -> Vector:
-    """Returns the derivative of J(phi), while phi changes by `rate`, times `rate`."""
+    """Returns (dJ(phi)/dt) phi', where phi' is `rate`."""
     _, b, da, db = _coefficients(norm(phi))
     swing = dot(phi, rate)
     once = cross(phi, rate)
@@ -197,7 +196,7 @@ def _jacobian_rate(phi: Vector, rate: Vector) -> Vector:
 
 
 def _coefficients(angle: float) -> tuple[float, float, float, float]:
-    """Returns a and b, and their derivatives by the angle divided by the angle."""
+    """Returns a, b, (da/dx)/x and (db/dx)/x, where x = |phi| is the angle [rad]."""
     square = angle * angle
     if angle < SMALL_RAD:
         return 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0, -1.0 / 12.0, -1.0 / 60.0

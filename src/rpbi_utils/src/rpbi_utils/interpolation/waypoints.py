@@ -1,4 +1,4 @@
-"""Waypoints in messages."""
+"""Reads waypoints from messages."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 
 
 class Waypoints(NamedTuple):
-    """K waypoints.
+    """K waypoints of a motion.
 
     Attributes:
         times_s: K times [s], strictly increasing.
-        scalars: Values of the rows that are interpolated as numbers [m or rad], shape (K, S).
-        rates: Their derivatives [1/s], shape (K, S); None to estimate them.
-        accelerations: Their second derivatives [1/s^2], shape (K, S); None to estimate them.
-        quats_xyzw: K orientations, or None if they are among the scalars or constant.
+        scalars: Values of the S rows that are interpolated as numbers [m or rad], shape (K, S).
+        rates: First derivatives of the scalars [m/s or rad/s], shape (K, S); None to estimate the derivatives.
+        accelerations: Second derivatives of the scalars [m/s^2 or rad/s^2], shape (K, S); None to estimate them.
+        quats_xyzw: K orientations; None if the orientation is constant or part of the scalars.
     """
 
     times_s: tuple[float, ...]
@@ -33,22 +33,22 @@ class Waypoints(NamedTuple):
     quats_xyzw: tuple[Quaternion, ...] | None = None
 
     def slower(self, factor: float) -> Waypoints:
-        """Returns the same waypoints with the derivatives of a motion that takes longer by a factor."""
+        """Returns the waypoints with derivatives for a motion that takes `factor` times as long. Times are unchanged."""
         rates = None if self.rates is None else self.rates / factor
         accelerations = None if self.accelerations is None else self.accelerations / factor**2
         return self._replace(rates=rates, accelerations=accelerations)
 
 
 def waypoint_matrix(layout: Sequence[tuple[str, int]], data: Sequence[float], offset: int = 0) -> Array:
-    """Returns the content of a Float64MultiArray as a matrix.
+    """Returns the content of a Float64MultiArray as a matrix, shape (rows, columns).
 
     Args:
-        layout: Label and size of each dimension.
-        data: The numbers, row by row.
-        offset: The message's `data_offset`.
+        layout: Label and size of the dimensions `rows` and `columns`.
+        data: Numbers of the message, row by row.
+        offset: Number of elements to skip at the start of `data` (the message's `data_offset`).
 
     Raises:
-        WaypointError: If labels or sizes are wrong.
+        WaypointError: If a label or a size is wrong.
     """
     if len(layout) != 2:
         raise WaypointError(f"layout.dim: expected 2 dimensions, 'rows' and 'columns', got {len(layout)}")
@@ -66,12 +66,12 @@ def read_waypoints(matrix: Array, dimensions: MotionDimensions) -> Waypoints:
     """Returns the waypoints in a matrix.
 
     Args:
-        matrix: Row 0: times [s]; then n rows of values, and perhaps n rows of their derivatives and n rows of their
-            second derivatives. Each column is a waypoint.
-        dimensions: Meaning of the rows.
+        matrix: Each column is a waypoint. Row 0 has the times [s], and the next n rows have the values. Optionally, n
+            rows with first derivatives follow, and then n rows with second derivatives.
+        dimensions: Number n and meaning of the rows.
 
     Raises:
-        WaypointError: If it has another form, times do not increase, or a number is not finite.
+        WaypointError: If the matrix has another shape, times do not increase, or a number is not finite.
     """
     n = dimensions.number
     rows, columns = matrix.shape
@@ -95,18 +95,21 @@ def read_waypoints(matrix: Array, dimensions: MotionDimensions) -> Waypoints:
     if dimensions.rotation.is_path:
         quats = tuple(_quat_in(row, column, dimensions.rotation) for column, row in enumerate(values))
     elif dimensions.rotation.rotation_repr == "euler" and rates is not None:
-        rates = rates.copy()  # as in the release, these rows are not used: they may be an angular velocity
+        rates = rates.copy()  # as in the authors' release, these rows are ignored: they may be an angular velocity
         at = [scalar_rows.index(row) for row in dimensions.rotation.rows]
         rates[:, at] = estimated_rates(times_s, values[:, list(dimensions.rotation.rows)])
     return Waypoints(tuple(times_s.tolist()), values[:, scalar_rows], rates, accelerations, quats)
 
 
 def estimated_rates(times_s: Sequence[float] | Array, values: Array) -> Array:
-    """Returns smooth derivatives at K points, zero at both ends.
+    """Estimates smooth derivatives at K points; the derivatives are zero at both ends.
 
     Args:
         times_s: K times [s].
         values: Values at these times, shape (K, S).
+
+    Returns:
+        Derivatives, shape (K, S).
     """
     rates = np.zeros_like(values)
     if len(values) > 2:

@@ -1,3 +1,3 @@
-"""Former names of `rpbi_data.labels.dataset`."""
+"""Former location of the names in `rpbi_data.labels.dataset`, kept for compatibility."""
 
 from rpbi_data.labels.dataset import write_labelled_images as write_labelled_images

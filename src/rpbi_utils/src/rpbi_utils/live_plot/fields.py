@@ -1,4 +1,4 @@
-"""Numeric fields of serialised messages by their names."""
+"""Reads numeric fields of serialised messages, selected by the fields' names."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rpbi_data.bags.message_layout import NUMBER_DTYPES, SCALAR, Field, Leaf, Me
 from rpbi_data.bags.row_plan import STAMP, plan_rows
 
 MAX_LINES = 16
-"""Largest number of lines of one name, which may denote all numbers of an array or of a part of a message."""
+"""Largest number of lines for one name. A name may denote all numbers of an array or of a part of a message."""
 MAX_OFFERED = 12
-"""Largest number of fields that a message lists."""
+"""Largest number of fields that an error message lists."""
 _INDEX = re.compile(r"\[(\d+)\]")
 _TIMES = ("time", "duration")
 
@@ -33,11 +33,11 @@ class FieldError(InterfaceError):
 
 
 class Values(NamedTuple):
-    """Numbers of one message.
+    """Numbers read from one message.
 
     Attributes:
-        stamp_s: The stamp of its header [s]; None without a header, and where it is 0.
-        by_name: The numbers by the name of the field below the topic.
+        stamp_s: Stamp in the message's header [s]; None without a header or if the stamp is 0.
+        by_name: Numbers, keyed by the field's path below the topic.
     """
 
     stamp_s: float | None
@@ -48,11 +48,11 @@ def split_name(name: str, topics: Collection[str]) -> tuple[str, str] | None:
     """Splits a name such as `/arm/joint_states/position[0]` into the topic and the path of the field.
 
     Args:
-        name: The name, with a leading slash. The path may be `position/0` or `position/JOINT`, too.
-        topics: Names of topics. The longest that fits counts.
+        name: Name with a leading slash. The path may also be written as `position/0` or `position/JOINT`.
+        topics: Names of topics. The longest topic with which `name` begins is chosen.
 
     Returns:
-        Topic and path; None if no topic fits.
+        Topic and path of the field; None if `name` begins with none of the topics.
     """
     path = _INDEX.sub(r"/\1", name)
     fitting = [topic for topic in topics if f"{path}/".startswith(f"{topic}/")]
@@ -63,11 +63,11 @@ def split_name(name: str, topics: Collection[str]) -> tuple[str, str] | None:
 
 
 class FieldReader:
-    """Reads a field, or all numbers of a part, of the messages of one topic, which may change their type.
+    """Reads one field, or all numbers of a part, from messages of one topic. The message type may change.
 
     Args:
-        topic: The topic, for errors.
-        path: Path of the field; empty for the whole message.
+        topic: Name of the topic, for error messages.
+        path: Path of the field or part; empty for the whole message.
     """
 
     def __init__(self, topic: str, path: str) -> None:
@@ -75,11 +75,11 @@ class FieldReader:
         self._plan: _Plan | None = None
 
     def read(self, message_type: MessageType, raw: bytes) -> Values:
-        """Returns the numbers of a message; none if the field is in an array that is too short in it.
+        """Returns the numbers of a message; an empty result if an array in the message is too short for the path.
 
         Raises:
-            FieldError: If messages of the type have no such field, or it is no number.
-            ValueError: If the message does not fit its type.
+            FieldError: If messages of the type have no such field, or the field is not a number.
+            ValueError: If the bytes do not fit the message type.
         """
         plan = self._plan
         if plan is None or not plan.fits(message_type, raw):
@@ -90,14 +90,14 @@ class FieldReader:
         layout = lay_out(message_type, raw)
         rows = plan_rows(message_type, raw)
         leaves, fixed = layout.leaves, layout.fixed
-        if len(rows.rows) == 1:  # joints have names there
+        if len(rows.rows) == 1:  # these leaves are named by joint
             leaves, fixed = {**rows.rows[0], **leaves}, rows.fixed
         found = self._chosen(message_type, leaves)
         stamp = leaves.get(STAMP) if message_type.has_header else None
         return _Plan(message_type, [(*span, raw[slice(*span)]) for span in fixed], len(raw), stamp, found)
 
     def _chosen(self, message_type: MessageType, leaves: Mapping[str, Leaf]) -> dict[str, Leaf]:
-        """Returns the leaves to draw by name."""
+        """Returns the numeric leaves at or below the path, keyed by name. Raises a FieldError if the path is wrong."""
         if self.path in leaves:
             if not _is_number(leaves[self.path]):
                 what = "text" if leaves[self.path].kind == "string" else "binary data"
@@ -107,7 +107,7 @@ class FieldReader:
         below = {name: leaf for name, leaf in leaves.items() if name.startswith(prefix) and _is_number(leaf)}
         if not self.path:
             below = {name: leaf for name, leaf in below.items() if not name.startswith("header/")}
-        one_each = {leaf.start: name for name, leaf in reversed(below.items())}  # by the names of joints, if there are
+        one_each = {leaf.start: name for name, leaf in reversed(below.items())}  # prefers joint names
         chosen = [name for name in below if name in one_each.values()]
         if chosen or _may_have_numbers(message_type, self.path):
             if len(chosen) > MAX_LINES:
@@ -128,7 +128,7 @@ class FieldReader:
 
 
 class _Plan:
-    """Location of numbers in all messages of one layout."""
+    """Byte positions of the selected numbers in all messages of one layout."""
 
     def __init__(
         self,
@@ -143,7 +143,7 @@ class _Plan:
         self._leaves = [(name, leaf.kind, _struct(leaf.kind), leaf.start) for name, leaf in leaves.items()]
 
     def fits(self, message_type: MessageType, raw: bytes) -> bool:
-        """Returns whether a message has this layout."""
+        """Returns whether a message has the type and the layout of this plan."""
         if message_type is not self._type or len(raw) != self._size:
             return False
         return all(raw[start:stop] == content for start, stop, content in self._fixed)
@@ -171,7 +171,7 @@ def _is_number(leaf: Leaf) -> bool:
 
 
 def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
-    """Returns whether a type has numbers at or below a path, whatever the lengths of its arrays."""
+    """Returns whether a message type can have numbers at or below a path, for any length of its arrays."""
     if not isinstance(field_type, MessageType):
         return not path and field_type != "string"
     paths = ((field, _path_below(field, path)) for field in field_type.fields)
@@ -179,8 +179,9 @@ def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
 
 
 def _path_below(field: Field, path: str) -> str | None:
-    """Returns the path from an element of a field on; None if a path leads elsewhere. All fields but headers are below
-    the empty path.
+    """Returns the rest of a path below a field; None if the path leads to another field.
+
+    The empty path leads to all fields except headers.
     """
     if not path:
         return None if field.name == "header" else ""

@@ -17,7 +17,7 @@ NAME = "live_plot"
 
 
 def main() -> None:
-    """Runs the program; exits with 1 without a display, with 2 for wrong arguments, with 0 when it is closed."""
+    """Runs the program. Exits with 1 without a display, with 2 for wrong arguments, and otherwise with 0."""
     arguments = _parser().parse_args(rospy.myargv(sys.argv)[1:])
     run_window(NAME, partial(_open, arguments), anonymous=True)
 
@@ -56,7 +56,7 @@ def _open(arguments: argparse.Namespace) -> Opened:
     from .window import LivePlotWindow
 
     class PlotSignals(QObject):
-        """Carries the end of the node into the thread of the window."""
+        """Qt signal that passes the node's shutdown to the window's thread."""
 
         ended = pyqtSignal()
 

@@ -1,4 +1,4 @@
-"""Lines that grow as messages arrive, and the visible part of them."""
+"""Collects the samples of a live plot's lines, and returns the visible part of the lines."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 MAX_SAMPLES = 120_000
-"""Number of newest samples that a line keeps; at 1 kHz those of two minutes."""
+"""Number of newest samples that a line keeps: two minutes at 1 kHz."""
 ANEW_S = 1.0
-"""Time by which stamps have to go back for a restart [s]; samples that are less late are dropped."""
+"""If a sample is older than the newest sample by more than this time, all lines restart [s].
+
+Samples that are out of order by less are dropped.
+"""
 
 _UNITS = {
     "position": "rad or m",
@@ -29,20 +32,20 @@ _UNITS = {
     "angular_velocity": "rad/s",
     "linear_acceleration": "m/s^2",
 }
-"""Units by the names of fields."""
+"""Units, keyed by the field's name."""
 _VECTORS = {"position": "m", "velocity": "m/s"}
-"""Units of fields with components x, y and z, where these differ."""
+"""Units of fields with components x, y and z, where they differ from `_UNITS`."""
 
 
 class Line(NamedTuple):
-    """A line as it is shown, or the reason why there is none.
+    """A visible line, or the reason why a line is missing.
 
     Attributes:
-        name: Its name, of topic and field; of a reason the name that the user gave.
-        times: Times of its samples [s], ascending.
-        values: Their values.
-        note: The reason; empty for a line.
-        number: Its number in the order in which lines began, for its colour.
+        name: Topic and field of the line. For a missing line, the name that the user gave.
+        times: Times of the samples [s], ascending, shape (N,).
+        values: Values of the samples, shape (N,).
+        note: Reason why the line is missing; empty for a visible line.
+        number: Index of the line in the order of creation. It selects the colour.
     """
 
     name: str
@@ -53,15 +56,15 @@ class Line(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Unit of its values, by the names of its field; empty if they name no quantity."""
-        *_, field, last = ["", "", *re.findall(r"\w+", self.name)]  # the last may be the name of a joint
+        """Unit of the values, derived from the field's name; empty if the name is not a known quantity."""
+        *_, field, last = ["", "", *re.findall(r"\w+", self.name)]  # the last part may be the name of a joint
         if last in ("x", "y", "z") and field in _VECTORS:
             return _VECTORS[field]
         return _UNITS.get(field, _UNITS.get(last, ""))
 
 
 class _Samples:
-    """The newest samples of a line, which has a rank and a number among all."""
+    """Buffer of a line's newest samples. `rank` orders the lines in the plot, `number` selects the colour."""
 
     def __init__(self, rank: int, number: int) -> None:
         self.rank, self.number = rank, number
@@ -81,14 +84,14 @@ class _Samples:
         self._end += 1
 
     def since(self, start_s: float) -> tuple[Array, Array]:
-        """Returns copies of times and values from a time on, and of the sample before."""
+        """Returns copies of times [s] and values from `start_s` [s] on, including the last sample before `start_s`."""
         times = self._times[: self._end]
         first = max(0, int(np.searchsorted(times, start_s)) - 1)
         return times[first:].copy(), self._values[first : self._end].copy()
 
 
 class LivePlot:
-    """Lines by name, filled by some threads and shown by another one."""
+    """Lines of a plot, keyed by name. Several threads may add samples while another thread reads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -96,18 +99,18 @@ class LivePlot:
         self._notes: dict[str, str] = {}
         self._newest_s = -np.inf
         self.count = 0
-        """Number of values that came."""
+        """Number of samples that were added so far."""
         self.changes = 0
-        """Number of changes of the data to show."""
+        """Number of changes of the visible data so far."""
 
     def add(self, name: str, time_s: float, value: float, rank: int = 0) -> None:
-        """Appends a sample to a line, which begins with its first one; all lines restart if time goes back.
+        """Appends a sample to a line, and creates the line if necessary. All lines restart if time goes back.
 
         Args:
             name: Name of the line.
             time_s: Time of the sample [s].
-            value: Its value.
-            rank: Lines of a smaller rank come first.
+            value: Value of the sample.
+            rank: Sort key of the line. Lines with smaller ranks come first.
         """
         with self._lock:
             if time_s < self._newest_s - ANEW_S:
@@ -122,7 +125,7 @@ class LivePlot:
             self.changes += 1
 
     def note(self, name: str, text: str) -> None:
-        """Sets the reason why lines of a name do not grow; an empty one if they do."""
+        """Sets the reason why lines of a name get no samples. An empty text removes the reason."""
         with self._lock:
             if self._notes.get(name, "") != text:
                 self._notes[name] = text
@@ -135,10 +138,10 @@ class LivePlot:
             self.changes += 1
 
     def view(self, seconds: float) -> tuple[float, list[Line]]:
-        """Returns the time of the newest sample [s], and the reasons and lines with the samples of some time before.
+        """Returns the time of the newest sample [s], and the lines: missing lines first, then lines with samples.
 
         Args:
-            seconds: Length of that time [s].
+            seconds: Length of the visible time span before the newest sample [s].
         """
         with self._lock:
             end_s = self._newest_s if np.isfinite(self._newest_s) else 0.0
@@ -150,17 +153,17 @@ class LivePlot:
 
 
 def thinned(times: Array, values: Array, start_s: float, end_s: float, columns: int) -> tuple[Array, Array]:
-    """Returns points that look the same in a picture: only the lowest and the highest of each column of pixels.
+    """Reduces samples to the lowest and highest value per pixel column, which look the same in a picture.
 
     Args:
-        times: Ascending [s].
-        values: As many.
+        times: Times of the samples [s], ascending, shape (N,).
+        values: Values of the samples, shape (N,).
         start_s: Time of the left edge [s].
         end_s: Time of the right edge [s].
         columns: Width of the picture [px].
 
     Returns:
-        Horizontal places [px] and values.
+        Horizontal positions [px] and values of the remaining points.
     """
     places = (times - start_s) * (columns / (end_s - start_s))
     if len(places) <= 2 * columns:
@@ -171,12 +174,12 @@ def thinned(times: Array, values: Array, start_s: float, end_s: float, columns: 
 
 
 def ticks(low: float, high: float, count: float) -> tuple[list[float], int]:
-    """Returns round numbers in a range, and the number of their decimals.
+    """Returns evenly spaced round numbers for the marks of an axis, and the number of decimals to print.
 
     Args:
-        low: Lower end.
-        high: Upper end, above the lower one.
-        count: Largest number of intervals between them.
+        low: Lower end of the axis.
+        high: Upper end of the axis, above `low`.
+        count: Largest number of intervals between marks.
     """
     raw = (high - low) / count
     power = 10.0 ** np.floor(np.log10(raw))

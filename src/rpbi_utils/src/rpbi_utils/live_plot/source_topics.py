@@ -1,4 +1,4 @@
-"""Feeds a plot with fields of topics, which may appear later, change their type, and disappear."""
+"""Feeds a plot with fields of topics. Topics may appear later, change their type, and disappear."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .plot import LivePlot
 LOOK_S = 1.0
 """Period of queries of the ROS master [s]."""
 PATIENCE_S = 3.0
-"""Time after which a missing topic is logged [s]; nodes that start together need some."""
+"""Time after the start from which missing topics are logged [s]. Nodes that start at the same time may need a while."""
 
 
 class FieldSource:
-    """Subscribes to topics as raw bytes, and reads the fields by the definitions that their publishers send.
+    """Subscribes to topics as raw bytes, and reads fields by the message definitions that the publishers send.
 
     Args:
-        names: Names such as `/arm/joint_states/position[0]`; relative ones are in this node's namespace.
-        plot: The plot.
+        names: Names such as `/arm/joint_states/position[0]`. Relative names are in this node's namespace.
+        plot: Plot that receives the samples.
     """
 
     def __init__(self, names: Sequence[str], plot: LivePlot) -> None:
@@ -47,8 +47,8 @@ class FieldSource:
             try:
                 self._look()
             except MASTER_FAILURES:
-                pass  # connections go on without it
-            except rospy.ROSException:  # it is shutting down
+                pass  # subscriptions work without the ROS master
+            except rospy.ROSException:  # the node is shutting down
                 return
             time.sleep(LOOK_S)
 
@@ -65,7 +65,7 @@ class FieldSource:
             else:
                 wanted.setdefault(found[0], []).append((name, found[1]))
         for topic in self._topics.keys() - wanted.keys():
-            if topic not in publishers | others:  # it has gone; its samples stay
+            if topic not in publishers | others:  # the topic has disappeared: keep its samples
                 wanted[topic] = self._topics[topic].fields
         for topic in self._topics.keys() - wanted.keys():
             self._topics.pop(topic).close()
@@ -86,13 +86,13 @@ class FieldSource:
 
 
 class _Clock:
-    """Time of samples: stamps, and for messages without one the newest stamp and the time since it came."""
+    """Assigns a time to each sample: the message's stamp, or else the newest stamp plus the time since its arrival."""
 
     def __init__(self) -> None:
         self._stamp_s, self._at_s = 0.0, time.monotonic()
 
     def time_of(self, stamp_s: float | None) -> float:
-        """Returns the time of a message that has just come [s]."""
+        """Returns the time of a message that has just arrived [s]."""
         if stamp_s is None:
             return self._stamp_s + time.monotonic() - self._at_s
         self._stamp_s, self._at_s = stamp_s, time.monotonic()
@@ -100,7 +100,7 @@ class _Clock:
 
 
 class _Topic:
-    """A topic with fields to draw."""
+    """Subscribes to a topic and adds the values of its selected fields to the plot."""
 
     def __init__(
         self, topic: str, fields: list[tuple[str, str]], ranks: Mapping[str, int], plot: LivePlot, clock: _Clock
@@ -120,7 +120,7 @@ class _Topic:
         self._subscriber.unregister()
 
     def is_published(self, is_published: bool) -> None:
-        """Records why there are no messages, if there are none."""
+        """Shows in the plot why messages are missing: without a publisher, or before the first message."""
         for name, _ in self.fields:
             if not is_published:
                 self._plot.note(name, "nobody publishes it")
@@ -163,7 +163,7 @@ class _Topic:
         return self._types[key]
 
     def _fail(self, names: Iterable[str], text: str) -> None:
-        """Records and logs an error once, unless values arrived before, as for joints that only some messages have."""
+        """Shows and logs an error once per name. Names that have had values are skipped: some messages lack joints."""
         for name in names:
             if name not in self._drawn and self._errors.get(name) != text:
                 self._errors[name] = text

@@ -1,4 +1,4 @@
-"""The window with the lines, its buttons and keys."""
+"""Window of the live plot, with buttons and keys."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ MIN_SECONDS, MAX_SECONDS = 0.5, 120.0
 """Shortest and longest time that the window shows [s]."""
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf", "#7f7f7f", "#bcbd22")
 LEFT, RIGHT, TOP, BOTTOM = 80, 12, 8, 28
-"""Margins of the lines [px]."""
+"""Margins around the lines [px]."""
 UNIT_WIDTH, GAP = 18, 12
-"""Width of the column of the units, and height between charts [px]."""
+"""Width of the column with the units, and vertical gap between two charts [px]."""
 ROW = 17
 """Height of a row of the legend [px]."""
 MAX_LEGEND = 10
@@ -39,16 +39,16 @@ GRID, INK, FAULT, PAPER = QColor("#e0e0e0"), QColor("#303030"), QColor("#a02020"
 
 
 class Chart(NamedTuple):
-    """The lines of one unit, with a vertical axis of their own.
+    """All lines with the same unit, drawn with a common vertical axis.
 
     Attributes:
-        unit: Their unit.
-        lines: The lines, and the reasons of missing ones.
-        points: Horizontal places [px] and values of each.
-        low: Lower end of the axis.
-        high: Upper end.
-        top: Upper edge [px].
-        height: Height [px].
+        unit: Unit of the lines.
+        lines: Visible lines. The first chart also contains missing lines, with their reasons.
+        points: Horizontal positions [px] and values of each line.
+        low: Lower end of the vertical axis, in `unit`.
+        high: Upper end of the vertical axis, in `unit`.
+        top: Position of the upper edge [px].
+        height: Height of the chart [px].
     """
 
     unit: str
@@ -60,12 +60,12 @@ class Chart(NamedTuple):
     height: float
 
     def y(self, value: Any) -> Any:
-        """Returns the place of a value, or of an array of them [px]."""
+        """Returns the vertical position of a value, or of each value of an array [px]."""
         return self.top + (self.high - value) * (self.height / (self.high - self.low))
 
 
 class Canvas(QWidget):
-    """Draws lines over the last seconds, as fast as samples arrive: a chart for each unit."""
+    """Draws the lines over the last `seconds` [s], with one chart per unit."""
 
     def __init__(self, plot: LivePlot, seconds: float) -> None:
         super().__init__()
@@ -85,7 +85,7 @@ class Canvas(QWidget):
         return self._frozen is not None
 
     def pause(self) -> None:
-        """Pauses the view, or continues it."""
+        """Pauses the view, or continues a paused view."""
         self._frozen = self._plot.view(MAX_SECONDS) if self._frozen is None else None
         self.update()
 
@@ -97,17 +97,17 @@ class Canvas(QWidget):
         self.update()
 
     def zoom(self, factor: float) -> None:
-        """Multiplies the time that is shown."""
+        """Multiplies the length of the visible time span by a factor."""
         self.seconds = float(np.clip(self.seconds * factor, MIN_SECONDS, MAX_SECONDS))
         self.update()
 
     def look(self) -> None:
-        """Redraws if there are new data."""
+        """Redraws if the data have changed and the view is not paused."""
         if self._frozen is None and self._plot.changes != self._shown:
             self.update()
 
     def view(self) -> tuple[float, list[Line]]:
-        """Returns the time of the right edge [s], and the lines."""
+        """Returns the time at the right edge [s], and the lines."""
         return self._plot.view(self.seconds) if self._frozen is None else self._frozen
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
@@ -131,7 +131,7 @@ class Canvas(QWidget):
         painter.end()
 
     def _charts(self, end_s: float, lines: list[Line]) -> list[Chart]:
-        """Returns the charts from top to bottom; reasons of missing lines are in the first one."""
+        """Returns the charts from top to bottom. The first chart includes the missing lines."""
         of_unit: dict[str, list[Line]] = {}
         for line in lines:
             if not line.note:
@@ -156,7 +156,7 @@ class Canvas(QWidget):
         return thinned(times, values, start_s, end_s, width)
 
     def _background(self, charts: list[Chart]) -> QPixmap:
-        """Returns the axes, which are drawn only when they change."""
+        """Returns a picture of the axes, which is drawn again only when the axes change."""
         axes = [(chart.unit, chart.low, chart.high) for chart in charts]
         wanted = (*axes, self.seconds, self.width(), self.height())
         if self._grid is None or wanted != self._grid_of:
@@ -215,12 +215,12 @@ class Canvas(QWidget):
 
 
 class LivePlotWindow(QMainWindow):
-    """Canvas, buttons, and a line with the newest event and the rates.
+    """Window with the plot, buttons, the newest event, and the rates of redraws and values.
 
     Args:
-        plot: The lines.
-        seconds: Time that is shown [s].
-        folder: Folder of saved files.
+        plot: Lines to draw.
+        seconds: Initial length of the visible time span [s].
+        folder: Folder for saved files.
     """
 
     def __init__(self, plot: LivePlot, seconds: float, folder: Path) -> None:
@@ -254,7 +254,7 @@ class LivePlotWindow(QMainWindow):
         self._timer.start(PERIOD_MS)
 
     def end(self) -> None:
-        """Stops drawing."""
+        """Stops the periodic redraw."""
         self._timer.stop()
 
     def _look(self) -> None:
@@ -278,7 +278,7 @@ class LivePlotWindow(QMainWindow):
     def _on_pause(self) -> None:
         self.canvas.pause()
         self._pause.setText("Go on" if self.canvas.is_paused else "Pause")
-        self._pause.setShortcut("Space")  # which Qt drops with the text
+        self._pause.setShortcut("Space")  # Qt removes the shortcut when the text changes
         self._message.setText("paused" if self.canvas.is_paused else "goes on")
 
     def _on_clear(self) -> None:
@@ -286,7 +286,7 @@ class LivePlotWindow(QMainWindow):
         self._message.setText("cleared")
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
-        """Writes the visible data to a new file, first under a temporary name."""
+        """Writes a new file in the folder; `write` receives a temporary path, which is renamed at the end."""
         path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -327,7 +327,7 @@ def _legend_row(line: Line) -> tuple[str, QColor]:
 
 
 def _range(values: list[np.ndarray]) -> tuple[float, float]:
-    """Returns the ends of the vertical axis at round numbers, so that they change rarely."""
+    """Returns the ends of the vertical axis for arrays of values. The ends are round numbers, so they change rarely."""
     filled = [each for each in values if len(each)]
     low = min((float(each.min()) for each in filled), default=0.0)
     high = max((float(each.max()) for each in filled), default=1.0)
@@ -340,7 +340,7 @@ def _range(values: list[np.ndarray]) -> tuple[float, float]:
 
 
 def _polygon(x: np.ndarray, y: np.ndarray) -> QPolygonF:
-    """Returns points as a Qt polygon, by one copy instead of an object for each."""
+    """Returns points [px] as a Qt polygon. The arrays are copied as a whole, without a Python object for each point."""
     polygon = QPolygonF(len(x))
     if len(x):
         memory: Any = polygon.data().asarray(16 * len(x))

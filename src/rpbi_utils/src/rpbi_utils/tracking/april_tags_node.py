@@ -1,4 +1,4 @@
-"""`apriltag_node.py`: AprilTags in a camera's images, on the topics of apriltag_ros."""
+"""`apriltag_node.py`: detects AprilTags in a camera's images. The topics are those of apriltag_ros."""
 
 from __future__ import annotations
 
@@ -24,11 +24,14 @@ from .tags import Image, TagDetector, tag_poses
 QUEUE_SIZE = 10
 CHANNELS = {"mono8": 1, "rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4}
 LUMA = np.array([0.299, 0.587, 0.114])
-"""Shares of red, green and blue in grey, ITU-R BT.601."""
+"""Weights of red, green and blue in a grey value (ITU-R BT.601)."""
 
 
 def grey_image(message: ImageMessage) -> Image:
-    """Returns an image as grey bytes, rows x columns; raises a ValueError for other encodings or sizes."""
+    """Converts an image message to grey bytes, shape (rows, columns).
+
+    Raises a ValueError if the encoding is not in `CHANNELS` or the size of the data is wrong.
+    """
     channels = CHANNELS.get(message.encoding)
     if channels is None:
         raise ValueError(f"expected an image in {', '.join(CHANNELS)}, got '{message.encoding}'")
@@ -44,7 +47,7 @@ def grey_image(message: ImageMessage) -> Image:
 
 
 class AprilTagNode:
-    """Publishes the tags in each image of `image_rect`, with the calibration on `camera_info`.
+    """Detects tags in images on `image_rect`, with the camera matrix on `camera_info`, and publishes their poses.
 
     Raises:
         ConfigError: If the configuration is wrong.

@@ -1,4 +1,4 @@
-"""Configuration of the nodes of tracking systems."""
+"""Configuration of the tracking nodes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from robot_model.geometry import Pose
 from .tracker import OutlierConfig, SmoothingConfig
 
 FAMILY_SIZE = 587
-"""Tags in the family tag36h11."""
+"""Number of tags in the family tag36h11."""
 
 
 class TrackedObjectConfig(ConfigModel):
@@ -55,7 +55,7 @@ class TrackedObjectConfig(ConfigModel):
 
     @property
     def tag_ids(self) -> tuple[int, ...]:
-        """The ids of its tags, sorted; none if Vicon sees it."""
+        """Ids of the object's tags, sorted; empty if Vicon tracks the object."""
         if self.april_tag is None:
             return ()
         return (self.april_tag,) if isinstance(self.april_tag, int) else tuple(sorted(self.april_tag))

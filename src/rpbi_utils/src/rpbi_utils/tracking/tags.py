@@ -1,4 +1,4 @@
-"""AprilTags of the family tag36h11: detected in images, by OpenCV, and written as textured squares for a world."""
+"""Detects AprilTags (family tag36h11) in images with OpenCV, and writes them as textured meshes for a world."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from robot_model.geometry import Pose
 from .config import FAMILY_SIZE
 
 CELLS = 8
-"""Cells along a side of a tag's black square."""
+"""Number of cells along a side of a tag's black square."""
 PIXEL_CENTRE = 0.5
-"""Coordinate of the centre of pixel 0 in the family's own search for squares, OpenCV's CORNER_REFINE_APRILTAG."""
+"""Coordinate of the centre of pixel 0 in the corners refined by OpenCV's CORNER_REFINE_APRILTAG [px]."""
 Image = npt.NDArray[np.uint8]
 
 
@@ -30,9 +30,9 @@ class DetectedTag(NamedTuple):
     """A tag in an image.
 
     Attributes:
-        id: Its number.
-        corners: 4 x 2 pixels of the black square: bottom left, bottom right, top right, top left of the
-            upright tag; pixel centres are at whole numbers.
+        id: Id of the tag in the family.
+        corners: Corners of the black square [px], shape (4, 2), in the order bottom left, bottom right, top right, top
+            left of the upright tag. Pixel centres are at whole numbers.
     """
 
     id: int
@@ -40,7 +40,7 @@ class DetectedTag(NamedTuple):
 
 
 def _opencv() -> Any:
-    """Returns the module; raises MissingDependency if there is none."""
+    """Returns the module `cv2`. Raises MissingDependency if OpenCV is not installed."""
     try:
         return import_module("cv2")
     except ImportError as error:
@@ -52,9 +52,9 @@ def _dictionary(cv2: Any) -> Any:
 
 
 def tag_image(number: int) -> Image:
-    """Returns a tag with a white margin of one cell, a pixel a cell, 0 or 255, as the family's authors draw it.
+    """Returns the picture of a tag with a white margin of one cell, one pixel per cell, with values 0 or 255.
 
-    OpenCV's tags of this family are upside down.
+    The tag is upright, as drawn by the family's authors. OpenCV's pictures of these tags are upside down.
     """
     cv2 = _opencv()
     draw = getattr(cv2.aruco, "generateImageMarker", None) or cv2.aruco.drawMarker
@@ -63,7 +63,7 @@ def tag_image(number: int) -> Image:
 
 
 class TagDetector:
-    """Finds tags in grey images, corners refined to parts of a pixel.
+    """Finds tags in grey images, with corners at sub-pixel precision.
 
     Raises:
         MissingDependency: If OpenCV is not installed.
@@ -82,7 +82,7 @@ class TagDetector:
         )
 
     def detect(self, grey: Image) -> list[DetectedTag]:
-        """Returns the tags in an image (rows x columns), each once; tags with two detections are left out."""
+        """Returns the tags in an image, shape (rows, columns), sorted by id. Ids that are found twice are left out."""
         corners, ids, _ = self._find(grey)
         numbers = [] if ids is None else ids.ravel().tolist()
         # OpenCV starts at the bottom right of the upright tag, and continues clockwise
@@ -95,20 +95,21 @@ class TagDetector:
 
 
 def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float64]) -> Pose | None:
-    """Returns the pose of a tag in the optical frame, None if there is none in front of the camera.
+    """Returns the pose of a tag in the camera's optical frame; None if no solution is in front of the camera.
 
     The tag's frame has x to the right, y up and z out of the tag.
 
     Args:
+        tag: Tag in a rectified image.
         size: Side of the black square [m].
-        camera_matrix: 3 x 3, of a rectified image.
+        camera_matrix: Camera matrix of the rectified image [px], shape (3, 3).
     """
     cv2 = _opencv()
     half = size / 2.0
-    # In the order that SOLVEPNP_IPPE_SQUARE wants: top left, top right, bottom right, bottom left
+    # Order required by SOLVEPNP_IPPE_SQUARE: top left, top right, bottom right, bottom left
     square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
     pixels = tag.corners[[3, 2, 1, 0]]
-    # The first finds both candidate poses of a tag, but fails for tags that are parallel to the image
+    # IPPE_SQUARE finds both candidate poses of a tag, but fails for tags that are parallel to the image
     solutions = [
         (float(error), rotation, translation)
         for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE)
@@ -128,7 +129,7 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
 def tag_poses(
     detector: TagDetector, grey: Image, camera_matrix: npt.NDArray[np.float64], sizes: Mapping[int, float]
 ) -> Iterator[tuple[int, Pose]]:
-    """Yields id and pose of the tags in an image whose sizes [m] are known."""
+    """Yields the id and the pose of each tag in an image. Skips tags whose id is not a key of `sizes` [m]."""
     for tag in detector.detect(grey):
         if tag.id in sizes and (pose := tag_pose(tag, sizes[tag.id], camera_matrix)) is not None:
             yield tag.id, pose
@@ -161,15 +162,12 @@ map_Kd {name}.png
 
 
 def write_tag(number: int, size: float, folder: Path) -> Path:
-    """Writes a mesh with its material and picture.
+    """Writes the mesh of a tag, with material and picture, and returns the path of the mesh.
 
     Args:
         number: Id of the tag.
-        size: Side of the black square [m]; the white margin is another eighth on each side.
-        folder: Target folder; it is created if missing.
-
-    Returns:
-        The path of the mesh.
+        size: Side of the black square [m]. A white margin adds one eighth of the side at each edge.
+        folder: Target folder. It is created if missing.
     """
     picture = np.kron(tag_image(number), np.ones((PIXELS_A_CELL, PIXELS_A_CELL), np.uint8))
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""`tracked_object_node.py`: detections of Vicon or an AprilTag detector as smooth TF frames that objects follow."""
+"""`tracked_object_node.py`: turns detections by Vicon or an AprilTag detector into smooth TF frames of objects."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LOOKS_HZ = 10.0
 
 
 class TrackedObject:
-    """A tracked object, and whether it is visible."""
+    """Tracks one object, and logs when the object is seen and when it is lost."""
 
     def __init__(self, config: TrackedObjectConfig, node: TrackingNodeConfig) -> None:
         self.config = config
@@ -42,21 +42,21 @@ class TrackedObject:
         self._is_seen = False
 
     def note_seen(self) -> None:
-        """Records that it is visible now."""
+        """Records that the object is visible now."""
         self._seen_s = time.monotonic()
         if not self._is_seen:
             self._is_seen = True
             rospy.loginfo("%s: is seen", self.config.name)
 
     def tell_if_lost(self) -> None:
-        """Reports once that no pose has arrived for too long."""
+        """Logs a warning once when no pose has arrived for `timeout_s`."""
         if self._is_seen and time.monotonic() - self._seen_s > self._timeout_s:
             self._is_seen = False
             rospy.logwarn("%s: is lost: no pose for %g s; nothing is broadcast", self.config.name, self._timeout_s)
 
 
 class TrackedObjectNode:
-    """Broadcasts the frames of the objects of `~config` while they are seen.
+    """Broadcasts a TF frame for each object in `~config` while the object is seen.
 
     Raises:
         ConfigError: If the configuration is wrong.
@@ -102,7 +102,7 @@ class TrackedObjectNode:
     def _observe(self, tracked: TrackedObject, header: Header, message: PoseMessage) -> None:
         config = tracked.config
         try:
-            frame_id = config.frame_id or header.frame_id.strip("/")  # a message of vicon_bridge is not valid for tf2
+            frame_id = config.frame_id or header.frame_id.strip("/")  # vicon_bridge has slashes, invalid in tf2
             stamp = header.stamp or rospy.Time.now()
             pose = self._in_world(frame_id, stamp) @ _pose_in(message, config.unit) @ config.offset
             smoothed = tracked.tracker.observe(pose, stamp.to_sec())
@@ -118,8 +118,9 @@ class TrackedObjectNode:
             self._publisher.publish(TFMessage([transform]))
 
     def _in_world(self, frame_id: str, stamp: rospy.Time) -> Pose:
-        """Returns the pose of a source's frame at the time of a detection; its present pose if TF does not cover that
-        time.
+        """Returns the pose of a detection's source frame in the configured frame, at the time of the detection.
+
+        If TF does not cover this time, returns the newest pose.
         """
         if frame_id == self._frame_id:
             return Pose()
@@ -135,7 +136,7 @@ def _key(ids: Sequence[int]) -> tuple[int, ...]:
 
 
 def _pose_in(message: PoseMessage, unit: str) -> Pose:
-    """Returns the pose in a message in metres; raises a ValueError if it is invalid."""
+    """Returns the pose in a message, converted to metres. Raises a ValueError if the pose is invalid."""
     scale = 0.001 if unit == "mm" else 1.0
     p, q = message.position, message.orientation
     return check_pose(Pose((scale * p.x, scale * p.y, scale * p.z), (q.x, q.y, q.z, q.w)))

@@ -1,4 +1,4 @@
-"""Filters the poses of one tracked object: drops outliers and smooths the rest by the one-euro filter."""
+"""Filters the poses of one tracked object: drops outliers and smooths the other poses with the one-euro filter."""
 
 from __future__ import annotations
 
@@ -36,10 +36,11 @@ class SmoothingConfig(ConfigModel):
 
 
 class OneEuroPose:
-    """A low-pass of poses whose cut-off frequency grows with the speed, for samples at any spacing.
+    """Low-pass filter for poses, whose cut-off frequency grows with the speed. Samples may be unevenly spaced.
 
-    Formulas: Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012; the gain of a low-pass is `1 - exp(-2 pi f dt)`, as
-    for a value that is held between samples. Orientations move along the shortest rotation by the same share.
+    Formulas: Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012. The gain of a low-pass filter is here
+    `1 - exp(-2 pi f dt)`, as if the input were constant between samples. Orientations are filtered along the shortest
+    rotation.
     """
 
     def __init__(self, config: SmoothingConfig) -> None:
@@ -48,10 +49,10 @@ class OneEuroPose:
         self._rotation: Vector = (0.0, 0.0, 0.0)
         self._last: Pose | None = None
         self.output: Pose | None = None
-        """The newest pose, None before the first."""
+        """Newest filtered pose; None before the first sample."""
 
     def step(self, pose: Pose, dt_s: float) -> Pose:
-        """Filters a pose that is `dt_s` later than the previous one; returns the smoothed one."""
+        """Filters a pose that was measured `dt_s` [s] after the previous pose, and returns the filtered pose."""
         if self.output is None or self._last is None:
             self._last = self.output = pose
             return pose
@@ -74,7 +75,7 @@ def _gain(cutoff_hz: float, dt_s: float) -> float:
 
 
 def _between(start: Quaternion, end: Quaternion, share: float) -> Quaternion:
-    """Returns the orientation that is a share of the shortest rotation from one to another."""
+    """Returns the orientation at a share, 0 to 1, of the shortest rotation from `start` to `end`."""
     turn = quaternion_of(scaled(share, rotation_between(start, end)))
     return normalized(quaternion_product(turn, start))
 
@@ -96,16 +97,16 @@ class OutlierConfig(ConfigModel):
 
 
 class OutlierError(ValueError):
-    """A pose that the object cannot have."""
+    """A pose is an outlier: the object cannot have moved there."""
 
 
 class PoseTracker:
-    """Computes a smooth path from the poses of one object, in the time of their stamps.
+    """Drops outliers from the poses of one object, and smooths the other poses. Time is taken from the stamps.
 
     Args:
-        smoothing: The smoothing.
-        outliers: The rejection of outliers.
-        timeout_s: Time without a pose after which it restarts [s].
+        smoothing: Parameters of the smoothing.
+        outliers: Limits of the object's motion, beyond which a pose is an outlier.
+        timeout_s: Time without a pose after which the filter restarts [s].
     """
 
     def __init__(self, smoothing: SmoothingConfig, outliers: OutlierConfig, timeout_s: float) -> None:
@@ -117,15 +118,15 @@ class PoseTracker:
         self._forget()
 
     def observe(self, pose: Pose, stamp_s: float) -> Pose | None:
-        """Adds a pose with its time [s]; returns the smoothed one.
+        """Adds a pose with its stamp [s], and returns the smoothed pose.
 
-        Returns None for a pose that is not later than the previous one: a repetition, or messages out of order.
+        Returns None if the stamp is not later than the previous stamp, as in repeated or reordered messages.
 
         Raises:
-            OutlierError: If the object cannot have that pose; the pose is dropped.
+            OutlierError: If the object cannot have moved to the pose. The pose is dropped.
         """
         age_s = math.inf if self._stamp_s is None else stamp_s - self._stamp_s
-        if age_s > self._timeout_s or age_s < -self._timeout_s:  # visible again, or another clock
+        if age_s > self._timeout_s or age_s < -self._timeout_s:  # visible again, or the clock was changed
             self._forget()
         elif age_s <= 0.0:
             return None
@@ -151,7 +152,7 @@ class PoseTracker:
         self._forget()
 
     def _impossible(self, start: Pose, end: Pose, dt_s: float) -> str | None:
-        """Returns why a motion between two poses in a time is impossible; None if it is possible."""
+        """Returns why a motion from `start` to `end` within `dt_s` [s] is impossible; None if it is possible."""
         limits = self._outliers
         way = math.dist(start.position, end.position)
         turn = math.hypot(*rotation_between(start.quat_xyzw, end.quat_xyzw))

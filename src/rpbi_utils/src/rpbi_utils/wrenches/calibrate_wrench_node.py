@@ -1,4 +1,4 @@
-"""`calibrate_wrench_node.py`: a wrench less its zero and less the weight of a payload."""
+"""`calibrate_wrench_node.py`: subtracts a sensor's zero and a payload's weight from measured wrenches."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from .identification import PoseSample, UndeterminedError, identify_payload
 
 QUEUE_SIZE = 100
 MAX_SILENCE_S = 5.0
-"""Time without a message after which a mean is given up [s of wall time]."""
+"""Time without a message after which the computation of a mean fails [s of wall time]."""
 RETRY_S = 0.2
-"""Time after which a sensor that is not at rest is zeroed again [s]."""
+"""Time between two attempts to zero a sensor that is not at rest [s]."""
 MAX_TF_AGE_S = 0.5
-"""Largest age of the sensor's pose compared with a wrench [s]."""
+"""Largest difference between the stamps of a wrench and of the sensor's pose [s]."""
 
 
 class SilentError(ValueError):
-    """No wrench has arrived."""
+    """No wrench has arrived, or another service is using the sensor."""
 
 
 class CalibrateWrenchNode:
-    """Publishes the wrench on `wrench`, less its zero and less a payload's weight, on `wrench/calibrated`.
+    """Subtracts the zero and the payload's weight from wrenches on `wrench`, and publishes `wrench/calibrated`.
 
     Raises:
         ConfigError: If parameters are wrong.
@@ -57,7 +57,7 @@ class CalibrateWrenchNode:
         self._frame_id = ""
         self._lock = threading.Lock()
         self._mean: RestingMean | None = None
-        """The mean in progress; None without one."""
+        """Mean that a service is computing now; None otherwise."""
         self._is_complete = threading.Condition(self._lock)
         self._arrived_s = time.monotonic()
         self._warn = ThrottledWarning()
@@ -74,7 +74,7 @@ class CalibrateWrenchNode:
         rospy.Service("wrench/payload/clear", Trigger, self._clear)
 
     def run(self) -> None:
-        """Zeroes the sensor, unless its offsets are given, as soon as it is at rest."""
+        """Zeroes the sensor as soon as the sensor is at rest. Returns at once if the parameters give the offsets."""
         while self._calibration.offset is None and not rospy.is_shutdown():
             answer = self._zero(None)
             if not answer.success and not rospy.is_shutdown():
@@ -105,7 +105,7 @@ class CalibrateWrenchNode:
         self._calibrated.publish(message)
 
     def _pose(self, header: Header) -> Pose | None:
-        """Returns the sensor's pose in the gravity frame at the time of a reading; None if TF does not have it."""
+        """Returns the sensor's pose in the gravity frame at the time of a wrench; None if TF lacks this pose."""
         self._frame_id = self._parameters.sensor_frame or header.frame_id.strip("/")
         frames = self._parameters.gravity_frame, self._frame_id
         try:
@@ -129,11 +129,11 @@ class CalibrateWrenchNode:
         return None if pose is None else gravity_in(pose, self._parameters.gravity)
 
     def _rest(self) -> tuple[Array, Pose | None]:
-        """Returns the mean of the next wrenches, and the sensor's pose; call it with the lock.
+        """Waits for the next wrenches, and returns their mean and the sensor's pose. The caller must hold the lock.
 
         Raises:
             MovedError: If the sensor moved.
-            SilentError: If no wrenches arrive, or another mean is in progress.
+            SilentError: If no wrenches arrive, or another service is computing a mean.
         """
         if self._mean is not None:
             raise SilentError("another service is reading the sensor; try again")
@@ -149,8 +149,9 @@ class CalibrateWrenchNode:
             self._mean = None
 
     def _zero(self, _: TriggerRequest | None) -> TriggerResponse:
-        """Sets the zero to the present wrench, less the payload's weight; the sensor has to be at rest without
-        contact.
+        """Sets the zero to the present wrench minus the payload's weight.
+
+        The sensor has to be at rest and without contact.
         """
         with self._lock:
             try:
@@ -167,7 +168,7 @@ class CalibrateWrenchNode:
         return TriggerResponse(True, message)
 
     def _sample(self, _: TriggerRequest) -> TriggerResponse:
-        """Adds the present pose and wrench to the samples for identification; the sensor has to be at rest."""
+        """Adds the present wrench and gravity to the samples for the identification. The sensor has to be at rest."""
         with self._lock:
             try:
                 mean, pose = self._rest()
@@ -180,7 +181,7 @@ class CalibrateWrenchNode:
             return TriggerResponse(True, f"pose {len(self._samples)}: gravity is {listed(gravity)} m/s^2 in the sensor")
 
     def _identify(self, _: TriggerRequest) -> TriggerResponse:
-        """Finds mass, centre and offsets from the sampled poses; from then on, the payload's weight is subtracted."""
+        """Identifies payload and offsets from the samples. From then on, the node subtracts the payload's weight."""
         with self._lock:
             try:
                 found = identify_payload(self._samples, self._parameters)
@@ -193,7 +194,7 @@ class CalibrateWrenchNode:
         return TriggerResponse(True, str(found))
 
     def _clear(self, _: TriggerRequest) -> TriggerResponse:
-        """Removes the sampled poses; an identified payload stays."""
+        """Removes all samples. An identified payload is kept."""
         with self._lock:
             count = len(self._samples)
             self._samples.clear()

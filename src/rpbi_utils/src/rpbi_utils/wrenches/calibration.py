@@ -1,4 +1,4 @@
-"""Configuration of `calibrate_wrench_node.py`, samples of a sensor at rest, and the calibrated wrench."""
+"""Configuration of `calibrate_wrench_node.py`, mean wrenches of a sensor at rest, and the correction of wrenches."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ NewtonMetre = Annotated[Positive, Unit("N m")]
 
 
 class MovedError(ValueError):
-    """The sensor moved, or was touched, while it was sampled."""
+    """The sensor moved or was touched while a mean was computed."""
 
 
 class PayloadConfig(ConfigModel):
-    """A payload, and the wrench of the sensor without it."""
+    """A payload, and the wrench that the sensor reports without any load."""
 
     mass: Annotated[float, Unit("kg")] = Field(
         description="Mass; negative if the sensor reports the wrench that acts on it, not the one that it exerts."
@@ -43,17 +43,17 @@ class PayloadConfig(ConfigModel):
     torque_offset: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Torque without any load.")
 
     def weight(self, gravity: Vector) -> Array:
-        """Returns force and torque of the payload at rest [N, N m], shape (6,).
+        """Returns force and torque of the payload's weight at the sensor [N, N m], shape (6,).
 
         Args:
-            gravity: Gravity in the sensor's axes [m/s^2].
+            gravity: Gravity vector in the sensor's axes [m/s^2].
         """
         force = -self.mass * np.asarray(gravity)
         return np.concatenate([force, np.cross(self.centre, force)])
 
     @property
     def offset(self) -> Array:
-        """Force and torque without any load [N, N m], shape (6,)."""
+        """Force and torque that the sensor reports without any load [N, N m], shape (6,)."""
         return np.array(self.force_offset + self.torque_offset)
 
 
@@ -74,10 +74,10 @@ class CalibrationParameters(ConfigModel):
 
 
 class RestingMean:
-    """The mean of a number of wrenches of a sensor at rest.
+    """Mean of `max_samples` wrenches of a sensor at rest.
 
     Args:
-        limits: Largest deviations of wrenches and pose.
+        limits: Parameters with the number of wrenches and the largest deviations of wrenches and pose.
     """
 
     def __init__(self, limits: CalibrationParameters) -> None:
@@ -87,20 +87,22 @@ class RestingMean:
 
     @property
     def is_complete(self) -> bool:
-        """Whether no further wrench is needed."""
+        """Whether enough wrenches have been added."""
         return len(self._wrenches) >= self._limits.max_samples
 
     def add(self, wrench: Array, pose: Pose | None) -> None:
-        """Adds force and torque [N, N m], shape (6,), and the sensor's pose, if it is known."""
+        """Adds a wrench [N, N m], shape (6,), and the sensor's pose at that time; None if the pose is unknown."""
         self._wrenches.append(wrench)
         if pose is not None:
             self._poses.append(pose)
 
     def result(self) -> tuple[Array, Pose | None]:
-        """Returns the mean, shape (6,), and the sensor's pose, None if it is not always known.
+        """Returns the mean wrench [N, N m], shape (6,), and the sensor's last pose.
+
+        The pose is None if one of the added poses is unknown.
 
         Raises:
-            MovedError: If the sensor moved, or the wrench changed.
+            MovedError: If the sensor moved or the wrench changed by more than the limits.
         """
         limits = self._limits
         for kind, unit, spread, most in (
@@ -130,11 +132,11 @@ class RestingMean:
 
 
 class WrenchCalibration:
-    """Zero of a sensor, and the payload whose weight is subtracted.
+    """Subtracts the zero of a sensor and the weight of a payload from wrenches.
 
     Attributes:
-        offset: Wrench that is subtracted [N, N m], shape (6,); None until there is a zero.
-        payload: The payload, None if there is none.
+        offset: The sensor's zero [N, N m], shape (6,); None before the first zeroing.
+        payload: Payload whose weight is subtracted; None without a payload.
     """
 
     def __init__(self, payload: PayloadConfig | None = None) -> None:
@@ -142,18 +144,19 @@ class WrenchCalibration:
         self.offset: Array | None = None if payload is None else payload.offset
 
     def zero(self, mean: Array, gravity: Vector | None) -> None:
-        """Sets the zero to the mean of a sensor without contact, less the payload's weight."""
+        """Sets the zero to the mean wrench of a sensor without contact, minus the payload's weight."""
         self.offset = mean - self._weight(gravity)
 
     def use(self, payload: PayloadConfig) -> None:
-        """Subtracts the weight and the offsets of an identified payload."""
+        """Sets the payload, and the zero that was identified together with the payload."""
         self.payload, self.offset = payload, payload.offset
 
     def calibrated(self, wrench: Array, gravity: Vector | None) -> Array:
-        """Returns a wrench less zero and payload.
+        """Returns a wrench minus the zero and the payload's weight [N, N m], shape (6,).
 
         Args:
-            gravity: Gravity in the sensor's axes [m/s^2]; not needed without a payload.
+            wrench: Measured wrench [N, N m], shape (6,).
+            gravity: Gravity vector in the sensor's axes [m/s^2]; may be None without a payload.
         """
         assert self.offset is not None
         return wrench - self.offset - self._weight(gravity)
@@ -166,10 +169,15 @@ class WrenchCalibration:
 
 
 def gravity_in(pose: Pose, gravity: float) -> Vector:
-    """Returns gravity [m/s^2] in the axes of a sensor, from its pose in a frame whose z axis points up."""
+    """Returns the gravity vector in a sensor's axes [m/s^2].
+
+    Args:
+        pose: Pose of the sensor in a frame whose z axis points up.
+        gravity: Magnitude of gravity [m/s^2].
+    """
     return rotated_back(pose.quat_xyzw, (0.0, 0.0, -gravity))
 
 
 def listed(values: Sequence[float], digits: int = 3) -> str:
-    """Returns numbers as text."""
+    """Returns numbers as text, separated by commas and rounded to `digits` decimals."""
     return ", ".join(f"{value:.{digits}f}" for value in values)

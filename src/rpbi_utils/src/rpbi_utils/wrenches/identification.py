@@ -1,7 +1,8 @@
-"""Mass and centre of a payload, and the offsets of a sensor, from wrenches in several poses.
+"""Identifies a payload's mass and centre of mass, and a sensor's offsets, from wrenches in several poses.
 
-At rest the sensor reports f = f0 - m g and t = t0 + m c x (-g) = t0 + g x (m c), with gravity g in its own axes. Forces
-depend on the mass and their offset, torques on the first moment m c and theirs: two linear least-squares problems.
+At rest, the sensor reports f = f0 - m g and t = t0 + m c x (-g) = t0 + g x (m c), with gravity g in the sensor's axes.
+The forces determine the mass m and the offset f0. The torques determine the first moment m c and the offset t0. Both
+are linear least-squares problems.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from .calibration import Array, CalibrationParameters, PayloadConfig, listed
 
 MIN_POSES = 3
 MIN_SPREAD = 0.1
-"""Least root mean square of the tilt of gravity's direction about the axis about which it tilts second most [rad]."""
+"""Smallest root mean square of the variation of gravity's direction across its main direction of variation [rad]."""
 MIN_SIGNIFICANCE = 3.0
-"""Least ratio of the mass and its standard deviation."""
+"""Smallest ratio of the mass to the standard deviation of the mass."""
 MIN_MASS_KG = 1e-3
 
 
@@ -29,11 +30,11 @@ class UndeterminedError(ValueError):
 
 
 class PoseSample(NamedTuple):
-    """Mean wrench in one pose.
+    """Mean wrench in one pose of the sensor.
 
     Attributes:
-        wrench: Force and torque [N, N m], shape (6,).
-        gravity: Gravity in the sensor's axes [m/s^2].
+        wrench: Mean force and torque [N, N m], shape (6,).
+        gravity: Gravity vector in the sensor's axes [m/s^2].
     """
 
     wrench: Array
@@ -45,12 +46,13 @@ class Identification(NamedTuple):
 
     Attributes:
         payload: The payload, with the sensor's offsets.
-        mass_sd: Standard deviation of its mass [kg]: the truth is within two of them in 95 % of cases, also with few
-            poses.
-        centre_sd: The same of a coordinate of its centre, the largest one [m]; that of the mass is part of it.
+        mass_sd: Standard deviation of the mass [kg]. It is scaled so that the true mass is within two standard
+            deviations in 95 % of cases, even with few poses.
+        centre_sd: Largest standard deviation of the centre's coordinates [m], scaled in the same way. It includes the
+            uncertainty of the mass.
         force_residual: Root mean square of the residual forces [N].
         torque_residual: Root mean square of the residual torques [N m].
-        poses: Number of poses.
+        poses: Number of poses used.
     """
 
     payload: PayloadConfig
@@ -73,9 +75,13 @@ class Identification(NamedTuple):
 def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameters) -> Identification:
     """Returns the payload that fits wrenches at rest best.
 
+    Args:
+        samples: Mean wrenches, one for each pose.
+        limits: Parameters with the largest residuals and the magnitude of gravity.
+
     Raises:
-        UndeterminedError: If there are too few poses or they are too alike, if the sensor carries nothing, or if no
-            payload explains the wrenches.
+        UndeterminedError: If the poses are too few or too similar, if the sensor carries no payload, or if no payload
+            explains the wrenches.
     """
     if len(samples) < MIN_POSES:
         raise UndeterminedError(f"expected at least {MIN_POSES} poses, got {len(samples)}")
@@ -107,7 +113,11 @@ def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameter
 
 
 def _check_spread(directions: Array) -> None:
-    """Checks that gravity's direction, less its mean, shape (N, 3), differs about two axes."""
+    """Raises an UndeterminedError unless gravity's directions vary about two axes.
+
+    Args:
+        directions: Directions of gravity in the sensor's axes, minus their mean, shape (N, 3).
+    """
     _, second, third = np.linalg.svd(directions, compute_uv=False)
     spread = float(np.hypot(second, third) / np.sqrt(len(directions)))
     if spread < MIN_SPREAD:
@@ -118,15 +128,16 @@ def _check_spread(directions: Array) -> None:
 
 
 def _fit(factors: Array, values: Array) -> tuple[Array, Array, Array, float]:
-    """Fits `values = offset + factors @ x`.
+    """Fits `values = offset + factors @ x` by least squares.
 
     Args:
         factors: Shape (N, 3, P).
         values: Shape (N, 3).
 
     Returns:
-        x, shape (P,), its standard deviations, the offset, shape (3,), and the residual's root mean square. Twice a
-        standard deviation is a confidence interval of 95 % by Student's distribution, since the noise is estimated.
+        x, shape (P,); the standard deviations of x, shape (P,); the offset, shape (3,); the residual's root mean
+        square. Two standard deviations are a 95 % confidence interval by Student's distribution, since the noise is
+        estimated, too.
     """
     count, _, parameters = factors.shape
     A = (factors - factors.mean(axis=0)).reshape(3 * count, parameters)
@@ -140,7 +151,7 @@ def _fit(factors: Array, values: Array) -> tuple[Array, Array, Array, float]:
 
 
 def _cross(vectors: Array) -> Array:
-    """Returns the matrices of cross products with vectors, shape (N, 3, 3)."""
+    """Returns the cross-product matrices of vectors, shape (N, 3), as an array of shape (N, 3, 3)."""
     x, y, z = vectors.T
     zero = np.zeros_like(x)
     return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
