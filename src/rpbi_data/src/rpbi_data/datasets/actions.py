@@ -1,4 +1,4 @@
-"""Actions of rows: the command, or the pose, that belongs to a row."""
+"""Actions of a data set's rows: the command, or the end effector's pose, that belongs to each row."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ from .signals import (
 Array = NDArray[Any]
 
 ROTATION_VECTOR = ("rx", "ry", "rz")
-"""Names of the parts of a rotation vector [rad]."""
+"""Names of the components of a rotation vector [rad]."""
 
 
 def derive_actions(
     tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions, pose: Sequence[Column]
 ) -> list[Signal]:
-    """Returns the feature `action`; none if there are no commands.
+    """Returns a list with the feature `action`; empty if there are no commands.
 
     Args:
-        tables: Tables of a recording, those of TF by frame.
-        types: Types of messages by topic.
+        tables: Tables of a recording; the table of TF is split by frame, see `by_frame`.
+        types: Message types, indexed by topic.
         fixed: Names of joints that cannot move, which are left out.
         row_options: Topics and meaning of actions.
-        pose: Columns of the pose of the end effector; empty without one.
+        pose: Columns of the end effector's pose; empty without an end effector.
 
     Raises:
-        UnknownNameError: If no target has a joint of the gripper.
-        ValueError: If differences are asked for, but commands are not positions of joints.
+        UnknownNameError: If a joint of the gripper is not in the targets.
+        ValueError: If actions are to be changes of values, but commands are not joint positions.
     """
     found = _commands(tables, types, fixed, row_options)
     arm = [each for each in found if joint_of(each[0]) not in row_options.gripper]
@@ -78,7 +78,10 @@ def derive_actions(
 def _commands(
     tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions
 ) -> list[tuple[Column, Column]]:
-    """Returns the columns of commands, each with that of the measured position; its table is empty without one."""
+    """Returns the columns of commands, each with the column of the same joint's measured position.
+
+    For a command without a measured position, the table of the second column is empty.
+    """
     topics = list(row_options.action or ())
     if row_options.action is None:
         joints = [topic for topic in tables if types.get(topic) == JOINTS]
@@ -100,16 +103,16 @@ def _commands(
 
 
 def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array) -> tuple[Array, Array]:
-    """Returns the actions of rows, and the time from each row to the command in use.
+    """Returns the actions of rows, and the time error of each row: the time between row and command.
 
     Args:
         signal: The feature `action`.
-        tables: The tables.
+        tables: Tables of the recording, see `derive_actions`.
         rows: Times of the rows, int64, shape (n,) [ns].
-        next_rows: Times of the rows after these [ns].
+        next_rows: Time of the row after each of these rows, int64, shape (n,) [ns].
 
     Returns:
-        Shape (n, numbers) and shape (n,) [s].
+        Actions, shape (n, numbers), and time errors, shape (n,) [s].
     """
     resampled: dict[str, pd.DataFrame] = {}
     errors = np.zeros(len(rows))
@@ -126,7 +129,7 @@ def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array)
     columns = []
     for (table, name), measured in zip(signal.columns, signal.held, strict=True):
         column = resampled[table][name].to_numpy(float)
-        if not _is_pose(table):  # before the first command a joint is held, other commands are 0
+        if not _is_pose(table):  # before the first command: measured position of a joint, else 0
             column = np.where(np.isnan(column), _measured(measured, tables, rows) if measured.table else 0.0, column)
         columns.append(column)
     matrix = np.stack(columns, axis=1)
@@ -134,7 +137,10 @@ def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array)
 
 
 def _differences(signal: Signal, matrix: Array, tables: Tables, rows: Array) -> Array:
-    """Returns actions whose first numbers are changes: of positions, or of a pose along and about axes of the world."""
+    """Replaces the first `signal.deltas` numbers of actions by their changes from the measured values.
+
+    The change of a pose is a translation along, and a rotation vector about, the axes of the world.
+    """
     count, (table, _) = signal.deltas, signal.columns[0]
     if not _is_pose(table):
         measured = [_measured(each, tables, rows) for each in signal.held[:count]]

@@ -1,4 +1,4 @@
-"""Checks of numbers, of the facts in `rpbi/` and of the recordings, which all formats share."""
+"""Checks that all data set formats share: of numbers, of the metadata in `rpbi/`, and of the source recordings."""
 
 from __future__ import annotations
 
@@ -30,11 +30,13 @@ MAX_NORM_ERROR = 1e-3
 
 
 def number_faults(names: Sequence[str], values: Array) -> Iterator[str]:
-    """Yields a sentence for each column with numbers that are not finite, and for quaternions that jump or are no unit.
+    """Yields a message for each column with non-finite numbers, and for each faulty quaternion.
+
+    A quaternion is faulty if its norm is not 1, or if it changes its sign from one row to the next.
 
     Args:
         names: Names of the columns.
-        values: Shape (n, columns).
+        values: Values of a feature, shape (n, columns).
     """
     is_bad = ~np.isfinite(values.astype(float))
     for name, bad in zip(names, is_bad.T):
@@ -56,7 +58,12 @@ def _quaternion_faults(quats: Array) -> Iterator[str]:
 
 
 def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
-    """Yields faults; if the search fails at unexpected content, yields a sentence about that instead."""
+    """Yields the messages of a check. If the check raises an error, yields a last message about unexpected content.
+
+    Args:
+        part: The checked part of the data set, for the message.
+        faults: Messages of the check.
+    """
     try:
         yield from faults
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
@@ -65,14 +72,15 @@ def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
 
 
 class Facts:
-    """The facts in `rpbi/` of a data set; empty for one of another tool.
+    """Metadata of a data set from its folder `rpbi/`; empty if another tool wrote the data set.
 
     Args:
         folder: The data set.
 
     Attributes:
-        export: Description of the data set, empty if there is none or it cannot be read.
-        faults: Sentences on files that cannot be read.
+        export: Description of the data set; empty if `rpbi/export.json` is missing or cannot be read.
+        faults: Messages about files that cannot be read.
+        is_there: Whether the data set has a folder `rpbi/`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -87,7 +95,10 @@ class Facts:
                 self.faults.append(str(error))
 
     def episode(self, index: int) -> dict[str, Any]:
-        """Returns the facts of an episode; empty for none, and then with a fault if they should be there."""
+        """Returns the metadata of an episode; empty if its file cannot be read.
+
+        For a data set with a folder `rpbi/`, a file that cannot be read is added to `faults`.
+        """
         if not self.is_there:
             return {}
         try:
@@ -97,13 +108,18 @@ class Facts:
             return {}
 
     def total_faults(self, episodes: int) -> Iterator[str]:
-        """Yields sentences if the number of episodes differs from the export."""
+        """Yields a message if the number of episodes in the data set differs from the number of exported episodes."""
         exported = self.export.get("episodes")
         if exported is not None and len(exported) != episodes:
             yield f"rpbi/export.json: {len(exported)} episodes were exported, found {episodes}"
 
     def chain_faults(self, index: int, facts: Mapping[str, Any]) -> Iterator[str]:
-        """Yields sentences if the chain of state hashes of an episode is broken."""
+        """Yields a message if an episode's chain of state hashes is missing or broken.
+
+        Args:
+            index: Index of the episode in the data set.
+            facts: Metadata of the episode; if empty, the chain is not checked.
+        """
         if facts:
             name = f"rpbi/{episode_file(self._folder, index).name}"
             hashes = facts.get("state_hashes")
@@ -114,13 +130,13 @@ class Facts:
 
 
 def feature_faults(key: str, names: Sequence[str], values: Array, facts: Mapping[str, Any]) -> Iterator[str]:
-    """Yields sentences if the values of a feature in an episode differ from the exported ones.
+    """Yields messages about faulty numbers of a feature in an episode, and about changes since the export.
 
     Args:
-        key: The feature.
-        names: Names of its numbers in the data set; empty if it has none.
-        values: Shape (n, columns).
-        facts: The facts of the episode; empty for none.
+        key: Key of the feature.
+        names: Names of the feature's columns in the data set.
+        values: Values of the feature in the episode, shape (n, columns).
+        facts: Metadata of the episode; if empty, changes since the export are not checked.
     """
     yield from number_faults(names, values)
     stored = facts.get("columns", {}).get(key)
@@ -138,7 +154,11 @@ def feature_faults(key: str, names: Sequence[str], values: Array, facts: Mapping
 
 
 def source_faults(dataset: Path, folder: EpisodeFolder) -> Iterator[str]:
-    """Yields a sentence for each recording that is missing or was changed since the export.
+    """Yields a message for each source recording that is missing or was changed since the export.
+
+    Args:
+        dataset: The exported data set.
+        folder: The episodes from which the data set was exported.
 
     Raises:
         DatasetError: If the data set was not exported from episodes.
@@ -147,16 +167,16 @@ def source_faults(dataset: Path, folder: EpisodeFolder) -> Iterator[str]:
         raise DatasetError(dataset, "has no rpbi/: it was not exported from episodes")
     try:
         numbers = read_export(dataset).get("episodes", [])
-    except ValueError:  # which is named anyway
+    except ValueError:  # reported by the check of the data set
         return
     for index, number in enumerate(numbers):
         try:
             folder.read(number)
             place = folder.folder_of(number)
-            bag = file_in(place, BAG) or place / BAG  # which cannot be opened then
+            bag = file_in(place, BAG) or place / BAG  # the latter cannot be opened: reported below
             if file_digest(bag) != read_episode(dataset, index)["source"]["bag_sha256"]:
                 yield f"{bag}: is not the recording that episode {index} was exported from"
         except (EpisodeError, OSError) as error:
             yield f"episode {index}: its recording cannot be read: {error}"
-        except (ValueError, KeyError, TypeError):  # named by the check of the data set
+        except (ValueError, KeyError, TypeError):  # reported by the check of the data set
             continue

@@ -1,4 +1,4 @@
-"""Coarse images, stored with videos, and the faults of videos that they reveal."""
+"""Coarse images, which the export stores with videos, and checks that compare videos with them."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 COARSE = 8
-"""Rows and columns of a coarse image."""
+"""Number of rows, and of columns, of a coarse image."""
 _BRIGHTNESS = np.array((0.299, 0.587, 0.114))
-"""Shares of red, green and blue, as codecs have them; compression keeps brightness better than colours."""
+"""Weights of red, green and blue in the brightness, as in video codecs, which preserve it better than colours."""
 _STRIDE = 2
-"""Distance of the rows and columns of pixels that count for a coarse image."""
+"""Every pixel row and column with this spacing is used for a coarse image."""
 
 MAX_IMAGE_DIFFERENCE = 12.0
-"""Largest difference between a frame and its image, of 255, as the root mean square over the parts."""
+"""A frame that differs by more than this from its exported image is reported [RMS over 8 x 8 parts, of 255]."""
 MIN_IMAGE_DIFFERENCE = 3.0
-"""Least such difference that is reported; in between, one that is a multiple of the median of the video is."""
+"""A smaller difference between a frame and its exported image is never reported [RMS over 8 x 8 parts, of 255]."""
 MEDIANS = 5.0
-"""That multiple."""
+"""A difference between both limits is reported if it exceeds this multiple of the video's median difference."""
 MIN_GAIN = 0.5
-"""Another order of frames or colours, or another camera, is reported if it leaves less than this share of squared
-differences.
+"""A shift of frames, a swap of colours or a swap of cameras is reported if undoing it leaves less than this share of
+the mean squared difference.
 """
 MIN_MOTION = 1e-2
-"""Mean squared difference, of 255 squared, below which neither another order nor another camera is reported."""
+"""Mean squared difference below which neither a shift of frames nor a swap of cameras is reported [of 255^2]."""
 MIN_COLOUR_DIFFERENCE = 4.0
-"""Mean squared difference of colours, of 255 squared, below which another order of colours is not reported."""
+"""Mean squared difference of colours below which a swap of colours is not reported [of 255^2]."""
 FROZEN_FRAMES = 10
-"""Frames that are frozen if they do not change while the images that were exported do."""
+"""Number of successive frames that are frozen if they hardly change while the exported images change."""
 MIN_FROZEN_MOTION = 1.0
-"""Least change of the exported images over so many frames, of 255, as the root mean square over the parts."""
+"""Smallest change of the exported images within `FROZEN_FRAMES` frames that counts [RMS over the parts, of 255]."""
 MAX_FROZEN_SHARE = 0.1
-"""Largest share of that change that frozen frames have."""
+"""Frames are frozen if they change by less than this share of the change of the exported images."""
 STILL_FRAMES = 15
-"""Frames that are frozen, in a data set of another tool, if they do not change while the joints move."""
+"""For data sets of other tools: number of successive frames that are frozen if they do not change while joints move."""
 MAX_STILL_CHANGE = 0.02
-"""Largest change from one such frame to the next, of 255."""
+"""Largest change from one frozen frame to the next, in data sets of other tools [RMS, of 255]."""
 MIN_SEEN_FRAMES = 30
-"""Other frames in which the joints move, nearly all of which have to change: the camera sees the joints."""
+"""Smallest number of other frames with moving joints from which is decided whether the camera sees the joints."""
 MIN_SEEN_SHARE = 0.98
-"""Their share that has to change."""
+"""The camera sees the joints if at least this share of the other frames with moving joints changes."""
 
 
 def coarse(pixels: Array) -> Array:
-    """Returns the mean colours of 8 by 8 parts of an image.
+    """Returns a coarse image: the mean colours of 8 x 8 parts of an image.
 
     Args:
-        pixels: Shape (height, width, 3), uint8.
+        pixels: Pixels of the image, shape (height, width, 3), uint8.
 
     Returns:
-        Shape (8, 8, 3), float32.
+        Red, green and blue of each part, from 0 to 255, shape (8, 8, 3), float32.
     """
     part = pixels[::_STRIDE, ::_STRIDE]
     rows = np.linspace(0, part.shape[0], COARSE + 1).astype(int)[:-1]
@@ -67,13 +67,13 @@ def coarse(pixels: Array) -> Array:
 
 
 def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterator[str]:
-    """Yields a sentence if the frames of a video differ from the exported images.
+    """Yields a message if the frames of a video differ from the exported images.
 
     Args:
-        key: The camera.
-        found: Coarse images of the frames, shape (n, 8, 8, 3).
-        stored: Coarse images of the images of all cameras, of the same shape; those of older exports have brightness
-            alone, shape (n, 8, 8).
+        key: Key of the camera.
+        found: Coarse images of the video's n frames, shape (n, 8, 8, 3).
+        stored: Coarse images of the exported images, indexed by camera, shape (n, 8, 8, 3). Older exports contain only
+            the brightness, shape (n, 8, 8).
     """
     colours = found.astype(float)
     known = {
@@ -111,14 +111,14 @@ def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterato
 
 
 def frozen_faults(images: Array, states: Array) -> Iterator[str]:
-    """Yields a sentence if frames of a camera that sees the joints do not change while these move.
+    """Yields a message if frames of a camera do not change while the joints move.
 
-    It is for data sets of other tools, whose images are not known. A camera that the joints leave now and then is no
-    reason: nearly all other frames in which they move have to change.
+    This check is for data sets of other tools, for which exported images are unknown. The camera may not always see the
+    moving joints. Frozen frames are therefore reported only if nearly all other frames with moving joints change.
 
     Args:
         images: Coarse images of the frames, shape (n, 8, 8, 3).
-        states: Positions of the joints, shape (n, columns).
+        states: Joint positions, shape (n, columns) [rad or m].
     """
     if len(images) != len(states) or len(images) < 2:
         return
@@ -136,7 +136,7 @@ def _brightness(images: Array) -> Array:
 
 
 def _order_of_colours(found: Array, exported: Array) -> list[str]:
-    """Returns the exported colours that appear as red, green and blue in the frames; none if they are unchanged."""
+    """Returns the exported colours that appear as red, green and blue in the frames; empty if colours are unchanged."""
     rest = _mean_square(found - exported)
     if rest < MIN_COLOUR_DIFFERENCE:
         return []
@@ -146,7 +146,12 @@ def _order_of_colours(found: Array, exported: Array) -> list[str]:
 
 
 def _frozen(found: Array, own: Array) -> Array:
-    """Returns the numbers of the frames that do not change although their images do."""
+    """Returns the indices of the frames that do not change although the exported images do.
+
+    Args:
+        found: Brightness of the frames, shape (n, 8, 8).
+        own: Brightness of the exported images, shape (n, 8, 8).
+    """
     count = len(found) - FROZEN_FRAMES + 1
     if count < 1:
         return np.empty(0, int)
@@ -160,7 +165,7 @@ def _frozen(found: Array, own: Array) -> Array:
 
 
 def _long_runs(is_so: Array, least: int) -> Array:
-    """Returns the runs of at least a number of consecutive true values."""
+    """Returns a mask of the runs of true values that have at least the length `least`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_so, [False]]).astype(int)))
     found = np.zeros(len(is_so), bool)
     for start, stop in edges.reshape(-1, 2):

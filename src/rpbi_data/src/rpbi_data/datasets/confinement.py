@@ -1,7 +1,8 @@
-"""Foreign data sets: their folder is checked first, and then read in a process with limits.
+"""Safe reading of data sets from unknown sources.
 
-The libraries that read Parquet, HDF5, videos and SQLite were not made for hostile files. If one of them ends the
-process, that is reported.
+First, the entries of the folder are checked. Then a child process with limits reads the files: the libraries that read
+Parquet, HDF5, videos and SQLite were not made for hostile files. If a library crashes the child process, the crash is
+reported.
 """
 
 from __future__ import annotations
@@ -18,24 +19,24 @@ from typing import NamedTuple
 from custom_ros_tools.foreign import MAX_ENTRIES, printable
 
 BASE_TIME_S = 30
-"""Processor time for any data set [s]."""
+"""Processor time that is allowed for every data set [s]."""
 TIME_PER_MB_S = 10
-"""Processor time for each MB of its files, most of it for videos [s]."""
+"""Additional processor time for each MB of the data set's files [s]; videos need most of it."""
 BASE_MEMORY = 1_200_000_000
-"""Memory for any data set, beside that of the program [bytes]."""
+"""Memory that is allowed for every data set, in addition to the program's own memory [bytes]."""
 MEMORY_PER_BYTE = 10
-"""Memory for each byte of its files."""
+"""Additional memory for each byte of the data set's files [bytes]."""
 MAX_DEPTH = 16
-"""Levels of folders."""
+"""Largest depth of nested folders."""
 ANY_SIZE = "--any-size, if you know who made it"
 
 
 class Tree(NamedTuple):
-    """Content of a folder.
+    """Result of the check of a folder's entries.
 
     Attributes:
-        faults: Sentences on entries that are not read: links, pipes, devices, too many files.
-        size: Bytes of all files.
+        faults: Messages about entries that must not be read: links, pipes, sockets, devices, too many or too deep ones.
+        size: Total size of all files [bytes].
     """
 
     faults: tuple[str, ...]
@@ -43,18 +44,23 @@ class Tree(NamedTuple):
 
 
 class CheckLine(NamedTuple):
-    """A line from the reading process: its kind, a word, and its text."""
+    """A line of output from the child process.
+
+    Attributes:
+        kind: `FAULT`, `SUMMARY` or `ERROR`.
+        text: Text of the line.
+    """
 
     kind: str
     text: str
 
 
 FAULT, SUMMARY, ERROR = "fault", "summary", "error"
-"""Kinds of lines; an error ends the check."""
+"""Kinds of lines. A line of the kind `ERROR` ends the check."""
 
 
 def look_at(folder: Path) -> Tree:
-    """Checks all entries of a data set, without opening a file."""
+    """Checks all files and folders of a data set, without opening a file."""
     faults: list[str] = []
     size = count = 0
     waiting = [(folder, 0)]
@@ -80,15 +86,16 @@ def look_at(folder: Path) -> Tree:
 
 
 def confined(task: Callable[[], Iterable[CheckLine]], size: int, any_size: bool = False) -> Iterator[CheckLine]:
-    """Yields the lines of a task that runs in a child process, which cannot write to files.
+    """Runs a task in a child process that cannot write to files, and yields the lines of the task.
 
     Args:
-        task: Reads foreign files.
-        size: Their size, by which limits grow [bytes].
-        any_size: Whether to leave time and memory unlimited.
+        task: Reads files from an unknown source, and yields lines.
+        size: Total size of these files, from which the limits are computed [bytes].
+        any_size: Whether processor time and memory are unlimited.
 
     Yields:
-        Its lines; at last one more of the kind `ERROR` if it exceeded a limit or was ended by a signal.
+        The lines of the task. If the task exceeds a limit or a signal ends the process, a last line of the kind
+        `ERROR`.
     """
     time_s = BASE_TIME_S + TIME_PER_MB_S * size // 1_000_000
     memory = BASE_MEMORY + MEMORY_PER_BYTE * size
@@ -118,11 +125,17 @@ def confined(task: Callable[[], Iterable[CheckLine]], size: int, any_size: bool 
 
 
 def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[int, int] | None) -> None:
-    """Runs the task in this process, and then ends the process."""
+    """Runs the task in this process, and then ends the process.
+
+    Args:
+        task: The task, whose lines are written as JSON.
+        writing: File descriptor to which the lines are written.
+        limits: Processor time [s] and memory [bytes]; None for no limits.
+    """
     code = 0
     try:
         silence = os.open(os.devnull, os.O_RDWR)
-        for number in (0, 1, 2):  # libraries print to them what is in files
+        for number in (0, 1, 2):  # libraries may print content of the files there
             os.dup2(silence, number)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
@@ -141,7 +154,7 @@ def _run(task: Callable[[], Iterable[CheckLine]], writing: int, limits: tuple[in
 
 
 def _own_memory() -> int:
-    """Returns the memory of this process for data [bytes]."""
+    """Returns the size of this process's data memory, VmData [bytes]."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmData:"):
             return int(line.split()[1]) * 1024

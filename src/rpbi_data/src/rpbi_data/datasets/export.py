@@ -1,4 +1,4 @@
-"""The export of a folder of episodes."""
+"""Export of a folder of episodes as a data set."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from .signals import RowOptions, Signal
 from .source import SourceEpisode
 
 MAX_KEPT_BYTES = 1_000_000_000
-"""Memory of the tables that are kept from the plan of a data set until it is written; others are read twice [bytes]."""
+"""Memory of tables that stay loaded between planning and writing [bytes]; further tables are read twice."""
 
 
 class ExportOptions(NamedTuple):
-    """Content of a data set, as the user wants it.
+    """Options of an export, which the user chooses.
 
     Attributes:
-        fps: Rows a second.
-        task: The task in words.
+        fps: Number of rows per second.
+        task: Description of the task in words.
         labels: Labels of the episodes to export; empty for all.
         row_options: Content of rows.
         disk_reserve_mb: Free space of the disk that is never used [MB].
@@ -60,8 +60,8 @@ class Result:
     """Result of an export.
 
     Attributes:
-        exported: Numbers of the episodes in the data set, in its order.
-        faults: Sentences on episodes that are not in it.
+        exported: Numbers of the exported episodes, in the order of the data set.
+        faults: Messages about episodes that were not exported.
     """
 
     exported: list[int] = field(default_factory=list)
@@ -73,7 +73,7 @@ class _Plan(NamedTuple):
 
     Attributes:
         sources: The episodes.
-        signals: Features and their topics; empty for a format without rows.
+        signals: Features and the topics from which they are derived; empty for a format without rows.
         schema: Content of the rows; None for a format without rows.
     """
 
@@ -92,20 +92,21 @@ def export_folder(
 ) -> Result:
     """Exports the episodes of a folder as a data set.
 
-    Episodes that cannot be exported are left out. The data set gets its name when it is complete.
+    Episodes that cannot be exported are left out. The data set is written to a temporary folder, which is renamed to
+    `target` when the data set is complete. After an error, no data set is left.
 
     Args:
-        folder: The folder.
-        target: Folder of the data set; it must not exist.
+        folder: The episodes.
+        target: Folder of the data set; must not exist.
         name: Name of the format.
-        format_: The format.
-        options: Content of the data set.
-        report: Is called with a sentence for each episode.
+        format_: Writes the data set.
+        options: Options of the export.
+        report: Called with a message for each exported episode.
 
     Raises:
-        EpisodeError: If there is no such folder, the target exists, no episode can be exported, or the data set cannot
-            be completed; there is none then.
-        OSError: If the data set cannot be begun.
+        EpisodeError: If the folder of episodes does not exist, the target exists, no episode can be exported, or the
+            data set cannot be completed.
+        OSError: If writing the data set cannot start.
     """
     if target.exists():
         raise DatasetError(target, "exists already: name a folder that does not")
@@ -131,7 +132,10 @@ def export_folder(
 
 
 def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions, result: Result) -> _Plan:
-    """Returns the episodes to export, and the features that most of them have."""
+    """Returns the episodes to export, and the set of features that occurs in most of these episodes.
+
+    Adds a message to `result.faults` for each episode that cannot be exported.
+    """
     sources: list[SourceEpisode] = []
     kept_bytes = 0
     for number in folder.numbers():
@@ -173,7 +177,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions,
 
 
 def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFeature, ...]]:
-    """Returns the features and cameras of an episode, for which its bag is read."""
+    """Reads the bag of an episode, and returns the episode's features and cameras."""
     return tuple(signal.feature for signal in source.signals), source.cameras
 
 
@@ -193,7 +197,7 @@ def _add_all(
     result: Result,
     report: Callable[[str], None],
 ) -> None:
-    """Adds episodes until the disk is full."""
+    """Adds the planned episodes to the data set, until the disk is full; updates `result`."""
     place = EpisodeFolder(part)
     for position, source in enumerate(plan.sources):
         number, index = source.episode.number, len(result.exported)
@@ -232,7 +236,7 @@ def _not_exported(sources: Sequence[SourceEpisode]) -> list[str]:
 
 
 def _complete(part: Path, format_: DatasetFormat, result: Result, facts: Callable[[], dict[str, object]]) -> None:
-    """Completes the data set; if the disk is full, without the last episode, whose place is free then."""
+    """Completes the data set; if the disk is full, removes the last episode to free space, and tries again."""
     try:
         write_export(part, facts())
         format_.close()

@@ -1,4 +1,4 @@
-"""Files of untrusted data sets: Parquet, HDF5 and JSON, read within limits; file names from templates."""
+"""Reading of untrusted Parquet, HDF5 and JSON files within limits, and file names from untrusted templates."""
 
 from __future__ import annotations
 
@@ -11,28 +11,31 @@ from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.foreign import load_foreign_json, path_below, read_below
 
 MAX_JSON_BYTES = 256_000_000
-"""Largest JSON file, such as the state hashes of hours [bytes]."""
+"""Largest size of a JSON file [bytes]; state hashes of hours can be this large."""
 MAX_JSON_VALUES = 20_000_000
 MAX_VALUES = 20_000_000
-"""Values of a table, or of numbers in an HDF5 file, that any file may have; larger ones have one for each byte."""
+"""Number of values that every Parquet or HDF5 file may have; a larger file may have one value for each byte."""
 MAX_ROW_BYTES = 100_000_000
-"""Bytes of one image of an HDF5 file."""
+"""Largest size of one image in an HDF5 file [bytes]."""
 MAX_UNFOLDED_BYTES = 2**30
-"""Bytes of all images of an HDF5 file; larger ones may have `MAX_COMPRESSION` times the bytes of the file."""
+"""Unpacked size that all images of every HDF5 file together may have [bytes].
+
+In a large file, images may unpack to `MAX_COMPRESSION` times the size of the file.
+"""
 MAX_COMPRESSION = 1032
-"""Largest compression ratio of such images, that of gzip."""
+"""Largest compression ratio of images in an HDF5 file; gzip cannot exceed this ratio."""
 MAX_OBJECTS = 100_000
-"""Groups and data sets of an HDF5 file."""
+"""Largest number of groups and data sets in an HDF5 file."""
 MAX_PLACE = 1_000_000_000
-"""Largest number of a file or folder."""
+"""Largest number that may replace a placeholder in a file name."""
 _PLACEHOLDER = re.compile(r"\{(\w+)(?::0?(\d)d)?\}")
 
 
 def read_json(folder: Path, name: str) -> Any:
-    """Returns the value in a JSON file of a data set.
+    """Returns the content of a JSON file of a data set.
 
     Raises:
-        ValueError: If it cannot be read, or is too large.
+        ValueError: If the file cannot be read, or is too large.
     """
     try:
         return load_foreign_json(read_below(folder, name, MAX_JSON_BYTES), name, MAX_JSON_BYTES, MAX_JSON_VALUES)
@@ -41,15 +44,15 @@ def read_json(folder: Path, name: str) -> Any:
 
 
 def file_name(template: Any, place: Mapping[str, Any]) -> str:
-    """Returns the name of a file by a template such as `data/file-{file_index:03d}.parquet`.
+    """Returns the file name that results from a template such as `data/file-{file_index:03d}.parquet`.
 
     Args:
-        template: The template; of the syntax of Python, only plain placeholders count.
-        place: Values of the placeholders: names, and numbers of at least 0.
+        template: The template. Only the placeholders `{name}` and `{name:03d}`, with any width, are allowed.
+        place: Values of the placeholders, indexed by name: texts, or integers from 0 to `MAX_PLACE`.
 
     Raises:
-        ValueError: If the template has another placeholder, a value is of another kind, or the file would not be in the
-            data set.
+        ValueError: If the template has an unknown placeholder, a value is neither a text nor such an integer, or the
+            file would be outside of the data set.
     """
     for key, value in place.items():
         is_number = isinstance(value, int) and 0 <= value <= MAX_PLACE
@@ -73,10 +76,10 @@ def file_name(template: Any, place: Mapping[str, Any]) -> str:
 
 
 def read_parquet(path: Path) -> Any:
-    """Returns the table of a Parquet file, whose size is read from its metadata first.
+    """Returns the table of a Parquet file; the number of values is first checked in the file's metadata.
 
     Raises:
-        ValueError: If it cannot be read, or has too many values.
+        ValueError: If the file cannot be read, or has too many values.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -95,14 +98,14 @@ def read_parquet(path: Path) -> Any:
 
 
 def hdf5_faults(file: Any, size: int) -> Iterator[str]:
-    """Yields a sentence for each object of an HDF5 file that is refused.
+    """Yields a message for each object of an HDF5 file that must not be read.
 
-    These are links, but for those by which groups have their members; objects with two names; data that lie in other
-    files, that are no numbers or texts, or that unfold to too much.
+    Refused are soft and external links, objects with two names, data in other files, data that are neither numbers nor
+    texts, and data that unpack to too many values or bytes.
 
     Args:
         file: The open file.
-        size: Its length [bytes].
+        size: Size of the file [bytes].
     """
     import h5py
 

@@ -1,4 +1,4 @@
-"""Base of the formats of data sets, and the episodes that they write."""
+"""Base class of data set formats, and the data that formats receive: schema and episodes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Array = NDArray[Any]
 STATE, ACTION = "observation.state", "action"
 IMAGES = "observation.images."
 STAMP, TIME_ERROR = "source.stamp", "source.time_error"
-"""Features of the rows themselves: their time in the clock of the recording, and the time error of each feature [s]."""
+"""Keys of two features of every row: its time in the recording's clock, and the time error of each feature [s]."""
 STAMP_NAMES = ("sec", "nsec")
-"""Numbers of a stamp, int64; LeRobot's reader returns numbers with a point in single precision."""
+"""Columns of a stamp, int64: LeRobot's reader would return a floating-point stamp in single precision."""
 QUATERNION = ("qx", "qy", "qz", "qw")
-"""Names of the four parts of a quaternion, as they follow each other in a feature."""
+"""Names of the four components of a quaternion, in the order of a feature's columns."""
 
 
 @dataclass(eq=False)
@@ -36,17 +36,17 @@ class DatasetError(EpisodeError):
 
 
 def stamps_of(times: Array) -> Array:
-    """Returns seconds and nanoseconds, shape (n, 2), int64, of times [ns], shape (n,)."""
+    """Returns times [ns], shape (n,), as seconds and nanoseconds, shape (n, 2), int64."""
     return np.stack(np.divmod(times, PER_SECOND), axis=1)
 
 
 class Feature(NamedTuple):
-    """Numbers of each row.
+    """A feature that consists of numbers in each row.
 
     Attributes:
-        key: Its name in the data set, such as `observation.state`.
-        names: Names of the numbers, such as those of joints.
-        dtype: Type of the numbers.
+        key: Name of the feature in the data set, such as `observation.state`.
+        names: Names of the numbers, such as joint names.
+        dtype: NumPy type of the numbers.
     """
 
     key: str
@@ -55,10 +55,10 @@ class Feature(NamedTuple):
 
 
 class CameraFeature(NamedTuple):
-    """Images of each row, of 8 bits in red, green and blue.
+    """A feature that consists of an RGB image with 8 bits per channel in each row.
 
     Attributes:
-        key: Its name in the data set, such as `observation.images.camera`.
+        key: Name of the feature in the data set, such as `observation.images.camera`.
         height: Rows of pixels, an even number.
         width: Columns of pixels, an even number.
     """
@@ -72,9 +72,9 @@ class Schema(NamedTuple):
     """Content of the rows of all episodes of a data set.
 
     Attributes:
-        fps: Rows a second.
-        features: Features of numbers.
-        cameras: Features of images.
+        fps: Number of rows per second.
+        features: Features that consist of numbers.
+        cameras: Features that consist of images.
     """
 
     fps: int
@@ -83,10 +83,10 @@ class Schema(NamedTuple):
 
 
 class ImageFrame(NamedTuple):
-    """An image of a row.
+    """The image of a camera in a row.
 
     Attributes:
-        pixels: Shape (height, width, 3), uint8.
+        pixels: Red, green and blue, shape (height, width, 3), uint8.
         stamp: Time of the image in the clock of the recording [ns].
     """
 
@@ -95,11 +95,11 @@ class ImageFrame(NamedTuple):
 
 
 class ExportedEpisode(ABC):
-    """An episode, as a format writes it.
+    """An episode with n rows, which a format writes into a data set.
 
     Attributes:
-        bag: The recording.
-        task: The task in words.
+        bag: Path of the recorded bag.
+        task: Description of the task in words.
         label: Label of the episode, such as `success`.
     """
 
@@ -114,7 +114,7 @@ class ExportedEpisode(ABC):
 
     @abstractmethod
     def frames(self, key: str) -> Iterator[ImageFrame]:
-        """Yields the n images of a camera, each the newest one at the time of its row.
+        """Yields an image of a camera for each of the n rows: the newest image at the time of the row.
 
         Raises:
             InterfaceError: If an image cannot be read.
@@ -122,7 +122,7 @@ class ExportedEpisode(ABC):
 
     @abstractmethod
     def values(self, image_stamps: Mapping[str, Array]) -> dict[str, Array]:
-        """Returns the numbers of all features by key, each of shape (n, number of names).
+        """Returns the numbers of all features, indexed by key, each of shape (n, number of names).
 
         Args:
             image_stamps: Times of the images of each camera, int64, shape (n,) [ns].
@@ -130,55 +130,65 @@ class ExportedEpisode(ABC):
 
 
 def require_room(folder: Path, size: int) -> None:
-    """Raises an OSError if the disk of a folder lacks space for a number of bytes, by reserving it."""
+    """Raises an OSError if the disk of a folder has less free space than `size` [bytes].
+
+    The space is reserved for a moment with a temporary file.
+    """
     with tempfile.TemporaryFile(dir=folder) as file:
         os.posix_fallocate(file.fileno(), 0, size)
 
 
 class DatasetFormat(ABC):
-    """A format of data sets: it writes episodes into a folder, recognises such folders and checks them.
+    """Base class of data set formats: a format writes episodes into a folder, recognises its folders and checks them.
 
-    `open`, `add` for each episode and `close` are called in this order. Each episode that was added stays complete
-    when a later `add` fails. On a full disk, the last one may be taken back, and `close` called again.
+    The export calls `open`, then `add` for each episode, then `close`. Added episodes stay complete if a later `add`
+    fails. If `close` fails because the disk is full, the export calls `take_back` and `close` again.
 
     Args:
-        config: Its options.
+        config: Options of the format, an instance of `Config`.
     """
 
     Config: ClassVar[type[ConfigModel]] = ConfigModel
     has_rows: ClassVar[bool] = True
-    """Whether it writes rows of one rate. Otherwise it only reads the bags, and the schema is None."""
+    """Whether the format writes rows at a constant rate. Otherwise it only reads the bags, and the schema is None."""
     content: ClassVar[str] = "files of another format"
-    """Content by which a folder is recognised, in words, for the message about a folder of no known format."""
+    """Content that identifies the format, in words: for the error message about a folder of unknown format."""
 
     def __init__(self, config: Any) -> None:
         self.config = config
 
     @abstractmethod
     def open(self, folder: Path, schema: Schema | None) -> None:
-        """Begins a data set in an empty folder."""
+        """Starts a data set in an empty folder.
+
+        Args:
+            folder: The empty folder.
+            schema: Content of the rows; None for a format without rows.
+        """
 
     @abstractmethod
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Writes an episode.
+        """Writes an episode. After an error, no part of the episode is left in the folder.
 
         Args:
-            index: Its number in the data set, from 0 on without gaps.
+            index: Index of the episode in the data set, from 0 without gaps.
             episode: The episode.
 
         Returns:
-            What is stored about it in `rpbi/`, see `rpbi_data.datasets.provenance`.
+            Metadata to store in the folder `rpbi/`, see `rpbi_data.datasets.provenance`.
 
         Raises:
-            InterfaceError: If the episode cannot be read; nothing of it is in the folder then.
-            OSError: If it cannot be written; nothing of it is in the folder then.
+            InterfaceError: If the episode cannot be read.
+            OSError: If the episode cannot be written.
         """
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last; at most once after each `add`, also after a `close` that failed.
+        """Removes the episode that was added last.
+
+        Called at most once after each `add`, possibly after `close` has failed.
 
         Raises:
-            OSError: If that cannot be done, as here; there is no data set then.
+            OSError: If the format cannot remove episodes, as in this base class; the export then fails.
         """
         raise OSError(errno.ENOSPC, f"no room to complete episode {index}")
 
@@ -187,20 +197,20 @@ class DatasetFormat(ABC):
         """Completes the data set.
 
         Raises:
-            OSError: If it cannot be written.
+            OSError: If the remaining files cannot be written.
         """
 
     @classmethod
     @abstractmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder has a data set of this format, written by any tool."""
+        """Returns whether a folder contains a data set of this format, no matter which tool wrote it."""
 
     @classmethod
     @abstractmethod
     def faults(cls, folder: Path) -> Iterator[str]:
-        """Yields a sentence for each fault of a data set."""
+        """Yields a message for each fault of a data set."""
 
     @classmethod
     @abstractmethod
     def summary(cls, folder: Path) -> str:
-        """Returns format and size of a data set without faults, such as `LeRobot v3.0: 2 episodes, 128 frames`."""
+        """Returns name and size of a data set without faults, such as `LeRobot v3.0: 2 episodes, 128 frames`."""

@@ -1,8 +1,9 @@
-"""Sources of the episodes of a data set, stored with them in the folder `rpbi`.
+"""Metadata that the export stores in a data set's folder `rpbi/`, from which later checks detect changes.
 
-`rpbi/export.json` describes the data set, `rpbi/episode_000000.json` an episode: its source, its chain of state hashes,
-and checksums, by which checks find values that were changed, swapped or shifted. `rpbi/episode_000000.npz` has coarse
-images, with which the frames of videos are compared.
+- `rpbi/export.json` describes the data set.
+- `rpbi/episode_000000.json` describes an episode: its source, its chain of state hashes, and checksums of its values.
+  The checksums reveal values that were changed, swapped or shifted.
+- `rpbi/episode_000000.npz` contains coarse images, with which the frames of videos are compared.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ Array = NDArray[Any]
 
 FOLDER, EXPORT = "rpbi", "export.json"
 VERSION = 1
-"""Version of these files."""
+"""Version of the file `export.json`."""
 
 
 def file_digest(path: Path) -> str:
-    """Returns the SHA-256 of a file."""
+    """Returns the SHA-256 of a file in hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(1 << 20):
@@ -42,10 +43,10 @@ def file_digest(path: Path) -> str:
 
 
 def hash_chain(states: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Returns states with a `link` each, the SHA-256 of the link before and of the state.
+    """Returns copies of states with the additional key `link`: the SHA-256 of the previous link and of the state.
 
     Args:
-        states: `stamp` [s], `resets`, `tick`, `commands` and `hash` of each, in order.
+        states: States in order, each with the keys `stamp` [s], `resets`, `tick`, `commands` and `hash`.
     """
     chain: list[dict[str, Any]] = []
     link = ""
@@ -56,11 +57,11 @@ def hash_chain(states: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def chain_faults(chain: Sequence[Mapping[str, Any]], last: str) -> Iterator[str]:
-    """Yields a sentence if a chain of state hashes is broken.
+    """Yields a message if a chain of state hashes is broken or incomplete.
 
     Args:
-        chain: As `hash_chain` returned it.
-        last: Its last link, stored by itself; empty for an empty chain.
+        chain: States with links, from `hash_chain`.
+        last: Last link of the chain, stored separately; empty for an empty chain.
     """
     link = ""
     for state in chain:
@@ -81,21 +82,21 @@ def _link(before: str, state: Mapping[str, Any]) -> str:
 
 
 def checksums(values: Array) -> list[list[int]]:
-    """Returns three checksums of each column: of all rows, of all but the last, of all but the first.
+    """Returns three CRC-32 checksums of each column: of all rows, without the last row, and without the first row.
 
     Args:
-        values: Shape (n, columns).
+        values: Values of a feature, shape (n, columns).
     """
     return [[_crc(column), _crc(column[:-1]), _crc(column[1:])] for column in values.T]
 
 
 def changes(names: Sequence[str], values: Array, stored: Sequence[Sequence[int]]) -> Iterator[str]:
-    """Yields a sentence for each column that differs from its checksums.
+    """Yields a message for each column whose values do not match its stored checksums.
 
     Args:
         names: Names of the columns.
-        values: Shape (n, columns), of the type with which the checksums were computed.
-        stored: As `checksums` returned them for the same number of rows.
+        values: Values to check, shape (n, columns), of the same data type as the exported values.
+        stored: Checksums of n exported rows, from `checksums`.
     """
     by_whole = {whole: name for name, (whole, _, _) in zip(names, stored)}
     for name, column, (whole, without_last, without_first) in zip(names, values.T, stored):
@@ -113,12 +114,12 @@ def changes(names: Sequence[str], values: Array, stored: Sequence[Sequence[int]]
 
 
 def frame_checksums(images: Iterable[Array]) -> list[int]:
-    """Returns a checksum of each image."""
+    """Returns the CRC-32 checksum of each image."""
     return [_crc(np.asarray(pixels)) for pixels in images]
 
 
 def frame_changes(found: Sequence[int], stored: Sequence[int]) -> Iterator[str]:
-    """Yields a sentence if images differ from their checksums."""
+    """Yields a message if the checksums of images differ from the stored checksums."""
     if found == stored:
         return
     if len(found) != len(stored):
@@ -140,17 +141,22 @@ def _crc(column: Array) -> int:
 
 
 def episode_file(folder: Path, index: int) -> Path:
-    """Returns the file with the facts of an episode of a data set."""
+    """Returns the path of the JSON file with the metadata of an episode.
+
+    Args:
+        folder: The data set.
+        index: Index of the episode in the data set, from 0.
+    """
     return folder / FOLDER / f"episode_{index:06d}.json"
 
 
 def write_export(folder: Path, facts: Mapping[str, Any]) -> None:
-    """Writes the description of a data set."""
+    """Writes the description of a data set to `rpbi/export.json`."""
     _write(folder / FOLDER / EXPORT, {"version": VERSION, **facts})
 
 
 def write_episode(folder: Path, index: int, facts: Mapping[str, Any], images: Mapping[str, Array]) -> None:
-    """Writes the facts of an episode, and its coarse images by camera."""
+    """Writes the metadata of an episode, and the episode's coarse images, which are indexed by camera."""
     path = episode_file(folder, index)
     _write(path, facts)
     if images:
@@ -161,7 +167,7 @@ def write_episode(folder: Path, index: int, facts: Mapping[str, Any], images: Ma
 
 
 def remove_episode(folder: Path, index: int) -> None:
-    """Removes the files that `write_episode` has written for an episode."""
+    """Removes the files that `write_episode` wrote for an episode."""
     for suffix in (".json", ".npz"):
         episode_file(folder, index).with_suffix(suffix).unlink(missing_ok=True)
 
@@ -173,22 +179,22 @@ def _write(path: Path, facts: Mapping[str, Any]) -> None:
 
 
 def is_exported(folder: Path) -> bool:
-    """Returns whether a data set was made by this project."""
+    """Returns whether a data set has a folder `rpbi/`: then it was exported by this project."""
     return (folder / FOLDER).is_dir()
 
 
 def read_export(folder: Path) -> dict[str, Any]:
-    """Returns the description of a data set; raises ValueError if it cannot be read."""
+    """Returns the description of a data set; raises a ValueError if `rpbi/export.json` cannot be read."""
     return _read(folder / FOLDER / EXPORT)
 
 
 def read_episode(folder: Path, index: int) -> dict[str, Any]:
-    """Returns the facts of an episode; raises ValueError if they cannot be read."""
+    """Returns the metadata of an episode; raises a ValueError if its file cannot be read."""
     return _read(episode_file(folder, index))
 
 
 def read_images(folder: Path, index: int) -> dict[str, Array]:
-    """Returns the coarse images of an episode by camera; raises ValueError if they cannot be read."""
+    """Returns the coarse images of an episode, indexed by camera; raises a ValueError if they cannot be read."""
     path = episode_file(folder, index).with_suffix(".npz")
     try:
         with np.load(path) as data:

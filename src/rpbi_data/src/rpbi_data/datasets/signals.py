@@ -23,7 +23,7 @@ OTHER_ACTIONS = {
     "geometry_msgs/TransformStamped", "geometry_msgs/WrenchStamped", "std_msgs/Float64", "std_msgs/Float64MultiArray",
     "std_msgs/Float32MultiArray",
 }  # fmt: skip
-"""Types of topics that are actions if their name ends as `ACTION_NAME` says, beside those of joints."""
+"""Message types, in addition to joint states, whose topics are actions if the topic name matches `ACTION_NAME`."""
 ACTION_NAME = re.compile(r"(.*)/(target|command|cmd_vel)")
 STATES_NAME = re.compile(r"(.*)/joint_states")
 TARGETS_NAME = re.compile(r"(.*/joint_states)/target")
@@ -33,20 +33,20 @@ _OF_ROBOT = re.compile(r"/joint_states(/target)?$")
 AXES = ("x", "y", "z")
 
 NEXT, PREVIOUS = "next", "previous"
-"""Times of actions, see `RowOptions`."""
+"""Values of `RowOptions.timing`."""
 GRIPPER, END_EFFECTOR = "observation.gripper", "observation.end_effector"
 _ALWAYS = (STATE, GRIPPER, END_EFFECTOR)
 
 Tables = Mapping[str, pd.DataFrame]
-"""Tables by name: a topic, or the topic of transforms, `#` and a frame."""
+"""Tables, indexed by topic. A table of transforms is indexed by `TOPIC#PARENT#CHILD`, see `by_frame`."""
 
 
 class Column(NamedTuple):
-    """Source of the numbers of a feature.
+    """A column of a table, from which a number of a feature is computed.
 
     Attributes:
-        table: Name of the table.
-        name: Column of the table.
+        table: Name of the table, see `Tables`.
+        name: Name of the column.
     """
 
     table: str
@@ -54,14 +54,15 @@ class Column(NamedTuple):
 
 
 class Signal(NamedTuple):
-    """A feature and its sources.
+    """A feature and the columns from which it is computed.
 
     Attributes:
         feature: The feature.
-        columns: Source of each of its numbers.
+        columns: Column of each number of the feature.
         method: Method of resampling, see `rpbi_utils.resample`; NEXT or PREVIOUS for actions.
-        held: For actions, columns of the measured positions; without a table for commands that have none.
-        deltas: For actions, number of columns of which the change from the row's measured value is taken.
+        held: For actions: column of the measured position that belongs to each number. The table is empty for commands
+            without a measured position.
+        deltas: For actions: how many of the first numbers are changes from the value measured at the row.
     """
 
     feature: Feature
@@ -72,23 +73,23 @@ class Signal(NamedTuple):
 
     @property
     def begins_at_once(self) -> bool:
-        """Whether rows begin with its first message; actions and contacts may begin later."""
+        """Whether rows start only at the first message of this feature; False for actions, which may start later."""
         return self.method not in (NEXT, PREVIOUS)
 
 
 class RowOptions(NamedTuple):
-    """Content of rows; with None, topics are derived.
+    """The user's choice of the content of rows.
 
     Attributes:
-        state: Topics of `observation.state`.
-        action: Topics of `action`.
-        images: Topics of images.
-        features: Patterns of the other observations, without `observation.`; None for all.
+        state: Topics of `observation.state`. None: derived from names and types of the recorded topics.
+        action: Topics of `action`. None: derived in the same way.
+        images: Topics of images. None: derived in the same way.
+        features: Wildcard patterns of the other observations' names, without `observation.`; None for all.
         end_effector: Frame of the end effector, such as `arm/tool`; empty for none.
-        gripper: Joints of the gripper, which are apart from the others.
-        timing: NEXT for the newest command before the next row as the action of a row; PREVIOUS for that of the row.
-        is_pose: Whether actions are poses of the end effector at the next row, not commands.
-        is_delta: Whether actions are changes from what is measured at the row, but for the gripper.
+        gripper: Names of the gripper's joints. They are a separate observation, and come last in actions.
+        timing: NEXT: the action is the newest command before the next row. PREVIOUS: the newest command at the row.
+        is_pose: Whether actions are the end effector's pose at the next row instead of commands.
+        is_delta: Whether actions, except those of the gripper, are changes from the values measured at the row.
     """
 
     state: tuple[str, ...] | None = None
@@ -106,8 +107,8 @@ def wanted_topics(types: Mapping[str, str], row_options: RowOptions) -> list[str
     """Returns the topics whose tables are needed.
 
     Args:
-        types: Types of messages by topic.
-        row_options: Topics that the user names.
+        types: Message types, indexed by topic.
+        row_options: Topics that the user chooses.
 
     Raises:
         UnknownNameError: If a named topic does not exist.
@@ -128,7 +129,7 @@ def _has_features(topic: str, kind: str) -> bool:
 
 
 def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool:
-    """Returns whether messages of a topic, of one type or several, would be a feature."""
+    """Returns whether messages of a topic, which may have several types, would be used for a feature."""
     named = {*(row_options.state or ()), *(row_options.action or ()), *(row_options.images or ())}
     return topic in named or any(
         _has_features(topic, kind) or (is_image(kind) and row_options.images is None) for kind in kinds
@@ -136,12 +137,12 @@ def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool
 
 
 def is_image(kind: str) -> bool:
-    """Returns whether a type of message is an image."""
+    """Returns whether a message type is an image."""
     return kind in (RAW_TYPE, COMPRESSED_TYPE)
 
 
 def image_topics(types: Mapping[str, str], row_options: RowOptions) -> dict[str, str]:
-    """Returns the topics of images by key of the feature; of a raw topic and its compressed one, the raw one."""
+    """Returns the topics of images, indexed by the feature's key; a raw topic is preferred to its compressed topic."""
     topics = row_options.images
     if topics is None:
         found = {topic for topic, kind in types.items() if is_image(kind)}
@@ -150,7 +151,7 @@ def image_topics(types: Mapping[str, str], row_options: RowOptions) -> dict[str,
 
 
 def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
-    """Returns the tables, with that of TF split by frame."""
+    """Returns the tables, with the table of TF split into a table for each pair of parent and child frame."""
     found = {name: table for name, table in tables.items() if name != topic}
     if topic in tables:
         frames = tables[topic].groupby(["parent", "child"], sort=True)
@@ -161,17 +162,17 @@ def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
 def derive(
     tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], row_options: RowOptions
 ) -> list[Signal]:
-    """Returns the observations of a recording.
+    """Returns the observations that can be computed from a recording.
 
     Args:
-        tables: Its tables, those of TF by frame.
-        types: Types of messages by topic.
+        tables: Tables of the recording; the table of TF is split by `by_frame`.
+        types: Message types, indexed by topic.
         namespace: Namespace of the simulator.
         fixed: Names of joints that cannot move, which are left out.
         row_options: Content that the user chooses.
 
     Raises:
-        UnknownNameError: If there is no such feature, joint of a gripper, or frame.
+        UnknownNameError: If a feature, a gripper joint or the end effector's frame is not in the recording.
     """
     found = [
         *_states(tables, types, fixed, row_options),
@@ -195,8 +196,9 @@ def derive(
 
 
 def label(topic: str) -> str:
-    """Returns a topic as a part of a key: without `rpbi`, with `_` for all other characters than letters and
-    numbers.
+    """Converts a topic to a part of a feature's key.
+
+    The name `rpbi` is removed, and characters other than letters and digits become `_`.
     """
     return re.sub(r"\W+", "_", "/".join(part for part in topic.split("/") if part != "rpbi")).strip("_")
 
@@ -240,7 +242,7 @@ def _contacts(tables: Tables, types: Mapping[str, str]) -> Iterator[Signal]:
 
 
 def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
-    """Yields the poses of the bodies of the world that have a frame of their own."""
+    """Yields the poses of all frames below the world whose names have no slash: the frames of bodies."""
     for name, table in _frames(tables, namespace).items():
         if "/" not in name:
             yield Signal(
@@ -250,10 +252,10 @@ def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
 
 
 def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Column, ...]:
-    """Returns the columns of the pose of a frame in the world.
+    """Returns the columns of the pose of a frame in the world frame.
 
     Raises:
-        UnknownNameError: If it is not on TF.
+        UnknownNameError: If the frame is not on TF.
     """
     frames = _frames(tables, namespace)
     name = frame.rpartition("rpbi/")[2]
@@ -263,7 +265,7 @@ def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Co
 
 
 def _frames(tables: Tables, namespace: str) -> dict[str, str]:
-    """Returns the tables of the frames whose parent is the world, by name without prefix, such as `arm/tool`."""
+    """Returns the names of the tables of frames below the world, indexed by frame without prefix, like `arm/tool`."""
     prefix = f"{namespace.strip('/')}/rpbi/".lstrip("/")
     found = {}
     for table in tables:
@@ -285,7 +287,7 @@ def _generic(key: str, tables: Tables, topics: Sequence[str]) -> Signal:
 
 
 def numbers_of(table: pd.DataFrame) -> list[str]:
-    """Returns the columns with numbers of messages, without header and time of recording."""
+    """Returns the names of a table's numeric columns, without the header and the recording time."""
     return [
         name
         for name in table.columns
@@ -294,18 +296,21 @@ def numbers_of(table: pd.DataFrame) -> list[str]:
 
 
 def joint_of(column: Column) -> str:
-    """Returns the name of the joint of a column of joint states."""
+    """Returns the joint name of a column of joint states."""
     return column.name.partition("/")[2]
 
 
 def joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> list[str]:
-    """Returns the columns of a kind, such as `position`, that have values, without those of fixed joints."""
+    """Returns the names of the columns of a kind, such as `position`, that have values; without fixed joints."""
     names = [name for name in table.columns if name.startswith(f"{kind}/")]
     return [name for name in names if name.partition("/")[2] not in fixed and table[name].notna().any()]
 
 
 def names_of(columns: Iterable[Column]) -> tuple[str, ...]:
-    """Returns names of numbers: joints by name, else the path; with the robot or topic where that is not unique."""
+    """Returns a name for each column: the joint name, or else the path of the message field.
+
+    If these names are not unique, all names are preceded by the robot or topic.
+    """
     columns = list(columns)
     short = [
         re.sub(rf"^({'|'.join(KINDS)})/(?!([xyzw]|covariance)$)", "", name).replace("/", ".") for _, name in columns

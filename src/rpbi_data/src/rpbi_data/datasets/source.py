@@ -1,4 +1,4 @@
-"""Rows at a constant rate from the bag of an episode."""
+"""Computes rows at a constant rate from the bag of an episode."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from .signals import RowOptions, Signal, by_frame, derive, end_effector_columns,
 
 
 class Cut(NamedTuple):
-    """Start of the rows of an episode with resets of its world.
+    """Start of the rows in an episode whose world was reset.
 
     Attributes:
         resets: Number of resets within the episode.
-        stamp_ns: Stamp of the first state after the last one [ns].
+        stamp_ns: Stamp of the first state after the last reset [ns].
     """
 
     resets: int
@@ -55,16 +55,16 @@ class Cut(NamedTuple):
 
 
 class SourceEpisode(ExportedEpisode):
-    """An episode of a folder, resampled at the rate of a schema.
+    """A recorded episode, resampled at the rate of a schema.
 
     Args:
-        folder: The folder.
+        folder: Folder of the episode.
         episode: The episode.
         row_options: Content of rows that the user chooses.
-        task: The task in words.
-        any_size: Whether its bag may exceed the limits of `BagReader`.
+        task: Description of the task in words.
+        any_size: Whether the bag may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s].
-        has_rows: Whether its rows are exported; otherwise only its states are read.
+        has_rows: Whether rows are exported; otherwise only the simulator's states are read.
     """
 
     def __init__(
@@ -85,29 +85,29 @@ class SourceEpisode(ExportedEpisode):
         self._signals: tuple[Signal, ...] = ()
 
     def check(self) -> None:
-        """Raises a BagError unless its bag can be read, within the limits."""
+        """Opens and closes the bag; raises a BagError if the bag cannot be read within the limits."""
         BagReader(self.bag, any_size=self._any_size).__exit__()
 
     @property
     def table_bytes(self) -> int:
-        """Memory of its tables [bytes]; 0 if they are not read, or were released."""
+        """Memory of the loaded tables [bytes]; 0 if no table is loaded."""
         made = [self.__dict__.get(name, {}) for name in ("_recorded", "_tables")]
         tables = {id(table): table for each in made for table in each.values()}
         return sum(int(table.memory_usage().sum()) for table in tables.values())
 
     def release(self) -> None:
-        """Releases its tables; they are read again when they are used."""
+        """Releases the memory of the tables, which are read again on the next use."""
         for name in ("_recorded", "_tables", "times"):
             self.__dict__.pop(name, None)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
-        """The features of its topics.
+        """The features of the recorded topics: observations, and the action if there is one.
 
         Raises:
             BagError: If the bag cannot be read.
-            UnknownNameError: If there is no topic, feature, frame or joint that the user named.
-            ValueError: If actions cannot be differences.
+            UnknownNameError: If a topic, feature, frame or joint that the user chose is not in the recording.
+            ValueError: If actions are to be changes of values, but commands are not joint positions.
         """
         row_options, namespace, fixed = self._row_options, self.episode.namespace, self._fixed_joints()
         pose = end_effector_columns(self._tables, namespace, row_options.end_effector) if row_options.is_pose else ()
@@ -116,7 +116,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def cut(self) -> Cut | None:
-        """The last reset of the world within it, where its rows begin; None without one."""
+        """The last reset of the world within the episode, after which rows begin; None without a reset."""
         states = self._recorded.get(self._state_topic)
         if states is None:
             return None
@@ -127,12 +127,15 @@ class SourceEpisode(ExportedEpisode):
 
     @property
     def cameras(self) -> tuple[CameraFeature, ...]:
-        """The cameras of 8 bits of its topics; those with another kind of pixels are left out unless they are named."""
+        """The cameras of the recorded topics with 8-bit pixels.
+
+        Other cameras are left out. If the user chose such a camera, a DatasetError is raised.
+        """
         return tuple(camera for camera, _ in self._cameras.values())
 
     @cached_property
     def _cameras(self) -> dict[str, tuple[CameraFeature, int]]:
-        """The cameras by key, and the stamp of the first image of each [ns]."""
+        """Cameras and the stamps of their first images [ns], indexed by key."""
         found = {}
         for key, topic in self._image_topics.items():
             first = next(self._images(topic), None)
@@ -148,10 +151,14 @@ class SourceEpisode(ExportedEpisode):
         return found
 
     def use(self, schema: Schema, signals: Sequence[Signal]) -> None:
-        """Sets the rows that `times`, `frames` and `values` return.
+        """Sets the content of the rows that `times`, `frames` and `values` return.
+
+        Args:
+            schema: Rate and features of the rows.
+            signals: The features of the schema that are computed from topics.
 
         Raises:
-            DatasetError: If a feature or a camera is not in the recording, or its images have another size.
+            DatasetError: If the recording lacks a feature or a camera, or has it with other names or another size.
         """
         here = {signal.feature.key: signal for signal in self.signals}
         for signal in signals:
@@ -168,10 +175,10 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def times(self) -> Array:
-        """Times of the rows at which all features except actions have values, int64, shape (n,) [ns].
+        """Times of the rows, at which all features except actions have values, int64, shape (n,) [ns].
 
         Raises:
-            DatasetError: If there is none.
+            DatasetError: If there are fewer than two rows.
         """
         tables = {name: self._tables[name] for name in self._continuous_tables()}
         starts = [table.index[0] for table in tables.values()]
@@ -223,7 +230,7 @@ class SourceEpisode(ExportedEpisode):
         return values
 
     def facts(self) -> dict[str, Any]:
-        """Returns its source and its chain of state hashes, for storage with the data set."""
+        """Returns metadata of the episode for the data set, such as its source and its chain of state hashes."""
         episode = self.episode
         chain = hash_chain(self._states())
         source = {"folder": str(self.folder.path), "episode": episode.number, "bag_sha256": file_digest(self.bag)}
@@ -248,7 +255,7 @@ class SourceEpisode(ExportedEpisode):
                 raise DatasetError(self.bag, f"'{key}': the nearest message is {at}, more than --max-time-error")
 
     def _resampled(self, signal: Signal) -> tuple[Array, Array]:
-        """Returns the values of a feature, shape (n, columns), and its time error in each row, shape (n,) [s]."""
+        """Returns the values of a feature, shape (n, columns), and the time error of each row, shape (n,) [s]."""
         if signal.feature.key == ACTION:
             end = self.times[0] + (2 * len(self.times) * PER_SECOND + self._schema.fps) // (2 * self._schema.fps)
             matrix, error = action_values(signal, self._tables, self.times, np.append(self.times[1:], end))
@@ -276,7 +283,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def _recorded(self) -> dict[str, pd.DataFrame]:
-        """Tables of all topics that are needed, read at once."""
+        """Tables of all topics that are needed; the bag is read once for all of them."""
         topics = {*self._feature_topics, *({self._state_topic} & self._types.keys())}
         return bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
 
@@ -286,7 +293,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
-        """Tables of features, from the last reset on, those of transforms by frame."""
+        """Tables of the features' topics, from the last reset on; the table of TF is split by frame."""
         tables = {topic: self._recorded[topic] for topic in self._feature_topics}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
@@ -296,10 +303,10 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def _types(self) -> dict[str, str]:
-        """Types of messages by topic.
+        """Message types, indexed by topic.
 
         Raises:
-            DatasetError: If a topic with features has several, or its clock was set back.
+            DatasetError: If a topic that is used for a feature has several types, or its clock was set back.
         """
         found = {}
         with BagReader(self.bag, any_size=self._any_size) as bag:
@@ -322,7 +329,7 @@ class SourceEpisode(ExportedEpisode):
         return image_topics(self._types, self._row_options)
 
     def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
-        """Yields a function that returns the pixels, and the stamp [ns], of each image, in the order of stamps."""
+        """Yields, for each image in the order of stamps, a function that decodes the pixels, and the stamp [ns]."""
         waiting: list[tuple[int, int, BagMessage]] = []
         with BagReader(self.bag, any_size=self._any_size) as bag:
             latest = 0
@@ -367,10 +374,10 @@ def _image(stamp: int, _: int, message: BagMessage) -> tuple[Callable[[], Array]
 
 
 def _rgb(pixels: Array) -> Array:
-    """Returns pixels in red, green and blue, with an even number of rows and columns.
+    """Converts pixels to red, green and blue, and crops them to an even number of rows and columns.
 
     Raises:
-        ValueError: If they are not of 8 bits.
+        ValueError: If the pixels do not have 8 bits per channel.
     """
     if pixels.dtype != np.uint8:
         raise ValueError(f"expected images of 8 bits a channel, got {pixels.dtype}")
@@ -381,7 +388,7 @@ def _rgb(pixels: Array) -> Array:
 
 
 def _make_continuous(values: Array, feature: Feature) -> None:
-    """Flips signs of quaternions so that each is nearest to the one before; the first has w >= 0."""
+    """Flips the signs of quaternions in place: each is nearest to its predecessor, and the first has w >= 0."""
     names = feature.names
     for first in range(len(names) - 3):
         if names[first : first + 4] == QUATERNION:

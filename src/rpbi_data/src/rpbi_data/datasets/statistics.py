@@ -11,18 +11,18 @@ Array = NDArray[Any]
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 MAX_SAMPLED_FRAMES = 100
-"""Number of images of an episode that statistics are computed from."""
+"""Largest number of images of an episode from which statistics are computed."""
 LEVELS = 256
 """Levels of brightness of a channel."""
 MAX_SAMPLED_PIXELS = 20_000
-"""Number of pixels of each of them, spread over the image."""
+"""Approximate number of pixels of each image from which statistics are computed, evenly spaced over the image."""
 
 
 def statistics(values: Array) -> dict[str, list[Any]]:
     """Returns minimum, maximum, mean, standard deviation, count and quantiles of each column.
 
     Args:
-        values: Shape (n, columns).
+        values: Values of a feature, shape (n, columns).
     """
     values = values.astype(float)
     found = {"min": values.min(axis=0), "max": values.max(axis=0)}
@@ -33,7 +33,7 @@ def statistics(values: Array) -> dict[str, list[Any]]:
 
 
 class ImageStatistics:
-    """Statistics of images, from the frequencies of brightness in a sample of frames and pixels.
+    """Statistics of an episode's images, from the brightness histogram of each channel in a sample of pixels.
 
     Args:
         frames: Expected number of images.
@@ -46,7 +46,7 @@ class ImageStatistics:
         self._counts = np.zeros((3, LEVELS), int)
 
     def add(self, pixels: Array) -> None:
-        """Adds an image, shape (height, width, 3), uint8."""
+        """Counts an image, shape (height, width, 3), uint8; only every k-th image is sampled."""
         if self._seen % self._every == 0:
             step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
             for channel, counts in enumerate(self._counts):
@@ -55,7 +55,7 @@ class ImageStatistics:
         self._seen += 1
 
     def result(self) -> dict[str, list[Any]]:
-        """Returns the statistics of the channels, from 0 to 1, each in the form [[[value]]]."""
+        """Returns the statistics of brightness, from 0 to 1, each as a nested list of the shape (3, 1, 1)."""
         levels = np.arange(LEVELS) / (LEVELS - 1)
         found: dict[str, list[Any]] = {}
         for counts in self._counts:
@@ -72,7 +72,7 @@ class ImageStatistics:
 
 
 def pooled(parts: list[dict[str, list[Any]]]) -> dict[str, list[Any]]:
-    """Returns the statistics of images of several episodes from those of each; quantiles are means of quantiles."""
+    """Combines the image statistics of several episodes; quantiles are weighted means of the episodes' quantiles."""
     counts = np.array([part["count"][0] for part in parts], float)
     arrays = {name: np.array([part[name] for part in parts]) for name in parts[0] if name != "count"}
 

@@ -1,4 +1,4 @@
-"""Videos of cameras, written and read by PyAV."""
+"""Writes and reads videos of cameras with PyAV."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ except ImportError:
 Array = NDArray[Any]
 
 ENCODER = "libx264"
-"""Encoder of H.264. That of AV1, SVT-AV1, gives the calling thread of root the highest real-time priority."""
+"""Encoder for H.264. The AV1 encoder SVT-AV1 would give the calling thread, if root, the highest real-time priority."""
 PIXEL_FORMAT = "yuv420p"
 MAX_PIXELS = 7680 * 4320
 """Largest number of pixels of a frame that is read."""
 KEY_FRAME_EVERY = 2
-"""Frames from one key frame to the next; a reader that jumps to a frame decodes at most so many."""
+"""Number of frames from one key frame to the next; a reader that jumps to a frame decodes at most this many."""
 
 
 class VideoWriter:
-    """A video of a constant rate, as a context that closes it.
+    """Writes a video with a constant frame rate. Used as a context manager, which completes and closes the file.
 
     Args:
-        path: The file.
-        fps: Frames a second.
+        path: The video file.
+        fps: Frames per second.
         height: Rows of pixels.
         width: Columns of pixels.
         preset: Preset of the encoder, such as `ultrafast`.
-        crf: Quantisation; a lower number is a better picture and a larger file.
+        crf: Quantisation; a lower number means better images and a larger file.
 
     Raises:
-        OSError: If the file cannot be written, here and in all methods.
+        OSError: If the file cannot be written. All methods may raise this error.
     """
 
     def __init__(self, path: Path, fps: int, height: int, width: int, preset: str, crf: int) -> None:
@@ -68,13 +68,13 @@ class VideoWriter:
 
 
 class VideoFacts:
-    """Rate, size and codec of a video file.
+    """Frame rate, size and codec of a video file.
 
     Args:
-        path: The file.
+        path: The video file, an MP4.
 
     Raises:
-        ValueError: If it cannot be read, or is no video.
+        ValueError: If the file cannot be read, or is not a video.
     """
 
     def __init__(self, path: Path) -> None:
@@ -86,10 +86,10 @@ class VideoFacts:
 
 
 def read_video(path: Path) -> Iterator[tuple[float, Array]]:
-    """Yields time [s] and pixels, shape (height, width, 3), of each frame of a video.
+    """Yields the time [s] and the pixels, shape (height, width, 3), uint8, of each frame of a video.
 
     Raises:
-        ValueError: If it cannot be read, when the faulty frame is reached.
+        ValueError: If the file cannot be read. The frames before a damaged frame are yielded first.
     """
     count = 0
     with _opened(path) as container:
@@ -103,7 +103,7 @@ def read_video(path: Path) -> Iterator[tuple[float, Array]]:
 
 def _opened(path: Path) -> Any:
     try:
-        container = av.open(str(path), format="mp4")  # others may be lists of files and addresses
+        container = av.open(str(path), format="mp4")  # other formats may name further files and addresses
     except (av.FFmpegError, OSError) as error:
         raise ValueError(f"cannot be read: {_words(error)}") from error
     if not container.streams.video:

@@ -1,4 +1,4 @@
-"""The formats of data sets; a new one is a class in its own file and a line here."""
+"""Table of the data set formats. To add a format, write its class in a new file, and add a line to the table."""
 
 from pathlib import Path
 
@@ -15,19 +15,19 @@ FORMATS: PluginTable[DatasetFormat] = PluginTable(
         "mcap": "rpbi_data.datasets.formats.mcap:Mcap",
     },
 )
-"""All formats by name."""
+"""All formats, indexed by name."""
 
 
 def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]:
-    """Returns the format of a data set.
+    """Returns the format that recognises a data set.
 
     Args:
         folder: The data set.
         others: Formats of other packages, as `module:Class`.
 
     Raises:
-        DatasetError: If there is no such folder, or no format recognises it; the message lists its content.
-        MissingDependency: If its library is not installed.
+        DatasetError: If the folder does not exist, or no format recognises it. The message lists the folder's content.
+        MissingDependency: If no installed format recognises the folder, and the library of another one is missing.
     """
     if not folder.is_dir():
         raise DatasetError(folder, "expected a folder with a data set, there is none")
@@ -37,7 +37,7 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
             found = FORMATS.find(name)
             if found.recognises(folder):
                 return found
-        except MissingDependency as error:  # that of another format may be there
+        except MissingDependency as error:  # another format may recognise the folder
             missing = error
     if missing:
         raise missing

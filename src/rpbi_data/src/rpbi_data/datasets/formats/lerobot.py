@@ -1,4 +1,4 @@
-"""LeRobot data sets of version 3.0."""
+"""Data set format LeRobot, version 3.0."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ except ImportError:
     raise MissingDependency("pyarrow", "./rpbi setup data") from None
 
 MAX_DATA_BYTES = 100_000_000
-"""Size of the rows in memory beyond which a data file is written [bytes]."""
+"""When the rows in memory exceed this size, they are written to a data file [bytes]."""
 ROOM_BYTES = 200_000
-"""Disk space for metadata, in addition to that of the rows [bytes]."""
+"""Disk space that is reserved for metadata, in addition to the space for rows [bytes]."""
 Preset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"]
 
 
@@ -61,7 +61,7 @@ class LeRobot(DatasetFormat):
     content = "meta/info.json (LeRobot)"
 
     def open(self, folder: Path, schema: Schema | None) -> None:
-        """Begins the data set."""
+        """Starts the data set."""
         assert schema is not None
         self._folder, self._schema = folder, schema
         self._tasks: dict[str, int] = {}
@@ -94,7 +94,7 @@ class LeRobot(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "images": images}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last; its rows are not written to a file yet."""
+        """Removes the episode that was added last; the episode's rows are still in memory."""
         self._frames -= len(self._pending.pop())
         self._episodes.pop()
         for key, found in self._image_statistics.items():
@@ -134,7 +134,7 @@ class LeRobot(DatasetFormat):
         _json(meta / "info.json", info)
 
     def _write_videos(self, index: int, episode: ExportedEpisode) -> tuple[dict[str, _Film], dict[str, Array]]:
-        """Writes the videos of an episode, and returns their facts and the numbers of the episode."""
+        """Writes the videos of an episode; returns data on each video, and the values of the episode's features."""
         paths = {each.key: self._folder / video_file(each.key, index) for each in self._schema.cameras}
         with ExitStack() as undo:
             for path in paths.values():
@@ -212,23 +212,23 @@ class LeRobot(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether there is a `meta/info.json`, or the remains of such a data set."""
+        """Returns whether a folder has `meta/info.json`, or the folders `meta` and `data` of a damaged data set."""
         return (folder / "meta").is_dir() and ((folder / "meta/info.json").exists() or (folder / "data").is_dir())
 
     @classmethod
     def faults(cls, folder: Path) -> Iterator[str]:
-        """Yields a sentence for each fault."""
+        """Yields a message for each fault."""
         return lerobot_faults(folder)
 
     @classmethod
     def summary(cls, folder: Path) -> str:
-        """Returns version, episodes and frames."""
+        """Returns a text with the version and the numbers of episodes and frames."""
         info = json.loads((folder / "meta/info.json").read_text(encoding="utf-8"))
         return f"LeRobot {info['codebase_version']}: {info['total_episodes']} episodes, {info['total_frames']} frames"
 
 
 class _Film:
-    """Data on the images of one camera in one episode."""
+    """Data on the images of one camera in one episode: stamps, statistics and coarse images."""
 
     def __init__(self, frames: int) -> None:
         self._statistics = ImageStatistics(frames)
@@ -236,14 +236,14 @@ class _Film:
         self._coarse: list[Array] = []
 
     def add(self, pixels: Array, stamp: int) -> None:
-        """Adds an image."""
+        """Adds an image, shape (height, width, 3), uint8, with its stamp [ns]."""
         self._statistics.add(pixels)
         self._stamps.append(stamp)
         self._coarse.append(coarse(pixels))
 
     @property
     def stamps(self) -> Array:
-        """Times of the images, shape (n,) [s]."""
+        """Stamps of the images, shape (n,) [ns]."""
         return np.array(self._stamps)
 
     @property
@@ -253,7 +253,7 @@ class _Film:
 
     @property
     def statistics(self) -> dict[str, list[Any]]:
-        """Statistics of the channels."""
+        """Statistics of the channels, see `ImageStatistics.result`."""
         return self._statistics.result()
 
 
@@ -262,7 +262,7 @@ def _feature(dtype: str, names: tuple[str, ...] | None) -> dict[str, Any]:
 
 
 def _array(values: Array) -> pa.Array:
-    """Returns rows of several numbers as lists of fixed length, and of one number as numbers."""
+    """Converts values, shape (n, columns), to an Arrow array of lists, or of numbers if there is only one column."""
     if values.shape[1] == 1:
         return pa.array(values[:, 0])
     return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])

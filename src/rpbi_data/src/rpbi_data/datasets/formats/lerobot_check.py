@@ -1,4 +1,4 @@
-"""Files and columns of LeRobot data sets of version 3.0, and the check of them."""
+"""Names of files and columns in LeRobot data sets, version 3.0, and the check of such data sets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 VERSION = "v3.0"
 CHUNK = 1000
-"""Number of files in a folder."""
+"""Largest number of files in a folder."""
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES_PATH = "meta/episodes/chunk-000/file-000.parquet"
@@ -32,13 +32,13 @@ ROW_COLUMNS = {
     "index": "int64",
     "task_index": "int64",
 }
-"""Columns of every data set, and their types."""
+"""Columns that every data set has, and their types."""
 NO_NUMBERS = ("image", "string", "audio")
-"""Types of columns, in data sets of other tools, whose values are not checked."""
+"""Types of columns whose values are not checked; they occur in data sets of other tools."""
 MAX_TIME_ERROR_S = 1e-4
-"""Largest deviation of a time stamp from `frame_index / fps`, as the owner's reader has it [s]."""
+"""Largest deviation of a time stamp from `frame_index / fps`, as in LeRobot's own reader [s]."""
 MAX_STATISTIC_ERROR = 1e-4
-"""Largest deviation of a statistic, as a share of the largest value of the feature."""
+"""Largest deviation of a stored statistic, as a share of the column's largest absolute value."""
 REQUIRED = (
     "codebase_version",
     "fps",
@@ -52,25 +52,25 @@ REQUIRED = (
 
 
 def place(number: int) -> dict[str, int]:
-    """Returns the folder of a file and its number in it."""
+    """Returns the number of the folder of a file, and the number of the file within the folder."""
     return {"chunk_index": number // CHUNK, "file_index": number % CHUNK}
 
 
 def data_file(number: int) -> Path:
-    """Returns the path of a data file in the data set."""
+    """Returns the path of a data file, relative to the data set."""
     return Path(DATA_PATH.format(**place(number)))
 
 
 def video_file(key: str, number: int) -> Path:
-    """Returns the path of a video file in the data set."""
+    """Returns the path of a video file, relative to the data set."""
     return Path(VIDEO_PATH.format(video_key=key, **place(number)))
 
 
 def matrix(column: Any) -> Array:
-    """Returns a column of a Parquet table with a row for each of its rows; one number a row is one column.
+    """Converts a column of a Parquet table to an array of the shape (rows, numbers per row).
 
     Raises:
-        ValueError: If its rows differ in length, or are no numbers.
+        ValueError: If rows are empty, differ in length, or do not consist of numbers.
     """
     array = column.combine_chunks()
     if array.null_count:
@@ -88,7 +88,7 @@ def matrix(column: Any) -> Array:
 
 
 def lerobot_faults(folder: Path) -> Iterator[str]:
-    """Yields a sentence for each fault of a LeRobot data set."""
+    """Yields a message for each fault of a LeRobot data set."""
     check = _Check(folder)
     yield from guarded("meta/info.json", check.info_faults())
     if not check.is_readable:
@@ -103,7 +103,7 @@ def lerobot_faults(folder: Path) -> Iterator[str]:
 
 
 class _Check:
-    """The parts of a check, in the order of their calls; later ones use data read by earlier ones."""
+    """Check of a data set; methods are called in the order of definition, since later ones use data of earlier ones."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -259,7 +259,12 @@ class _Check:
                 yield f"{name}: {fault}"
 
     def _table_faults(self, table: pa.Table, rows: list[dict[str, Any]]) -> Iterator[str]:
-        """Checks a data file with the episodes that should be in it, in order."""
+        """Checks a data file.
+
+        Args:
+            table: Content of the data file.
+            rows: Rows of `meta/episodes` of the episodes that should be in the file, in order.
+        """
         features = {key: each for key, each in self._info["features"].items() if each["dtype"] != "video"}
         for key in sorted(features.keys() - set(table.column_names)):
             yield f"'{key}' of meta/info.json is missing"
@@ -374,7 +379,14 @@ class _Check:
     def _file_faults(
         self, path: Path, key: str, feature: Mapping[str, Any], rows: list[dict[str, Any]]
     ) -> Iterator[str]:
-        """Checks a video with the episodes that should be in it."""
+        """Checks a video file.
+
+        Args:
+            path: The video file.
+            key: Key of the camera.
+            feature: Description of the camera in `meta/info.json`.
+            rows: Rows of `meta/episodes` of the episodes that should be in the video.
+        """
         from rpbi_data.datasets.video import VideoFacts, read_video  # not needed without cameras
 
         if not path.exists():
@@ -406,7 +418,7 @@ class _Check:
         yield from self._frame_faults(key, rows, np.array(times), np.array(images))
 
     def _frame_faults(self, key: str, rows: list[dict[str, Any]], times: Array, images: Array) -> Iterator[str]:
-        """Finds the frames of each episode by its times, as readers do, and compares them with the exported images."""
+        """Finds the frames of each episode by time, as readers do, and compares them with the exported images."""
         fps = self._info["fps"]
         for row in rows:
             where = f"episode {row['episode_index']}"
@@ -429,7 +441,7 @@ class _Check:
             yield from (f"{where}: {fault}" for fault in image_faults(key, found, stored))
 
     def _states(self, row: Mapping[str, Any]) -> Array:
-        """Returns the positions of the joints in an episode, shape (length, columns); empty for none."""
+        """Returns `observation.state` of an episode, shape (length, columns); an empty array without this feature."""
         parts = self._values.get(STATE, [])
         if not parts or len({part.shape[1] for part in parts}) != 1:
             return np.empty((0, 0))
@@ -454,7 +466,7 @@ def _type_faults(key: str, feature: Mapping[str, Any], values: Array) -> Iterato
 
 
 def _statistic_faults(stored: Mapping[str, Any], values: Array) -> Iterator[str]:
-    """Compares the statistics of a feature with its values; values beyond the extremes are reported separately."""
+    """Compares the stored statistics of a feature with statistics of the values."""
     found = statistics(values)
     scale = np.maximum(np.abs(values.astype(float)).max(axis=0), 1e-6)
     for name in ("min", "max", "mean", "std"):
@@ -474,7 +486,7 @@ def _statistic_faults(stored: Mapping[str, Any], values: Array) -> Iterator[str]
 
 
 def _nearest(times: Array, wanted: Array) -> Array:
-    """Returns the indices of the times nearest to others; `times` is ascending and not empty."""
+    """Returns, for each wanted time, the index of the nearest time in `times`, which is ascending and not empty."""
     right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     right = np.minimum(right, len(times) - 1)
     left = np.maximum(right - 1, 0)

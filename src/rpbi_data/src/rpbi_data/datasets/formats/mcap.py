@@ -1,4 +1,4 @@
-"""rosbag2 recordings in MCAP files: all messages as they were recorded."""
+"""Data set format of rosbag2 recordings in MCAP files, which contain all messages as recorded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ except ImportError:
     raise MissingDependency("rosbags", "./rpbi setup data") from None
 
 ROSBAG2_VERSION = 9
-"""Version of the metadata of a recording; that of ROS 2 Jazzy."""
+"""Version of a recording's metadata, as in ROS 2 Jazzy."""
 
 
 class McapConfig(ConfigModel):
@@ -44,7 +44,7 @@ class Mcap(DatasetFormat):
     content = "folders with metadata.yaml (rosbag2)"
 
     def open(self, folder: Path, schema: Schema | None) -> None:
-        """Begins the folder."""
+        """Prepares the conversion of message types."""
         self._folder = folder
         self._types = get_typestore(Stores[f"ROS2_{self.config.distribution.upper()}"])
 
@@ -73,27 +73,27 @@ class Mcap(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether there are folders with a `metadata.yaml` or a file of MCAP."""
+        """Returns whether a folder has subfolders with a `metadata.yaml` or an MCAP file."""
         return bool([*folder.glob("*/metadata.yaml"), *folder.glob("*/*.mcap")])
 
     @classmethod
     def faults(cls, folder: Path) -> Iterator[str]:
-        """Yields a sentence for each fault."""
+        """Yields a message for each fault."""
         return _faults(folder)
 
     @classmethod
     def summary(cls, folder: Path) -> str:
-        """Returns the number of episodes and messages."""
+        """Returns a text with the numbers of episodes and messages."""
         found = [_count(each.parent) for each in sorted(folder.glob("*/metadata.yaml"))]
         return f"rosbag2 in MCAP: {len(found)} episodes, {sum(found)} messages"
 
 
 def _convert(bag: Path, target: Path, types: Any) -> None:
-    """Converts all topics of a ROS 1 bag; their definitions are in it."""
+    """Converts all topics of a ROS 1 bag, with the message definitions in the bag."""
     choices = ("exclude_topics", "include_topics", "exclude_msgtypes", "include_msgtypes")
     everything: dict[str, Any] = dict.fromkeys(choices, ())
     plain: dict[str, Any] = {"compress": None, "compress_mode": "message"}
-    with redirect_stdout(io.StringIO()):  # it names types that ROS 2 does not have, which are written all the same
+    with redirect_stdout(io.StringIO()):  # `convert` prints types unknown to ROS 2, but writes them
         convert([bag], target, "mcap", ROSBAG2_VERSION, default_typestore=None, typestore=types, **plain, **everything)
 
 
@@ -103,10 +103,10 @@ def _count(recording: Path) -> int:
 
 
 def _topics_of(recording: Path) -> dict[str, dict[str, Any]]:
-    """Returns type, number of messages and SHA-256 of stamps and content of each topic of a recording.
+    """Returns the type, the number of messages, and the SHA-256 of stamps and content, for each topic of a recording.
 
     Raises:
-        ReaderError: If it cannot be read.
+        ReaderError: If the recording cannot be read.
     """
     found: dict[str, dict[str, Any]] = {}
     digests: dict[str, Any] = {}
@@ -120,7 +120,7 @@ def _topics_of(recording: Path) -> dict[str, dict[str, Any]]:
 
 
 def _faults(folder: Path) -> Iterator[str]:
-    """Yields a sentence for each fault of a folder of recordings."""
+    """Yields a message for each fault of a folder of recordings."""
     facts = Facts(folder)
     yield from guarded("rpbi", _recording_faults(folder, facts))
     yield from facts.faults

@@ -1,4 +1,4 @@
-"""Data sets of robomimic: one HDF5 file."""
+"""Data set format robomimic, which is one HDF5 file."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from rpbi_data.datasets.provenance import checksums, frame_changes, frame_checks
 FILE = "dataset.hdf5"
 _OBSERVATION = "observation."
 ACTIONS = "actions"
-"""Name of the actions of an episode in the file."""
+"""Name of an episode's actions in the HDF5 file."""
 SUCCESS = "success"
-"""Label of episodes whose last row has the reward 1, and filter of them in `mask`."""
+"""Default label of episodes whose last row has the reward 1."""
 
 ROOM_BYTES = 100_000
-"""Disk space in addition to that of the numbers of an episode [bytes]."""
+"""Disk space that is reserved in addition to the size of an episode's values [bytes]."""
 MAX_SCALING_ERROR = 1e-6
-"""Largest deviation of the largest or least scaled action from 1 or -1."""
+"""Largest deviation of a column's largest absolute scaled action from 1."""
 
 
 class RobomimicConfig(ConfigModel):
@@ -57,7 +57,7 @@ class Robomimic(DatasetFormat):
     content = "an HDF5 file (robomimic)"
 
     def open(self, folder: Path, schema: Schema | None) -> None:
-        """Begins the data set."""
+        """Creates the HDF5 file."""
         assert schema is not None
         if all(each.key != ACTION for each in schema.features):
             raise DatasetError(folder, f"expected a feature '{ACTION}', found none")
@@ -70,7 +70,7 @@ class Robomimic(DatasetFormat):
         self._is_closing = False
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Writes an episode after it was read completely and its disk space was checked."""
+        """Reads an episode completely, checks the free disk space, and then writes the episode."""
         stamps: dict[str, Array] = {}
         observations: dict[str, Array] = {}
         for camera in self._schema.cameras:
@@ -103,7 +103,7 @@ class Robomimic(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last; its space in the file is reused."""
+        """Removes the episode that was added last, to free space; not possible after `close` has started to scale."""
         if self._is_closing:
             super().take_back(index)
         name = f"demo_{index}"
@@ -113,7 +113,7 @@ class Robomimic(DatasetFormat):
         self._room_bytes = 0
 
     def close(self) -> None:
-        """Scales all actions, and writes the facts on the whole data set."""
+        """Scales all actions, and writes the metadata of the whole data set."""
         if self._room_bytes:
             require_room(self._folder, self._room_bytes)  # see `add`
         self._is_closing = True
@@ -168,17 +168,17 @@ class Robomimic(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether there is an HDF5 file, even a broken one."""
+        """Returns whether a folder has an HDF5 file, even a broken one."""
         return bool(list(folder.glob("*.hdf5")))
 
     @classmethod
     def faults(cls, folder: Path) -> Iterator[str]:
-        """Yields a sentence for each fault."""
+        """Yields a message for each fault."""
         return _faults(folder)
 
     @classmethod
     def summary(cls, folder: Path) -> str:
-        """Returns episodes and rows of each file."""
+        """Returns a text with the numbers of episodes and rows in each file."""
         found = []
         for path in sorted(folder.glob("*.hdf5")):
             with h5py.File(path) as file:
@@ -194,24 +194,24 @@ def _put_observation(demo: h5py.Group, key: str, values: Array) -> None:
 
 
 def observation_key(key: str) -> str:
-    """Returns the name of a feature in the groups `obs` and `next_obs`."""
+    """Returns the name of a feature in the HDF5 groups `obs` and `next_obs`."""
     return key.removeprefix(_OBSERVATION).replace(".", "_")
 
 
 def scaled(actions: Array, low: Array, high: Array) -> Array:
-    """Returns actions in [-1, 1]; 0 where all are the same.
+    """Returns actions scaled to [-1, 1]; a column in which all actions are equal becomes 0.
 
     Args:
-        actions: Shape (n, columns).
-        low: Least action of each column.
-        high: Largest action of each column.
+        actions: Actions, shape (n, columns).
+        low: Smallest action of each column over all episodes, shape (columns,).
+        high: Largest action of each column over all episodes, shape (columns,).
     """
     extent = np.where(high > low, high - low, 1.0)
     return np.asarray(np.where(high > low, np.clip(2.0 * (actions - low) / extent - 1.0, -1.0, 1.0), 0.0))
 
 
 def _faults(folder: Path) -> Iterator[str]:
-    """Yields a sentence for each fault of a robomimic data set."""
+    """Yields a message for each fault of a robomimic data set."""
     facts = Facts(folder)
     episodes = 0
     for path in sorted(folder.glob("*.hdf5")):
@@ -268,13 +268,13 @@ def _names(data: h5py.Group) -> dict[str, list[str]]:
 def _demo_faults(
     demo: h5py.Group, stored: Mapping[str, Any], shapes: dict[str, tuple[int, ...]], names: Mapping[str, list[str]]
 ) -> Iterator[str]:
-    """Checks an episode.
+    """Yields a message for each fault of an episode.
 
     Args:
-        demo: Its group.
-        stored: Its facts; empty for none.
-        shapes: Shapes of rows in the episodes before, to which those of this one are added.
-        names: Names of the numbers of observations.
+        demo: HDF5 group of the episode.
+        stored: Metadata of the episode from the folder `rpbi/`; empty without metadata.
+        shapes: Shapes of rows in previous episodes, indexed by observation; new observations are added.
+        names: Column names of each observation, indexed by observation.
     """
     if ACTIONS not in demo:
         yield f"expected {ACTIONS}, found none"
