@@ -1,4 +1,4 @@
-"""The joints between a robot's base and one of its links, as PyBullet moves them."""
+"""Kinematic chain from a robot's base to one of its links, computed by PyBullet."""
 
 import math
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ class Target(NamedTuple):
     """Target of a link.
 
     Attributes:
-        position: x, y, z in the base [m].
-        quat_xyzw: Its orientation in the base, a unit quaternion; None: any.
+        position: Position x, y, z in the frame of the base [m].
+        quat_xyzw: Orientation in the frame of the base, a unit quaternion; None accepts any orientation.
     """
 
     position: Sequence[float]
@@ -27,16 +27,20 @@ class Target(NamedTuple):
 
 
 class BulletChain:
-    """A link and the m joints that move it, as a body of its own, since further joints would cost time.
+    """Computes the kinematics of one link, which m joints move.
+
+    Loads the chain from the root to the link as a separate PyBullet body, since further joints would cost time.
 
     Args:
-        urdf: The part between the root and the link, see `UrdfDocument.bare`.
+        pb: Client into which the chain is loaded.
+        urdf: URDF of the chain, without shapes.
         scaling: PyBullet's `globalScaling`.
-        joint_names: The n joints of the robot that a motor can move.
+        link_name: Name of the link.
+        joint_names: Names of the robot's n joints that motors can move.
 
     Attributes:
-        members: Indices of the m joints among the n.
-        reach: Largest distance of the link from the root [m].
+        members: Indices of the m joints in `joint_names`.
+        reach: Ball that contains all positions of the link's origin, in the frame of the base.
     """
 
     def __init__(self, pb: Client, urdf: str, scaling: float, link_name: str, joint_names: Sequence[str]) -> None:
@@ -55,17 +59,20 @@ class BulletChain:
         self.reach = Reach.of(knots[0], map(math.dist, knots, knots[1:]), driven)
 
     def set(self, q: np.ndarray) -> None:
-        """Puts the joints at m positions [rad or m]."""
+        """Sets the m joint positions [rad or m]."""
         if self._joint_indices:
             self.pb.resetJointStatesMultiDof(self.body_id, self._joint_indices, [[position] for position in q.tolist()])
 
     def pose(self) -> Pose:
-        """Returns the pose of the link in the base."""
+        """Returns the pose of the link's URDF frame in the frame of the base."""
         state = self.pb.getLinkState(self.body_id, self.link_index, computeForwardKinematics=True)
         return Pose(state[4], state[5])
 
     def error(self, target: Target) -> np.ndarray:
-        """Returns the error to the target: 3 distances [m], and a rotation vector [rad] if it has an orientation."""
+        """Returns the error from the link's present pose to a target.
+
+        The first 3 numbers are distances [m]. If the target has an orientation, a rotation vector [rad] follows.
+        """
         position, quat = self.pose()
         error = [goal - present for goal, present in zip(target.position, position)]
         if target.quat_xyzw is not None:
@@ -73,13 +80,21 @@ class BulletChain:
         return np.array(error)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:
-        """Returns the residual of the link at m positions [rad or m]."""
+        """Sets m joint positions [rad or m], and returns the link's residual to a target."""
         self.set(q)
         error = self.error(target).tolist()
         return Residual(math.hypot(*error[:3]), math.hypot(*error[3:]))
 
     def jacobian(self, q: np.ndarray, rows: int) -> np.ndarray:
-        """Returns how the link's position, and with 6 rows its orientation, changes with the joints, rows x m."""
+        """Returns the Jacobian of the link's origin.
+
+        Args:
+            q: m joint positions [rad or m].
+            rows: 3 for the linear part alone, 6 for the linear and the angular part.
+
+        Returns:
+            Shape (rows, m), in the axes of the base.
+        """
         zeros = [0.0] * len(q)
         linear, angular = self.pb.calculateJacobian(
             self.body_id, self.link_index, [0.0, 0.0, 0.0], q.tolist(), zeros, zeros

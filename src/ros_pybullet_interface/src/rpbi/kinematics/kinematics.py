@@ -28,23 +28,23 @@ from .search import Search
 
 
 class Kinematics:
-    """Forward and inverse kinematics of one robot, in a private PyBullet client with its base at the origin.
+    """Computes forward and inverse kinematics of one robot, in a private PyBullet client.
 
-    Any thread may call it; a lock inside lets one in at a time. PyBullet holds Python's lock for a few tenths of a
-    millisecond at a time, never for a whole solution.
+    Any thread may call the methods; a lock admits one thread at a time. PyBullet holds Python's global interpreter lock
+    for a few tenths of a millisecond at a time, never for a whole solution.
 
     Args:
-        urdf_path: The robot's description; the meshes it names need not be there.
+        urdf_path: URDF file of the robot. Meshes in the file need not exist.
         scaling: PyBullet's `globalScaling` of the robot.
-        flags: PyBullet's `flags` of its `loadURDF`.
+        flags: PyBullet's `flags` of `loadURDF`.
 
     Attributes:
-        joint_names: The n joints that a motor can move, in the robot's order.
-        limits: Their limits.
+        joint_names: Names of the n joints that motors can move, in the robot's order.
+        limits: Position limits of these n joints.
 
     Raises:
-        ConfigError: If the description cannot be read, is not well-formed or makes no robot.
-        PhysicsError: If PyBullet cannot load it.
+        ConfigError: If the URDF cannot be read, is not well-formed, or does not describe a robot.
+        PhysicsError: If PyBullet cannot load the robot.
     """
 
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
@@ -76,12 +76,13 @@ class Kinematics:
 
         Args:
             positions: n positions [rad or m], in the order of `joint_names`.
-            link_name: The link; not the root.
+            link_name: Name of the link, which is not the root link.
 
         Raises:
             UnknownNameError: If there is no such link.
-            ValueError: If there are not n positions, or one is not finite.
-            PhysicsError: If it was closed.
+            ValueError: If the number of positions is not n, a position is not finite, the link is the root link, or a
+                joint above the link is not revolute, prismatic or fixed.
+            PhysicsError: If `close` was called.
         """
         if len(positions) != len(self.joint_names) or not all(map(math.isfinite, positions)):
             expected = f"{len(self.joint_names)} finite values, one for each of {', '.join(self.joint_names)}"
@@ -92,16 +93,17 @@ class Kinematics:
             return chain.pose()
 
     def solve(self, problem: PybulletProblem) -> PybulletSolution:
-        """Searches joint positions that bring a link to a target; the same problem has the same answer.
+        """Searches joint positions that move a link to a target. The result depends on the problem only.
 
-        It returns the first solution from the given start, then from random ones, and stops after a fixed number of
-        iterations. With a rest posture it starts there, and moves from the solution to the one nearest to the posture.
+        The search begins at the problem's start, continues from random starts until a solution is found, and is limited
+        to a fixed number of iterations. With a rest posture, the search begins at the posture. It then moves along the
+        solutions to the one nearest to the posture.
 
         Raises:
             UnknownNameError: If there is no such link.
-            ValueError: If a list has not one value for each joint, limits leave a joint no position, or the link
-                hangs on a joint that is neither revolute nor prismatic.
-            PhysicsError: If it was closed.
+            ValueError: If the length of a list is not the number of joints, limits exclude all positions of a joint,
+                the link is the root link, or a joint above the link is not revolute, prismatic or fixed.
+            PhysicsError: If `close` was called.
         """
         problem.check_lengths(self.joint_names)
         limits = problem.narrowed(self.limits, self.joint_names)
@@ -126,7 +128,7 @@ class Kinematics:
 
     @contextmanager
     def _open(self) -> Iterator[None]:
-        """Locks the client for one thread, or raises PhysicsError if it was closed."""
+        """Locks the client for one thread during a `with` block; raises PhysicsError if the client was closed."""
         with self._lock:
             if not self._disconnect.alive:
                 raise PhysicsError("the robot was removed, and its kinematics with it")
@@ -147,11 +149,11 @@ class Kinematics:
         return joints
 
     def _chain(self, link_name: str) -> BulletChain:
-        """Returns the chain that moves a link.
+        """Returns the chain from the root to a link, and loads it at the first call.
 
         Raises:
             UnknownNameError: If there is no such link.
-            ValueError: If it is the root link, or hangs on a joint that is neither revolute nor prismatic.
+            ValueError: If the link is the root link, or a joint above the link is not revolute, prismatic or fixed.
         """
         if link_name == self._root_link:
             raise ValueError(f"link_name: '{link_name}' is the root link, which no joint moves")

@@ -1,4 +1,4 @@
-"""Steps from a configuration: to the target, near it, or along its solutions to a posture."""
+"""Numerical methods of inverse kinematics: iterations towards a target, or towards a rest posture at the target."""
 
 import math
 import time
@@ -14,27 +14,32 @@ from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 from .chain import BulletChain, Target
 
 Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
-"""A method that brings a link nearer to its target; limits are not considered.
+"""Function that moves m joints such that a link approaches its target, without regard to joint limits.
 
-Its arguments are m start positions [rad or m], the joints to hold, and the largest number of iterations; it returns m
-positions.
+Arguments: m start positions [rad or m]; m booleans, whether to hold each joint; the largest number of iterations.
+Returns m positions [rad or m].
 """
 BREAK_S = 5e-5
-"""Pause between stages, which lets the simulation take Python's lock [s]."""
+"""Pause between stages, in which the simulation thread can take Python's global interpreter lock [s]."""
 FROZEN = 1e6
-"""Damping that keeps a joint where it is."""
+"""Damping with which a joint does not move."""
 DAMPING = 1e-3
-"""Damping of the joint with the least weight; PyBullet's own 0.5 needs some hundred iterations rather than ten."""
+"""Damping of the joint with the smallest weight. PyBullet's default of 0.5 needs 100 iterations instead of 10."""
 JOINT_ITERATIONS_A_CALL = 140
-"""Iterations in one call of PyBullet, times the number of joints: it holds Python's lock meanwhile, some 0.1 ms."""
+"""Iterations in one call of PyBullet, times the number of joints.
+
+During a call, some 0.1 ms, PyBullet holds Python's global interpreter lock.
+"""
 
 
 class DampedLeastSquares:
-    """PyBullet's damped least squares.
+    """Damped least squares, by PyBullet; a `Step`.
 
     Args:
-        threshold_m: Distance at which to stop [m].
-        damping: Weight of the motion of each of the m joints; the least is 1.
+        chain: Chain that moves the link.
+        target: Target of the link.
+        threshold_m: Distance from the target at which iterations stop [m].
+        damping: m weights of the joints' motion. The smallest weight is 1.
     """
 
     def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
@@ -67,14 +72,14 @@ class DampedLeastSquares:
 
 
 LARGEST_STEP = np.pi / 4
-"""Largest motion of a joint in one step [rad or m], as in the paper."""
+"""Largest motion of a joint in one step [rad or m], as in the paper by Buss and Kim."""
 
 
 class SelectivelyDampedLeastSquares:
-    """Selectively damped least squares; our own, since PyBullet's ends the process (bullet3 issue 4404).
+    """Selectively damped least squares; a `Step` with the arguments of `DampedLeastSquares`.
 
     After Buss and Kim, Selectively Damped Least Squares for Inverse Kinematics, Journal of Graphics Tools 10(3), 2005.
-    The arguments are those of `DampedLeastSquares`.
+    PyBullet's own implementation crashes the process (bullet3 issue 4404).
     """
 
     def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
@@ -94,8 +99,8 @@ class SelectivelyDampedLeastSquares:
 
 
 def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Returns the m joints' step for an error; each singular direction is damped by the joint motion that it needs."""
-    lengths = np.linalg.norm(jacobian, axis=0)  # how much the link moves with each joint
+    """Returns the step of m joints for an error; limits the step along each singular vector by the motion it causes."""
+    lengths = np.linalg.norm(jacobian, axis=0)  # motion of the link per unit motion of each joint
     step = np.zeros(jacobian.shape[1])
     left, singular_values, right = np.linalg.svd(jacobian, full_matrices=False)
     for u, sigma, v in zip(left.T, singular_values, right):
@@ -116,29 +121,31 @@ POSTURE_STEPS = 60
 LARGEST_POSTURE_STEP = 0.2
 """Largest motion of a joint of weight 1 in one step [rad or m]."""
 DONE = 1e-3
-"""Step of such a joint below which the search ends [rad or m]."""
+"""Step of a joint of weight 1 below which the search ends [rad or m]."""
 POSTURE_DAMPING = 1e-6
-"""Keeps the pseudo-inverse finite where the link cannot move in all directions."""
+"""Damping that keeps the pseudo-inverse finite at singular configurations."""
 
 
 def towards_posture(
     chain: BulletChain, target: Target, limits: Limits, rest: np.ndarray, ranges: np.ndarray, q: np.ndarray, size: float
 ) -> np.ndarray:
-    """Slides along all solutions of a problem to the one nearest to a rest posture.
+    """Moves from one solution along the set of solutions towards a rest posture.
 
-    A gradient projection: each step moves towards the posture in the null space of the link, and corrects the error of
-    the last one (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
+    Uses gradient projection: each step moves towards the posture in the null space of the link's Jacobian, and corrects
+    the error of the previous step (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
-        target: Pose of the link, to be held.
-        limits: Limits of its m joints.
+        chain: Chain that moves the link.
+        target: Target of the link, which is kept.
+        limits: Limits of the m joints.
         rest: m positions of the posture [rad or m].
-        ranges: m weights, 1 at most: a joint may be as far from its rest as its range is wide.
-        q: m positions of the solution to start from.
-        size: Residual that a solution may have, see `Residual.size`.
+        ranges: m weights up to 1, proportional to the joints' ranges. A joint's distance from the posture is divided by
+            its weight.
+        q: m positions of the first solution [rad or m].
+        size: Largest residual of a solution, see `Residual.size`.
 
     Returns:
-        The best solution that was found; `q` itself if there is none that is nearer.
+        m positions of the solution nearest to the posture; `q` if no nearer solution was found.
     """
     best, best_cost = q, _cost(q, rest, ranges)
     least, most = np.array(limits.lower), np.array(limits.upper)
@@ -163,7 +170,15 @@ def _cost(q: np.ndarray, rest: np.ndarray, ranges: np.ndarray) -> float:
 def _step(
     jacobian: np.ndarray, error: np.ndarray, wish: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
-    """Returns the step that corrects the error and is nearest to the desired one; joints stop at their limits."""
+    """Returns the joint step nearest to a desired step that corrects the link's error within the joint limits.
+
+    Args:
+        jacobian: Jacobian of the link.
+        error: Error of the link to its target.
+        wish: Desired step.
+        lower: Steps to the lower limits.
+        upper: Steps to the upper limits.
+    """
     step = np.zeros(len(wish))
     free = np.ones(len(wish), dtype=bool)
     for _ in range(len(wish)):
@@ -182,13 +197,19 @@ def _step(
 
 
 def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
-    """Minimises the distance of the link from a target that may be out of reach.
+    """Minimizes the error of the link to a target that may be out of reach.
 
-    By L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
+    Uses L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
+
+    Args:
+        chain: Chain that moves the link.
+        target: Target of the link.
+        limits: Limits of the m joints.
+        q: m start positions [rad or m].
+        steps: Largest number of iterations.
 
     Returns:
-        m positions [rad or m], and the distance from the target: the norm of distance and angle, each divided by its
-        tolerance.
+        m positions [rad or m], and the remaining error: the norm of distance and angle, each divided by its tolerance.
     """
     from scipy.optimize import minimize  # slow to import, and seldom used
 

@@ -1,4 +1,4 @@
-"""Problems of inverse kinematics as PyBullet has them, and their solutions."""
+"""Problems of inverse kinematics with PyBullet's parameters, and their solutions."""
 
 import math
 from collections.abc import Sequence
@@ -14,27 +14,31 @@ _PER_JOINT = (*_NULL_SPACE, "jointDamping", "currentPosition")
 
 @dataclass(frozen=True)
 class PybulletProblem:
-    """Target pose of a link of a robot, and parameters of the search for it.
+    """Target pose of a link of a robot, and parameters of the search for joint positions.
 
-    The fields are those of the message `CalculateInverseKinematicsProblem`, without the frame. "Each joint" is each
-    joint that a motor can move, in the robot's order; the solver chooses values that are empty or 0.
+    The fields equal those of the message `CalculateInverseKinematicsProblem`, without the frame. Lists per joint have
+    one value for each of the n joints that motors can move, in the robot's order. The solver replaces fields that are
+    empty or 0 by defaults. `lowerLimits`, `upperLimits`, `jointRanges` and `resetPoses` must be given together.
 
     Attributes:
-        link_name: The link, by its name in the URDF; not the root.
-        targetPosition: x, y, z of the link's URDF frame in the frame of the robot's base link [m].
-        targetOrientation: Its quaternion x, y, z, w in the same frame, of any length but 0; empty: any orientation.
-        lowerLimits: Lower limit of each joint [rad or m]. They narrow those of the URDF and never widen them.
-        upperLimits: Upper limit of each joint [rad or m].
-        jointRanges: Range of each joint about its rest posture, relative to the others [rad or m].
-        resetPoses: Rest posture of each joint, to be near as the target allows [rad or m]. These four go together.
-        jointDamping: Weight of the motion of each joint, relative to the others.
-        solver: 0 damped least squares, 1 selectively damped least squares.
-        currentPosition: Start of the search, for each joint [rad or m]; joints that do not move the link stay.
-        maxNumIterations: Most iterations from one start.
-        residualThreshold: Distance at which the search stops [m], 1 mm at most; as angle [rad], it counts ten times.
+        link_name: Name of the link in the URDF; not the root link.
+        targetPosition: Target x, y, z of the link's URDF frame, in the frame of the robot's base link [m].
+        targetOrientation: Target quaternion x, y, z, w in the same frame, not necessarily of length 1. Empty accepts
+            any orientation.
+        lowerLimits: n lower limits [rad or m], which narrow the URDF's limits but never widen them.
+        upperLimits: n upper limits [rad or m], likewise.
+        jointRanges: n ranges [rad or m]. The wider a joint's range is relative to others, the farther the joint may be
+            from its rest position.
+        resetPoses: n positions of the rest posture [rad or m]; the solution is as near to the posture as possible.
+        jointDamping: n weights of the joints' motion, relative to each other.
+        solver: 0 for damped least squares, 1 for selectively damped least squares.
+        currentPosition: n start positions [rad or m]. Joints that do not move the link keep these positions.
+        maxNumIterations: Largest number of iterations from one start.
+        residualThreshold: Distance at which the search stops [m], at most 1 mm. Ten times this number is the threshold
+            of the angle [rad].
 
     Raises:
-        ValueError: If a field is invalid; it names the field.
+        ValueError: If a field is invalid. The message names the field.
     """
 
     link_name: str
@@ -75,10 +79,13 @@ class PybulletProblem:
             raise ValueError(f"residualThreshold: must not be negative, got {self.residualThreshold}")
 
     def check_lengths(self, joint_names: Sequence[str]) -> None:
-        """Checks that lists with a value for each joint have one for each of these.
+        """Checks the lengths of the lists per joint.
+
+        Args:
+            joint_names: Names of the n joints.
 
         Raises:
-            ValueError: If one has not.
+            ValueError: If a list is not empty and has another length than n.
         """
         for field in _PER_JOINT:
             length = len(getattr(self, field))
@@ -87,12 +94,17 @@ class PybulletProblem:
                 raise ValueError(f"{field}: expected {expected}; got {length}")
 
     def narrowed(self, limits: Limits, joint_names: Sequence[str]) -> Limits:
-        """Returns limits of joints with those of the problem, if it has any, inside them.
+        """Returns the intersection of given joint limits with the problem's limits.
 
-        A lower limit above the upper one means none, as it does in PyBullet, where the URDF has none either.
+        As in PyBullet, the problem's limits are ignored for a joint without URDF limits if the lower limit is above the
+        upper one.
+
+        Args:
+            limits: URDF limits of the n joints.
+            joint_names: Names of the n joints.
 
         Raises:
-            ValueError: If a joint is left without any position; it names the joint.
+            ValueError: If the intersection is empty for a joint. The message names the joint.
         """
         lower, upper = list(limits.lower), list(limits.upper)
         for i, (name, least, most) in enumerate(zip(joint_names, self.lowerLimits, self.upperLimits)):
@@ -115,13 +127,14 @@ class PybulletSolution:
     """Result of inverse kinematics.
 
     Attributes:
-        success: Whether the link is within 1 mm and, if an orientation was asked for, 0.01 rad of its target.
-        message: Description of the error.
-        joint_names: n joints that a motor can move, in the robot's order.
-        positions: n positions [rad or m]; without success, the best that were found.
-        chain: Those of the joints that move the link, within their limits; the others are where they were.
-        position_error_m: Distance that is left [m].
-        orientation_error_rad: Angle that is left [rad]; 0 if no orientation was asked for.
+        success: Whether the link is within 1 mm of its target and, with a target orientation, within 0.01 rad.
+        message: Description of the remaining error.
+        joint_names: Names of the n joints that motors can move, in the robot's order.
+        positions: n positions [rad or m]; without success, the best positions found. Joints of the chain are within
+            their limits; other joints keep their start positions.
+        chain: Names of the joints that move the link.
+        position_error_m: Remaining distance [m].
+        orientation_error_rad: Remaining angle [rad]; 0 without a target orientation.
     """
 
     success: bool

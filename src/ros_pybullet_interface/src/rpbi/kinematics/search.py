@@ -1,4 +1,4 @@
-"""The search for a solution: from one start after the other, until one leads to the target."""
+"""Search for a solution of inverse kinematics from several starts, one after another."""
 
 import math
 import time
@@ -16,39 +16,39 @@ from .methods import BREAK_S, DampedLeastSquares, SelectivelyDampedLeastSquares,
 from .problem import PybulletProblem
 
 RANDOM_STARTS = 50
-"""Number of random starts after those of the problem."""
+"""Number of random starts after the starts that the problem gives."""
 RANDOM_STARTS_BEYOND_REACH = 5
-"""The same number for a target beyond reach, where only the nearest posture can be found."""
+"""Number of random starts for a target out of reach, where only the nearest posture can be found."""
 ITERATIONS_A_STAGE = 20
-"""Iterations after which positions are brought into limits and progress is checked."""
+"""Number of iterations after which positions are brought within limits and progress is checked."""
 ITERATIONS_A_START = 120
-"""Largest number of iterations from one start, unless the problem sets it."""
+"""Largest number of iterations from one start, unless the problem sets another number."""
 JOINT_ITERATIONS = 14_000
-"""Most iterations for one problem, times the number of joints: 2,000 for 7 joints, some 20 ms."""
+"""Largest number of iterations for one problem, times the number of joints: 2,000 for 7 joints, some 20 ms."""
 THRESHOLD = 0.1
-"""Residual at which the search stops, unless the problem sets it, see `Residual.size`."""
+"""Residual at which the search stops, see `Residual.size`, unless the problem sets another one."""
 SEED = 0
 """Seed of the random starts."""
 MUCH_NEARER = 0.8
-"""Share of the present error below which a posture is preferred to the present one, out of reach."""
+"""For a target out of reach: ratio of errors below which another posture replaces the one near the present posture."""
 FAR = 1.0
-"""Motion of a joint [rad or m] from which a solution may be in another branch, with the elbow on the other side."""
+"""Motion of a joint from which a solution may be in another branch, such as elbow up and elbow down [rad or m]."""
 STARTS_NEARBY = 16
-"""Number of starts near the present positions from which a nearer solution is searched."""
+"""Number of starts near the present positions, or the rest posture, from which a nearer solution is searched."""
 SPREAD = 0.4
-"""Standard deviation of these starts [rad or m]."""
+"""Standard deviation of the nearby starts [rad or m]."""
 LEAST_WEIGHT = 1e-3
-"""Least damping and least range of a joint, as a part of the largest."""
+"""Smallest damping and smallest range of a joint, as a share of the largest."""
 
 
 class Search:
-    """One search.
+    """Searches positions of the m joints of a chain for one problem.
 
     Args:
-        chain: The link to move, and the m joints that do.
-        target: Its target pose.
+        chain: Chain that moves the link.
+        target: Target of the link.
         limits: Limits of the m joints.
-        problem: The problem, checked against the robot.
+        problem: The problem, after checks for the robot.
         current: m present positions [rad or m].
     """
 
@@ -67,10 +67,10 @@ class Search:
         self._iterations_left = JOINT_ITERATIONS // max(1, len(current))
 
     def run(self) -> tuple[np.ndarray, Residual]:
-        """Returns the best m positions [rad or m] that were found, and how far off the target they are.
+        """Searches, and returns the best m positions found [rad or m] and their residual.
 
-        For a target out of reach, they are a local minimum of the distance near the present posture, so that a moving
-        target does not cause jumps between postures; unless another posture is much nearer.
+        For a target out of reach, the positions minimize the error locally, near the present posture. A moving target
+        therefore does not cause jumps between postures. Another posture is returned only if its error is much smaller.
         """
         q, residual = self._solution()
         if residual.size > 1.0 and self._current:
@@ -78,7 +78,7 @@ class Search:
         q, residual = self._in_branch(q, residual)
         if len(self._rest):
             ranges = self._of_chain(self._problem.jointRanges)
-            ranges = np.where(ranges > 0.0, ranges, TURN)  # PyBullet's -1 of joints without limits
+            ranges = np.where(ranges > 0.0, ranges, TURN)  # PyBullet has -1 for joints without limits
             weights = np.maximum(ranges / ranges.max(), LEAST_WEIGHT)
             most = max(residual.size, self._threshold)
             q = towards_posture(self._chain, self._target, self._limits, self._rest, weights, q, most)
@@ -86,10 +86,13 @@ class Search:
         return q, residual
 
     def _in_branch(self, q: np.ndarray, residual: Residual) -> tuple[np.ndarray, Residual]:
-        """Returns the nearest solution to the rest posture, else to the present positions.
+        """Searches a solution nearer to the rest posture, or without one, to the present positions.
 
-        One that is further away may have the elbow on the other side, so positions nearby, which are always the same,
-        are starts too.
+        A distant solution may be in another branch, such as elbow up and elbow down. Further searches therefore start
+        near the posture or the present positions. The random numbers are the same at each call.
+
+        Returns:
+            The nearest solution found, and its residual.
         """
         present = np.array(self._current)
         near = self._rest if len(self._rest) else present
@@ -108,7 +111,11 @@ class Search:
         return q, residual
 
     def _solution(self) -> tuple[np.ndarray, Residual]:
-        """Returns the best positions from the first start that leads to the target, else the best of all."""
+        """Searches from one start after another until a solution is found.
+
+        Returns:
+            The best positions found so far [rad or m], and their residual.
+        """
         best = np.array(self._current)
         least = self._chain.residual(self._target, best)
         for step, start in self._starts():
@@ -131,7 +138,7 @@ class Search:
         return q, self._chain.residual(self._target, q)
 
     def _starts(self) -> Iterator[tuple[Step, list[float]]]:
-        """Yields the starts: the rest posture, the present positions, and then random ones, each with its method."""
+        """Yields starts, each with a method: the rest posture, the present positions, and then random positions."""
         if not self._current:
             return
         if len(self._rest):
@@ -142,9 +149,9 @@ class Search:
             yield (self._fast_step if i else self._asked_step), start
 
     def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:
-        """Yields each stage of the search from a start towards the target.
+        """Moves from a start towards the target, and yields positions and residual after each stage of iterations.
 
-        A joint at a limit is held there for one stage, so that the others compensate.
+        A joint that reaches a limit is held there for one stage, so that the other joints compensate.
         """
         last = math.inf
         frozen = stuck = np.equal(self._limits.lower, self._limits.upper)
@@ -165,12 +172,17 @@ class Search:
             frozen, last = stuck | stopped, residual.size
 
     def _of_chain(self, values: Sequence[float]) -> np.ndarray:
-        """Returns the values of a field of the problem for the joints of the chain, if any."""
+        """Selects the values of the chain's joints from a list per joint of the problem; an empty list stays empty."""
         return np.array(values, dtype=float)[self._chain.members] if len(values) else np.empty(0)
 
 
 def _damping(given: np.ndarray, count: int) -> np.ndarray:
-    """Returns the damping of each joint, relative to the smallest."""
+    """Returns the damping of each joint relative to the smallest damping.
+
+    Args:
+        given: Damping that the problem gives; empty or zeros for equal damping.
+        count: Number of joints.
+    """
     if not given.any():
         return np.ones(count)
     given = np.maximum(given, LEAST_WEIGHT * given.max())
