@@ -40,7 +40,7 @@ class ActionPart(Protocol):
 
 
 class JointAction:
-    """Moves joint targets of a robot: each value is a share, from -1 to 1, of the joint's largest change per action.
+    """Moves joint targets of a robot: each value, from -1 to 1, is a fraction of the largest change per action.
 
     Args:
         joints: Names of the joints that move; by default all joints with motors.
@@ -65,15 +65,16 @@ class JointAction:
         self._targets = np.array([positions[index] for index in self._indices])
 
     def apply(self, values: Values) -> None:
-        """Moves the targets within the joint limits, and commands them."""
+        """Moves the targets within the joint limits, and sends the targets to the robot."""
         self._targets = np.minimum(np.maximum(self._targets + values * self._steps, self._lower), self._upper)
         self._world.put(self._slot, JointCommand(self._names, position=self._targets.tolist()))
 
 
 class PoseAction:
-    """Moves the target pose of a link's controller: translations along, then rotations about x, y and z of the world.
+    """Moves the target pose of a link's controller.
 
-    The target starts at the controlled point. While the controller is not active, actions have no effect.
+    The values are three translations along, then three rotations about the world's x, y and z axes. The target starts
+    at the controlled point. While the controller is not active, actions have no effect.
 
     Args:
         controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
@@ -157,12 +158,12 @@ class HandAction:
         self.size = len(axes)
 
     def reset(self) -> None:
-        """Takes the present pose of the link as start and target."""
+        """Sets start pose and target to the present pose of the link."""
         self._start = robot_of(self._world, self._robot).link_pose(self._link)
         self.goal = list(self._start.position)
 
     def apply(self, values: Values) -> None:
-        """Moves the target, and the joints towards the target with a damped inverse of the Jacobian."""
+        """Moves the target within the box; sends joint targets from a damped inverse of the Jacobian to the robot."""
         for axis, value in zip(self._axes, values.tolist()):
             self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])
         robot = robot_of(self._world, self._robot)
@@ -184,7 +185,7 @@ class HandAction:
 
 
 class GripperAction:
-    """Opens (1) or closes (-1) the fingers of a gripper: one value, the share of the largest change of their target.
+    """Opens (1) or closes (-1) the fingers of a gripper; the value is a fraction of the largest change per action.
 
     Args:
         joints: Finger joints, which all get the same target.
@@ -205,6 +206,6 @@ class GripperAction:
         self._target = robot_of(self._world, self._robot).joint_positions()[self._index]
 
     def apply(self, values: Values) -> None:
-        """Moves the target within the limits of the first finger joint, and commands it to all fingers."""
+        """Moves the target within the limits of the first finger joint, and sends the target to all finger joints."""
         self._target = min(max(self._target + self._step * float(values[0]), self._lower), self._upper)
         self._world.put(self._slot, JointCommand(self._names, position=(self._target,) * len(self._names)))

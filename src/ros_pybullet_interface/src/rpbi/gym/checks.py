@@ -19,7 +19,7 @@ from .task import WorldTask
 class CheckedTask:
     """Wraps a task and checks the values that it returns.
 
-    An error of a task from another package becomes a PluginError that names class, method and action.
+    An error in a task from another package becomes a PluginError that names the class, the method and the action.
 
     Args:
         task: The wrapped task.
@@ -117,8 +117,7 @@ def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> 
 
 
 def check_action(space: spaces.Space[Any], action: Any, key: str = "action") -> None:
-    """Checks that an action fits an action space; numbers beyond the bounds of a box are allowed, since tasks clip
-    them.
+    """Checks that an action fits an action space. Numbers outside a box are allowed, since tasks clip such numbers.
 
     Raises:
         ValueError: If the type or shape of the action does not fit the space, or a number in the action is not finite.

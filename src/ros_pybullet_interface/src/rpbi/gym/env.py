@@ -109,8 +109,8 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         """Applies an action, and advances the world by the ticks of an action.
 
         Returns:
-            Observation, reward, whether the episode is over, whether all of its actions are used, and an information
-            dictionary with `is_success`.
+            Observation, reward, `terminated` (whether the task has ended the episode), `truncated` (whether the largest
+            number of actions per episode is reached), and an information dictionary with `is_success`.
 
         Raises:
             ValueError: If the type or shape of the action does not fit the action space, or a number in the action is
@@ -191,10 +191,10 @@ def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) ->
 
 
 class DelayLine:
-    """Runs the ticks of an action, with delayed actions and delayed observations.
+    """Steps the world for the duration of an action, with delayed actions and delayed observations.
 
-    An observation with delay d is made d ticks before the end of an action. If that is before the start of the episode,
-    the first observation is used instead.
+    An observation with delay d is made d ticks before the end of an action. If this time is before the start of the
+    episode, the first observation is used instead.
 
     Args:
         ticks: Number of ticks per action.
@@ -213,7 +213,7 @@ class DelayLine:
         self._tick = 0
 
     def run(self, action: Any, act: Callable[[Any], None], step: Callable[[], Any], observe: Callable[[], Any]) -> Any:
-        """Runs one action, and returns the observation that is due at its end.
+        """Steps the world for the duration of one action, and returns the delayed observation at the end.
 
         Args:
             action: New action, which is applied after its delay.

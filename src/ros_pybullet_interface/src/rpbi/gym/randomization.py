@@ -116,7 +116,7 @@ class Delays(ConfigModel):
 
 
 class Randomization(ConfigModel):
-    """All that varies from episode to episode."""
+    """Configuration of everything that varies from episode to episode."""
 
     dynamics: ListOf[DynamicsVariation] = Field((), description="Dynamics of bodies and links.")
     poses: ListOf[PoseVariation] = Field((), description="Start poses of bodies.")

@@ -11,7 +11,10 @@ TYPE = "type"
 
 
 def schemas() -> dict[str, Schema]:
-    """Returns the schemas by kind of file: `gym_TASK` of each task, with Gymnasium, and `gym_randomization`."""
+    """Returns the schemas indexed by kind of file: `gym_TASK` for each task, and `gym_randomization`.
+
+    Without an installed Gymnasium, the schemas of tasks are left out.
+    """
     found = {f"gym_{name}": _of_task(name, schema) for name, schema in TASKS.schemas().items()}
     return {**found, "gym_randomization": json_schema(Randomization, "gym_randomization")}
 

@@ -39,7 +39,7 @@ class SharedArrays:
     """The results of n environments in memory that processes share: observations, rewards and ends of episodes.
 
     Args:
-        space: Space of the observations of one environment.
+        space: Observation space of one environment.
         count: Number n of environments.
         file: File descriptor of the memory, which this object then owns; by default, new memory is allocated.
 

@@ -33,10 +33,11 @@ Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[
 
 
 class WorldVectorEnv(VectorEnv[Any, Any, Any]):
-    """Environments in worker processes, one or more in each; a step of all is one request to each process.
+    """A vector of environments in worker processes, each with one or more environments.
 
-    Processes are started anew, not forked, so scripts need no `if __name__ == "__main__"`, and the calling process may
-    have threads. Observations come through shared memory.
+    For a step, each process gets a single request. Observations are transferred in shared memory. Processes are not
+    forked but started as new programs. Therefore scripts do not need `if __name__ == "__main__"`, and the calling
+    process may have threads.
 
     Args:
         makers: Functions that make one environment each; lambdas of a script are allowed.
@@ -65,7 +66,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         self._parts = [slice(*ends) for ends in _parts(self.num_envs, self.workers)]
         self._processes = [_Process(index) for index in range(self.workers)]
         processors = sorted(os.sched_getaffinity(0))
-        if self.workers == len(processors):  # else Linux may wake two on one processor while another idles
+        if self.workers == len(processors):  # otherwise Linux may run two workers on one processor while another idles
             for process, processor in zip(self._processes, processors):
                 process.stay_on(processor)
         try:
@@ -87,8 +88,8 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
             Observations of all environments, and information from the environments that were reset.
 
         Raises:
-            ValueError: If there are more or fewer seeds than environments, or the mask is not n bools, one true at
-                least.
+            ValueError: If there are more or fewer seeds than environments, or the mask is not an array of n bools with
+                at least one true.
         """
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
         seeds = [None] * self.num_envs if seeds is None else list(seeds)
@@ -150,7 +151,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Sets an attribute of each environment: from a list with a value for each, or to a single value."""
+        """Sets an attribute of each environment, either to the values of a list or to the same value."""
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ValueError(f"expected {self.num_envs} values, got {len(each)}")
@@ -230,7 +231,7 @@ class _Process:
     def send_file(self, file: int) -> None:
         """Sends a file descriptor."""
         send_handle(self._connection, file, self._process.pid)
-        os.set_blocking(self._connection.fileno(), True)  # a default timeout of sockets may have changed it
+        os.set_blocking(self._connection.fileno(), True)  # non-blocking by now if sockets have a default timeout
 
     def answer(self) -> tuple[bool, Any]:
         """Waits for the answer to a request, and returns whether the request succeeded, and its result or error."""

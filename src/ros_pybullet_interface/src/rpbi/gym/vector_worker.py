@@ -28,12 +28,13 @@ class StepResult(NamedTuple):
     """Outcome of a step.
 
     Attributes:
-        observation: Observation before the next action.
+        observation: Observation before the next action; after a reset, the first observation of the new episode.
         reward: Reward of the action.
-        terminated: Whether the episode is over.
+        terminated: Whether the task has ended the episode.
         truncated: Whether the episode was truncated.
         info: Further information.
-        final: In mode `SAME_STEP`, last observation and information of an episode that has just ended; otherwise None.
+        final: In mode `SAME_STEP`, if the episode has just ended, its last observation (`final_obs`) and information
+            (`final_info`); otherwise None.
     """
 
     observation: Any
@@ -84,7 +85,7 @@ class Slot:
 
 
 class Worker:
-    """The environments of this worker process, which are a part of all environments.
+    """The environments of this worker process, a subset of the vector's environments.
 
     Args:
         makers: Functions that make one environment each.
@@ -167,7 +168,7 @@ def main() -> None:
                 gc.freeze()  # otherwise a garbage collection walks all worlds while other processes wait
             elif name == "share":
                 file = recv_handle(connection)
-                os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
+                os.set_blocking(connection.fileno(), True)  # non-blocking by now if sockets have a default timeout
                 answer = getattr(worker, name)(SharedArrays(arguments[0], arguments[1], file))
             else:
                 answer = getattr(worker, name)(*arguments)

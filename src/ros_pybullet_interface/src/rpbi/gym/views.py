@@ -1,4 +1,4 @@
-"""Images of a world's cameras, as parts of observations and as frames to look at."""
+"""Images of a world's cameras, for observations and for rendering."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Views:
         return images
 
     def render(self) -> Image | None:
-        """Returns what the first camera of the world sees, uint8, shape (height, width, 3).
+        """Returns the image of the world's first camera, uint8, shape (height, width, 3); None if `mode` is None.
 
         With a window, waits instead until `period_s` has passed since the last call, and returns None.
         """

@@ -1,6 +1,4 @@
-"""Work on recordings in forks of this process: several parts at once, or a whole recording with limited
-processor time.
-"""
+"""Calls functions on recordings in forks of this process, in parallel or with limited processor time."""
 
 from __future__ import annotations
 
@@ -20,9 +18,7 @@ Result = TypeVar("Result")
 
 
 def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[RecordedPart]]:
-    """Splits parts into at most `jobs` groups of consecutive parts, with about the same number of parts in
-    each group.
-    """
+    """Splits parts into at most `jobs` groups of consecutive parts; all groups have about the same number of parts."""
     count = max(1, min(jobs, len(parts)))
     bounds = [len(parts) * index // count for index in range(count + 1)]
     return [parts[begin:end] for begin, end in zip(bounds, bounds[1:])]
@@ -31,15 +27,15 @@ def groups_of(parts: Sequence[RecordedPart], jobs: int) -> list[Sequence[Recorde
 def in_forks(
     work: Callable[[Sequence[RecordedPart]], Result], groups: Sequence[Sequence[RecordedPart]], cpu_s: int | None = None
 ) -> list[Result]:
-    """Calls a function with each group of parts and returns the results in the order of the groups.
+    """Calls a function with each group of parts, and returns the results in the order of the groups.
 
-    Several groups are processed at the same time, each in a fork of this process. A single group is processed in this
-    process itself, without a limit of processor time.
+    Two or more groups are processed in parallel, each in a fork of this process. A single group is processed in this
+    process: `cpu_s` is then ignored, and errors of the function are raised unchanged.
 
     Args:
-        work: Function that takes a group and returns a result that can be pickled.
+        work: Function that takes a group and returns a picklable result.
         groups: Groups of parts, see `groups_of`.
-        cpu_s: Processor time that each fork may use [s]; None for no limit.
+        cpu_s: Largest processor time of each fork [s]; None means no limit.
 
     Raises:
         InterfaceError: If the function raises an error in a fork, or a fork ends early.
@@ -51,11 +47,11 @@ def in_forks(
 
 
 def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
-    """Calls a function in a fork of this process and returns its result.
+    """Calls a function in a fork of this process, and returns the function's result.
 
     Args:
-        work: Function without arguments, whose result can be pickled.
-        cpu_s: Processor time that the fork may use [s].
+        work: Function without arguments that returns a picklable result.
+        cpu_s: Largest processor time of the fork [s].
 
     Raises:
         InterfaceError: If the function raises an error, or the fork ends early.
@@ -65,8 +61,10 @@ def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
 
 
 def limit_cpu_time(cpu_s: int) -> None:
-    """Limits the processor time that this process may use from now on [s]; SIGXCPU ends the process beyond the
-    limit.
+    """Limits the processor time that this process may use from now on; the signal SIGXCPU ends it at the limit.
+
+    Args:
+        cpu_s: Further processor time [s].
     """
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1
@@ -75,7 +73,10 @@ def limit_cpu_time(cpu_s: int) -> None:
 
 
 class TooSlowError(InterfaceError):
-    """A process needed more processor time than allowed; the error's argument is the allowed time [s]."""
+    """A process needed more processor time than allowed.
+
+    The first argument of the error is the allowed time [s].
+    """
 
     def __str__(self) -> str:
         return (
@@ -104,7 +105,7 @@ def _results(calls: Sequence[Callable[[], Result]], cpu_s: int | None) -> list[R
 
 
 def merged(results: Sequence[ReplayResult]) -> ReplayResult:
-    """Combines the results of replaying consecutive groups of parts into the result of the whole recording."""
+    """Combines results of consecutive groups of parts into the result of the whole recording."""
     return ReplayResult(
         sum(each.agreed for each in results),
         sum(each.ticks for each in results),

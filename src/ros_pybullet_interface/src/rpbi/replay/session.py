@@ -1,4 +1,4 @@
-"""Simulates a recorded session again and compares the hashes of its states with the recorded hashes."""
+"""Replays a recorded session, and compares hashes of the simulated states with the recorded hashes."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rpbi.world.saved.values import from_text
 
 
 class Checkpoint(NamedTuple):
-    """Hash of the state of a recorded world at a given time; the fields are ordered so that checkpoints sort by time.
+    """The recorded hash of a world's state at one time. Sorting checkpoints sorts them by time.
 
     Attributes:
         resets: Number of resets of the world before the checkpoint.
         tick: Tick of the world.
-        commands: Number of commands since the last reset, or since the start if there was none.
+        commands: Number of commands since the last reset, or since the start if there was no reset.
         state_hash: Hash of the world's state.
     """
 
@@ -38,9 +38,9 @@ class Recording:
 
     Attributes:
         description: Description of the world.
-        commands: For each number of resets before them, the commands, indexed by their position since the last reset
-            (or since the start).
-        checkpoints: The recorded states, in any order.
+        commands: `commands[resets][index]` is the command with position `index` among the commands after reset number
+            `resets`; 0 stands for the start of the session.
+        checkpoints: The recorded hashes.
     """
 
     description: WorldDescription
@@ -48,9 +48,7 @@ class Recording:
     checkpoints: set[Checkpoint] = field(default_factory=set)
 
     def parts(self) -> list[RecordedPart]:
-        """Splits the recording into parts that can be replayed independently, and returns the parts in order
-        of time.
-        """
+        """Splits the recording into parts that can be replayed independently, sorted by time."""
         parts = []
         start = Checkpoint(0, 0, 0, self.description.start_hash)
         checkpoints = sorted({start, *self.checkpoints})
@@ -68,17 +66,18 @@ class Recording:
 
 
 class RecordedPart(NamedTuple):
-    """A part of a recording.
+    """A part of a recording that can be replayed independently of earlier parts.
 
-    It begins at a start of the world (when the world was built or reset) or at a keyframe, and ends at the next
-    keyframe or at the last recorded state.
+    A part begins when the world was built or reset, or at a keyframe. It ends at the next keyframe, or at the last
+    checkpoint before the next reset.
 
     Attributes:
         resets: Number of resets of the world before the part.
-        first: Index of the part's first command.
-        keyframe: Command of the keyframe at which the part begins; None if the part begins at a start of the world.
-        checkpoints: The recorded states of the part, in order of time.
-        end: Index of the command of the keyframe with which the part ends; None if it ends with the last state.
+        first: Index of the part's first command, counted from the last reset.
+        keyframe: Command that made the keyframe at which the part begins; None if the part begins with a built or reset
+            world.
+        checkpoints: Checkpoints of the part, sorted by time.
+        end: Index of the command that made the keyframe at which the part ends; None if it ends with a checkpoint.
     """
 
     resets: int
@@ -89,13 +88,13 @@ class RecordedPart(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A state of the replay that differs from the recorded state.
+    """A checkpoint at which the replayed state differs from the recorded state.
 
     Attributes:
-        checkpoint: The recorded state.
-        state_hash: Hash of the state in the replay.
-        last_agreement: The last earlier state that agreed; None if none has agreed since the replay last began at a
-            start of the world or at a keyframe.
+        checkpoint: The checkpoint.
+        state_hash: Hash of the replayed state.
+        last_agreement: The last earlier checkpoint at which both states agreed. None if there is no such checkpoint
+            since the replay last began with a built or reset world or with a recorded keyframe.
     """
 
     checkpoint: Checkpoint
@@ -107,11 +106,10 @@ class ReplayResult(NamedTuple):
     """Outcome of a replay.
 
     Attributes:
-        agreed: Number of states that agreed with the recording.
-        ticks: Number of ticks replayed.
-        difference: The first state that differs from the recording, at which the replay ended; None if no state
-            differs.
-        left_out: For each stretch of the recording that could not be replayed, a text with where it begins and why.
+        agreed: Number of checkpoints at which the replayed state agreed with the recording.
+        ticks: Number of replayed ticks.
+        difference: The first difference from the recording, at which the replay ended; None without a difference.
+        left_out: A message for each section of the recording that could not be replayed, with its begin and the reason.
     """
 
     agreed: int
@@ -125,9 +123,9 @@ class Replay:
 
     Args:
         recording: The recording to replay.
-        progress: Called with the number of ticks replayed since the last call.
-        observe: Called where a part begins at a start of the world or at a keyframe, and after every tick. Its
-            arguments are the world, the number of resets so far in the recording, and the samples.
+        progress: Called after each section, with the number of ticks replayed since the last call.
+        observe: Called after every tick, and whenever the replay begins with a built or reset world or with a recorded
+            keyframe. The arguments are the world, the number of resets so far in the recording, and the sensor samples.
 
     Raises:
         ConfigError: If the world cannot be built on this machine.
@@ -147,14 +145,15 @@ class Replay:
         self._left_out: list[str] = []
 
     def run(self, parts: Sequence[RecordedPart] | None = None) -> ReplayResult:
-        """Replays parts of the recording up to the first difference, and returns the outcome.
+        """Replays parts of the recording up to the first difference, and returns the result.
+
+        A part that ends at a keyframe makes this keyframe again, and compares it with the recorded keyframe. The next
+        part then continues from the replayed state. All other parts begin with the built or reset world, or with their
+        recorded keyframe. Therefore different processes may replay different parts: if all parts agree, the whole
+        recording agrees.
 
         Args:
-            parts: Consecutive parts of the recording; all parts by default. The first part begins at its start of the
-                world or at its recorded keyframe, and so does a part after a reset or after a part that could not be
-                replayed. Every other part continues where the previous part ended. A part that another part follows
-                before the next reset ends with a keyframe, which is compared with the recorded keyframe. Thus if all
-                parts agree, even if replayed by different processes, the whole recording agrees.
+            parts: Consecutive parts of the recording; all parts by default.
         """
         difference, continues = None, False
         try:
@@ -181,8 +180,10 @@ class Replay:
         self._observe(self._world, part.resets, self._world.read_rest())
 
     def _run_part(self, part: RecordedPart) -> tuple[Difference | None, bool]:
-        """Replays a part; returns the first state that differs, if any, and whether the next part can continue from
-        its end.
+        """Replays a part from the present state of the world.
+
+        Returns:
+            The first difference, or None; and whether the next part can continue from the present state.
         """
         commands = self._recording.commands.get(part.resets, {})
         done = part.first
@@ -212,7 +213,16 @@ class Replay:
         return None, part.end is not None
 
     def _advance(self, to: Checkpoint, commands: Mapping[int, RecordedCommand], done: int) -> int:
-        """Applies commands and steps up to a checkpoint; returns the index of the next command to be applied."""
+        """Steps the world and applies commands up to a checkpoint.
+
+        Args:
+            to: The checkpoint.
+            commands: Commands since the last reset, indexed by position.
+            done: Index of the next command to apply.
+
+        Returns:
+            Index of the next command to apply after the checkpoint.
+        """
         world, start = self._world, self._world.clock.tick
         while True:
             tick = world.clock.tick

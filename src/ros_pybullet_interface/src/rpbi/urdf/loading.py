@@ -1,4 +1,4 @@
-"""Loads URDF files into PyBullet, and finds the faults of files that cannot be loaded."""
+"""Loads URDF files into PyBullet, and checks whether files can be loaded."""
 
 import logging
 import math
@@ -45,13 +45,13 @@ PLACEHOLDER_FACTOR = 10.0
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Checks a URDF file for faults with which PyBullet would refuse to load the file, or would crash.
+    """Checks a URDF file for faults that would make PyBullet refuse the file or crash.
 
-    Meshes that this machine has not loaded before are loaded in another process as a trial.
+    Checks first the structure, then the number of joints, then the named files, and stops after a check with faults.
+    Meshes that were not loaded on this machine before are loaded in another process as a trial.
 
     Returns:
-        A sentence for each fault; empty if none was found. The structure, the number of joints, and the files are
-        checked in turn; a later check is made only if the earlier checks have found nothing.
+        A sentence for each fault; empty if the file can be loaded.
     """
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
@@ -88,7 +88,7 @@ def check_joints(file: str, robot: Element) -> None:
 
 
 def _mesh_problems(document: UrdfDocument) -> list[str]:
-    """Returns a sentence for each mesh that PyBullet would not find, would leave out, or would crash on."""
+    """Returns a sentence for each mesh that PyBullet would not find or not load, or that would crash PyBullet."""
     problems: dict[str, None] = {}
     meshes: dict[Mesh, str] = {}
     for part, use in (("visual", Use.URDF_VISUAL), ("collision", Use.URDF_COLLISION)):
@@ -115,8 +115,8 @@ class PreparedUrdf(NamedTuple):
     """Text that PyBullet loads instead of a URDF file.
 
     Attributes:
-        text: URDF with only the parts that PyBullet reads, written so that PyBullet's reader finds the same as ours.
-            PyBullet's reader stops at null characters, cuts long lines and ignores errors.
+        text: URDF with only the parts that PyBullet reads. It contains nothing that PyBullet's parser would read
+            wrongly; the parser stops at null characters, cuts long lines and ignores errors.
         joints: Number of joints in the text, including fixed joints.
         without_inertial: Names of the links that do not have an `<inertial>` element.
     """
@@ -169,7 +169,9 @@ def load_urdf(
     prepare: Prepare = for_pybullet,
     inertia_from_urdf: bool = False,
 ) -> int:
-    """Loads a URDF file in which `urdf_problems` finds nothing, and returns PyBullet's id of the body.
+    """Loads a URDF file into PyBullet, and returns PyBullet's id of the body.
+
+    The file must have been checked with `urdf_problems`.
 
     Args:
         pb: Client into which the file is loaded.
@@ -208,13 +210,13 @@ def load_urdf(
 
 
 def flags_for(joints: int, flags: int) -> int:
-    """Returns flags of `loadURDF`, to which the flag that merges fixed joints is added if there are too many joints.
+    """Returns flags for `loadURDF`; adds `URDF_MERGE_FIXED_LINKS` if a robot has more than MAX_JOINTS joints.
 
-    PyBullet loads more than 127 joints, but then does not report where joints and links are.
+    PyBullet can load more joints, but would not report the poses of their links.
 
     Args:
         joints: Number of joints in the URDF.
-        flags: Flags to which the flag may be added.
+        flags: Other flags for `loadURDF`.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 
@@ -256,9 +258,10 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of the distance between the centre of mass and points of the collision shape [m].
+    """Returns an upper bound of the distance from a link's centre of mass to points of its collision shape [m].
 
-    The bound is inf for a link without a shape, and in maximal coordinates, where PyBullet reports no shapes.
+    The bound is inf for a link without a collision shape, and for a body in maximal coordinates, whose shapes PyBullet
+    does not report.
     """
     if pb.getDynamicsInfo(body_id, link)[10] == MAXIMAL_COORDINATES or not pb.getCollisionShapeData(body_id, link):
         return math.inf

@@ -57,9 +57,7 @@ class PushTask(HandTask):
         return math.dist(self.goal, self.position_of(self.config.object)[:2])
 
     def reward(self) -> float:
-        """Returns the negative sum of the distance from body to goal and 0.1 times the distance from hand to
-        body [m].
-        """
+        """Returns -(distance from body to goal + 0.1 * distance from hand to body) [m]."""
         return -self.distance() - 0.1 * math.dist(self.hand(), self.position_of(self.config.object))
 
     def has_succeeded(self) -> bool:
