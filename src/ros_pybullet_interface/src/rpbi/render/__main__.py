@@ -1,6 +1,6 @@
 """Entry point of the renderer process: `python -m rpbi.render --socket FD --sink module:factory`.
 
-The simulator starts it. Further arguments are the sink's, who finds them in `sys.argv`.
+The simulator starts this process. Further arguments are for the sink, which reads them from `sys.argv`.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from .process import RenderProcess, ReportHandler
 
 
 def main() -> None:
-    """Runs the process until the simulator ends it."""
+    """Runs the renderer process until the simulator closes the connection or ends."""
     parser = argparse.ArgumentParser(prog="rpbi.render")
     parser.add_argument("--socket", type=int, required=True, help="file descriptor of the connection")
     parser.add_argument("--sink", required=True, help="module:factory of the receiver of frames")

@@ -1,9 +1,9 @@
-"""A better depth buffer for PyBullet's EGL renderer.
+"""Gives PyBullet's EGL renderer a depth buffer of 24 bits.
 
-The plugin asks EGL for a depth buffer of 8 bits or more, and Mesa answers with the smallest it has, 16 bits: with a
-near plane at 1 cm a wall at 2 m is then off by up to 3 mm. This module therefore replaces the plugin's context by one
-with 24 bits, right after the plugin was loaded and before it has any shapes. The new context shares the plugin's
-shaders and textures, and everything drawn or read from now on in this thread uses its surface.
+PyBullet's EGL plugin requests a depth buffer of at least 8 bits, and Mesa chooses its smallest one, which has 16 bits.
+With a near plane at 1 cm, the depth of a wall at 2 m is then wrong by up to 3 mm. This module therefore replaces the
+plugin's context by a context with a 24-bit depth buffer, after the plugin was loaded and before shapes are loaded. The
+new context shares the plugin's shaders and textures. From then on, this thread draws to the new context's surface.
 """
 
 import ctypes
@@ -50,26 +50,26 @@ class Egl:
             raise EglError("there is no current EGL context")
 
     def renderer(self) -> str:
-        """Returns the driver's name of the renderer."""
+        """Returns the name of the renderer, as reported by the OpenGL driver."""
         text = self._gl("glGetString", c_char_p, c_uint)(_GL_RENDERER)
         return text.decode(errors="replace") if text else "unknown"
 
     def read_depth(self, width_px: int, height_px: int) -> npt.NDArray[np.float32]:
-        """Returns the depth buffer as the last pass has left it, shape (height, width), its first row on top."""
+        """Returns the depth buffer after the last drawing pass, shape (height, width), with the top row first."""
         depth = np.empty((height_px, width_px), np.float32)
         read = self._gl("glReadPixels", None, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
         read(0, 0, width_px, height_px, _GL_DEPTH_COMPONENT, _GL_FLOAT, depth.ctypes.data)
         return depth[::-1]
 
     def deepen(self, width_px: int, height_px: int) -> None:
-        """Makes a context with a deep enough depth buffer current; call it before any shape is loaded.
+        """Creates a context with a 24-bit depth buffer and makes it current; call this before shapes are loaded.
 
         Args:
-            width_px: Columns of the widest image that will be drawn.
-            height_px: Rows of the highest.
+            width_px: Largest number of columns of all images.
+            height_px: Largest number of rows of all images.
 
         Raises:
-            EglError: If EGL has none; the old context is then still current.
+            EglError: If EGL cannot create such a context; the old context then stays current.
         """
         wanted = [_RED, 8, _GREEN, 8, _BLUE, 8, _DEPTH, DEPTH_BITS]
         wanted += [_SURFACE_TYPE, _PBUFFER_BIT, _RENDERABLE_TYPE, _OPENGL_BIT, _NONE]
@@ -87,10 +87,10 @@ class Egl:
         self._use(surface, context)
 
     def resize(self, width_px: int, height_px: int) -> None:
-        """Makes a surface of another size current; needs `deepen` before.
+        """Creates a drawing surface of another size and makes it current; call `deepen` before.
 
         Raises:
-            EglError: If EGL has none; the old one is then still current.
+            EglError: If EGL cannot create such a surface; the old surface then stays current.
         """
         surface = self._surface(width_px, height_px)
         if not (self._config and surface):
@@ -108,7 +108,13 @@ class Egl:
         self._context = context
 
     def _gl(self, name: str, result: Any, *arguments: Any) -> Any:
-        """Returns a function of OpenGL."""
+        """Returns an OpenGL function as a callable.
+
+        Args:
+            name: Name of the function.
+            result: The ctypes type that the function returns.
+            arguments: The ctypes types of the function's arguments.
+        """
         address = self._call("eglGetProcAddress", c_void_p, c_char_p(name.encode()))
         if not address:
             raise EglError(f"the driver has no {name}")

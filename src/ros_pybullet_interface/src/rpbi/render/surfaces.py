@@ -1,4 +1,4 @@
-"""Surfaces of simple bodies as triangles with normals."""
+"""Triangle meshes, with normals, of boxes, planes, capsules and cylinders."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -9,19 +9,20 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 TOLERANCE_M = 2e-4
-"""Largest distance of a polygon's edges inside its circle [m], unless that needs more than `MAX_CORNERS`."""
+"""Largest distance between a circle and the polygon that replaces it [m], unless that needs more than `MAX_CORNERS`."""
 MIN_CORNERS, MAX_CORNERS = 24, 160
 PLANE_HALF_WIDTH_M = 100.0
-"""Half the edge of the square that represents an infinite plane."""
+"""Half the edge length of the square that represents an infinite plane."""
 
 
 class SurfaceMesh(NamedTuple):
-    """Triangles with a normal at each corner.
+    """A triangle mesh with a normal at each corner.
 
     Attributes:
-        points: Corners [m], shape (n, 3).
-        normals: Outward unit normals at them, shape (n, 3).
-        triangles: Numbers of three corners each, anticlockwise as seen from outside, shape (m, 3).
+        points: Positions of the corners [m], shape (n, 3).
+        normals: Outward unit normals at the corners, shape (n, 3).
+        triangles: Indices into `points` of each triangle's corners, counter-clockwise as seen from outside, shape
+            (m, 3).
     """
 
     points: Array
@@ -29,7 +30,7 @@ class SurfaceMesh(NamedTuple):
     triangles: npt.NDArray[np.int64]
 
     def as_obj(self) -> str:
-        """Returns the text of a Wavefront OBJ file."""
+        """Returns the mesh as the text of a Wavefront OBJ file."""
         lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.points]
         lines += [f"vn {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.normals]
         lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in self.triangles + 1]
@@ -37,13 +38,21 @@ class SurfaceMesh(NamedTuple):
 
 
 def box(half_extents: Sequence[float]) -> SurfaceMesh:
-    """Returns a box about the origin, each side with its own normal."""
+    """Returns a box centred at the origin; the corners of each side have that side's normal.
+
+    Args:
+        half_extents: Half the size along x, y and z [m].
+    """
     unit = _concatenated([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
     return unit._replace(points=unit.points * np.asarray(half_extents))
 
 
 def plane(normal: Sequence[float]) -> SurfaceMesh:
-    """Returns a large square through the origin, visible from both sides."""
+    """Returns a large square centred at the origin, visible from both sides.
+
+    Args:
+        normal: Normal of the square, of any length.
+    """
     upwards = np.asarray(normal) / np.linalg.norm(normal)
     both = _concatenated([_square(upwards), _square(-upwards)])
     on_plane = both.points - (both.points @ upwards)[:, None] * upwards
@@ -51,19 +60,24 @@ def plane(normal: Sequence[float]) -> SurfaceMesh:
 
 
 def capsule(radius: float, length: float) -> SurfaceMesh:
-    """Returns a capsule about the origin along z; `length` is that of its cylinder, 0 makes it a sphere."""
+    """Returns a capsule centred at the origin with its axis along z.
+
+    Args:
+        radius: Radius [m].
+        length: Length of the cylindrical part [m]; 0 for a sphere.
+    """
     corners = _corners(radius)
     equator = corners // 4
     latitude = np.linspace(-np.pi / 2, np.pi / 2, corners // 2 + 1)
     if length > 0.0:
-        latitude = np.insert(latitude, equator, 0.0)  # the equator twice, a length apart
+        latitude = np.insert(latitude, equator, 0.0)  # the equator twice: at both ends of the cylindrical part
     profile = np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
     shift = np.where(np.arange(len(latitude)) <= equator, -length / 2, length / 2)
     return _turned(radius * profile + np.stack([0.0 * shift, shift], axis=1), profile, corners)
 
 
 def cylinder(radius: float, length: float) -> SurfaceMesh:
-    """Returns a cylinder about the origin along z, its ends closed."""
+    """Returns a cylinder with closed ends, centred at the origin with its axis along z; radius and length are in m."""
     half = length / 2
     outline = np.array([[0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0, half]])
     normals = np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float)
@@ -72,7 +86,13 @@ def cylinder(radius: float, length: float) -> SurfaceMesh:
 
 
 def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = None) -> SurfaceMesh:
-    """Returns a mesh of triangles; without normals, each is flat."""
+    """Returns a mesh with given corners and triangles.
+
+    Args:
+        points: Positions of the corners [m], shape (n, 3).
+        triangles: Indices into `points`, shape (m, 3).
+        normals: Unit normals at the corners, shape (n, 3); None gives each triangle's corners the triangle's normal.
+    """
     if normals is not None:
         return SurfaceMesh(points, normals, triangles)
     corners = points[triangles]
@@ -83,7 +103,7 @@ def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = Non
 
 
 def _square(outward: Array) -> SurfaceMesh:
-    """Returns the side of a cube of edge 2 that has this outward normal of unit length."""
+    """Returns one side of the cube from -1 to 1 along each axis; `outward` is the side's outward unit normal."""
     first = np.roll(np.eye(3)[np.argmax(np.abs(outward))], 1)
     u = np.cross(outward, first)
     u /= np.linalg.norm(u)
@@ -93,18 +113,18 @@ def _square(outward: Array) -> SurfaceMesh:
 
 
 def _corners(radius: float) -> int:
-    """Returns the number of corners of a circle, a multiple of 4; fewer for small circles."""
+    """Returns the number of corners, a multiple of 4, of the polygon that replaces a circle of a given radius [m]."""
     needed = np.pi / np.arccos(1.0 - min(TOLERANCE_M / radius, 1.0))
     return int(np.clip(4 * np.ceil(needed / 4), MIN_CORNERS, MAX_CORNERS))
 
 
 def _turned(profile: Array, normals: Array, corners: int) -> SurfaceMesh:
-    """Returns the surface that an outline makes when it turns about z.
+    """Returns the surface of revolution of an outline about z.
 
     Args:
-        profile: Distance from the axis and height of n points, upwards along the outside, shape (n, 2).
-        normals: Their normals in the same plane, shape (n, 2).
-        corners: Corners of its circles.
+        profile: Distance from the z axis and height of n points of the outline, from bottom to top, shape (n, 2).
+        normals: Outward normals of the outline at these points, in the same coordinates, shape (n, 2).
+        corners: Number of corners of the polygons that replace circles about z.
     """
     angle = np.linspace(0.0, 2.0 * np.pi, corners + 1)
     around = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,8 +1,9 @@
-"""Meshes in place of PyBullet's primitive shapes.
+"""Replaces PyBullet's primitive visual shapes by meshes.
 
-PyBullet draws spheres and cylinders from few triangles (a sphere of 0.2 m is up to 13 mm off), shades the edges of
-boxes away, and with EGL a visual plane or a mesh without a file crashes it. The renderer therefore draws fitted meshes
-in their place. EGL confuses several transparent shapes from one file, so each has its own file.
+PyBullet draws spheres and cylinders with few triangles (the error of a sphere of 0.2 m is up to 13 mm), and smooths the
+edges of boxes in its shading. With EGL, it crashes on visual planes and on meshes without a file. The renderer process
+therefore draws meshes instead. EGL confuses transparent shapes from the same path, so each transparent shape gets its
+own path to the file, such as `./shape_0.obj`.
 """
 
 import os
@@ -23,11 +24,11 @@ _DEFAULT_RADIUS_M, _DEFAULT_LENGTH_M, _DEFAULT_HALF_EXTENTS_M = 0.5, 1.0, (1.0, 
 """PyBullet's own defaults."""
 
 _SPECK = surfaces.mesh(1e-6 * np.eye(3), np.array([[0, 1, 2]]))
-"""Replaces invisible shapes, which EGL would draw into depth and segmentation."""
+"""Tiny triangle that replaces invisible shapes, which EGL would draw into the depth and segmentation images."""
 
 
 class FineShapes:
-    """Turns the shapes that PyBullet makes by itself into meshes, as files in a folder of its own."""
+    """Converts PyBullet's primitive shapes to meshes, and stores the meshes as files in a temporary folder."""
 
     def __init__(self) -> None:
         self._folder = temporary_folder("shapes")
@@ -43,7 +44,11 @@ class FineShapes:
         }
 
     def of(self, shape: CreateVisualShape) -> CreateVisualShape:
-        """Returns the shape to draw: a mesh from a file, or the same if it is one already."""
+        """Returns the shape to draw in place of a given visual shape.
+
+        Primitive and invisible shapes become meshes from files. A mesh from a file stays the same; a transparent one
+        gets its own path to the file. Other shapes are returned unchanged.
+        """
         opacity = 1.0 if shape.rgbaColor is None else shape.rgbaColor[3]
         make = self._surface_of.get(shape.shapeType)
         surface = _SPECK if not opacity else make(shape) if make else None
@@ -56,17 +61,17 @@ class FineShapes:
         return CreateVisualShape.model_construct(**{**kept, "shapeType": pybullet.GEOM_MESH, "fileName": file})
 
     def close(self) -> None:
-        """Deletes the files."""
+        """Deletes the mesh files."""
         self._folder.cleanup()
 
     def _as_another_file(self, file: str) -> str:
-        """Returns another path of the same file, so that PyBullet loads it again."""
+        """Returns a new path to the same file, by repeating `./`, so that PyBullet loads the file again."""
         self._transparent_count += 1
         folder, name = os.path.split(file)
         return os.path.join(folder, "./" * self._transparent_count + name)
 
     def _file(self, surface: SurfaceMesh) -> str:
-        """Returns the file of a surface; equal ones share one, which PyBullet then reads once."""
+        """Writes a surface to a file and returns the path; equal surfaces share a file, which PyBullet reads once."""
         key = b"".join(part.tobytes() for part in surface)
         if key not in self._files:
             path = Path(self._folder.name) / f"shape_{len(self._files)}.obj"

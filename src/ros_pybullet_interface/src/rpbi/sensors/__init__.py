@@ -1,4 +1,4 @@
-"""The types of sensors; to add one, write a class in its own file and a line here."""
+"""The types of sensors; to add a type, write a class in its own file and add a line to the table below."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from rpbi.config.sensors import SensorConfig
@@ -25,6 +25,6 @@ SENSOR_TYPES: PluginTable[BodySensor] = PluginTable(
     },
     suggests=False,
 )
-"""All types of sensors. A `BodySensor` may be under `sensors` of any object, the others have keys of their own."""
+"""All types of sensors. The YAML key `sensors` of any object can list a `BodySensor`; other sensors have own keys."""
 
 __all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig"]

@@ -12,7 +12,7 @@ class BaseStateSensor(Sensor):
     """Pose and twist of the URDF frame of a body's root link.
 
     Args:
-        frame: The name of that frame; without it, `rpbi/NAME/ROOT_LINK`.
+        frame: Name of the root link's TF frame in samples, without prefix; by default `rpbi/NAME/ROOT_LINK`.
     """
 
     sample_type = BaseStateSample
@@ -25,7 +25,7 @@ class BaseStateSensor(Sensor):
         self._frame = frame or f"rpbi/{body.name}/{body.root_link}"
 
     def read(self, tick: int) -> BaseStateSample:
-        """Reads the base; its velocity is that of the frame's origin, not of the centre of mass."""
+        """Reads the pose in the world, and the twist of the frame's origin in the axes of the frame."""
         pose = self._body.base_pose()
         twist = self._body.base_twist()
         if not math.isfinite(sum(pose.position) + sum(twist.linear) + sum(twist.angular)):

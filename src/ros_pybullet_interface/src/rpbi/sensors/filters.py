@@ -1,4 +1,4 @@
-"""Filters of measured values: low pass, noise and zero."""
+"""Filters of measured values: a low-pass filter, noise and the mean for zeroing."""
 
 import math
 from collections.abc import Sequence
@@ -9,13 +9,13 @@ import numpy.typing as npt
 
 
 class LowPass:
-    """First-order low-pass, exact for an input that is constant over each tick.
+    """First-order low-pass filter, exact for an input that is constant during each tick.
 
-    `y[n] = y[n-1] + (1 - exp(-2 pi f dt)) (x[n] - y[n-1])`: the zero-order-hold solution of `y' = 2 pi f (x - y)`. It
-    starts at its first input.
+    `y[n] = y[n-1] + (1 - exp(-2 pi f dt)) (x[n] - y[n-1])` is the zero-order-hold solution of `y' = 2 pi f (x - y)`.
+    The first output is the first input.
 
     Args:
-        cutoff_hz: Frequency at which 1/sqrt(2) of the amplitude passes [Hz].
+        cutoff_hz: Cutoff frequency f, at which the amplitude is reduced to 1/sqrt(2) [Hz].
         dt_s: Length of a tick [s].
     """
 
@@ -25,7 +25,7 @@ class LowPass:
         """The newest value, None before the first."""
 
     def step(self, value: npt.NDArray[np.float64]) -> None:
-        """Adds the value of one tick."""
+        """Filters the input value of the next tick; `output` then has the result."""
         self.output = value if self.output is None else self.output + self._gain * (value - self.output)
 
 
@@ -33,12 +33,12 @@ _TICKS_PER_BLOCK = 256
 
 
 class SeededNoise:
-    """Normally distributed noise and a bias; the values depend only on seed and tick.
+    """Generates normally distributed noise with a bias; the values depend only on the seed and the tick.
 
     Args:
         seed: Seed, 0 or greater.
-        deviation: Standard deviation of each of n values.
-        bias: Mean of each.
+        deviation: Standard deviation of each of the n values.
+        bias: Mean of each of the n values.
     """
 
     def __init__(self, seed: int, deviation: Sequence[float], bias: Sequence[float]) -> None:
@@ -50,7 +50,7 @@ class SeededNoise:
         self._block = np.empty((0, len(deviation)))
 
     def at(self, tick: int) -> npt.NDArray[np.float64]:
-        """Returns the n values of a tick."""
+        """Returns the noise of a tick, n values."""
         if not self._is_noisy:
             return self._bias
         index, row = divmod(tick, _TICKS_PER_BLOCK)  # drawn in blocks, since making a generator takes 20 us
@@ -64,7 +64,11 @@ class SeededNoise:
 
 
 class Zeroing:
-    """Averages the next `count` samples."""
+    """Computes the mean of a number of samples, which becomes a sensor's new zero.
+
+    Args:
+        count: Number of samples.
+    """
 
     def __init__(self, count: int) -> None:
         self.mean: Future[npt.NDArray[np.float64]] = Future()
@@ -73,7 +77,7 @@ class Zeroing:
         self._sum: npt.NDArray[np.float64] | float = 0.0
 
     def add(self, value: npt.NDArray[np.float64]) -> None:
-        """Adds a sample; the last one sets the mean."""
+        """Adds a sample; the last sample sets the result of `mean`."""
         self._sum = self._sum + value
         self._left -= 1
         if not self._left:

@@ -22,12 +22,14 @@ from .sensor import SensedBody, SensedWorld, Sensor
 class ForceTorqueSensor(Sensor):
     """Force and moment that a joint transmits, about its origin, in the axes of its child link's URDF frame.
 
-    PyBullet's own reading cannot be used: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
-    with them added it is still wrong, see docs/force_torque.md. The wrench is therefore the change of momentum of all
-    links below the joint during the last tick, less their weight and less all contact, attachment and external forces
-    (Newton-Euler, as an impulse balance). That holds for all types of joints, control modes and limits.
+    PyBullet's own measurement lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and would still be
+    wrong if they were added, see docs/force_torque.md. This sensor computes the wrench from an impulse balance
+    (Newton-Euler) for all links below the joint. The wrench is their change of momentum during the last tick, minus
+    their weight and minus all contact, attachment and external forces. The balance holds for all types of joints,
+    control modes and limits.
 
-    It is read at `default_hz` unless its configuration has a rate.
+    Args:
+        default_hz: Rate of the sensor if its configuration has no rate [Hz].
     """
 
     Config = ForceTorqueConfig
@@ -71,24 +73,24 @@ class ForceTorqueSensor(Sensor):
         self._sample = None
 
     def after_step(self, tick: int) -> None:
-        """Feeds the low-pass, which runs at every tick whatever the sensor's rate."""
+        """Updates the low-pass filter, at every tick regardless of the sensor's rate."""
         if self._low_pass is not None and self._before is not None:
             self._low_pass.step(self._wrench(self._before, tick))
 
     def read(self, tick: int) -> WrenchSample | None:
-        """Returns the wrench of the last tick, None before the first one."""
+        """Returns the wrench of the last tick; None before the first tick."""
         if self._sample is None and self._before is not None:
             self._sample = self._measure(self._before, tick)
         return self._sample
 
     def _loads(self) -> Iterator[LinkWrench]:
-        """Yields the loads of attachments and external wrenches on the links below the joint in the last step."""
+        """Yields the wrenches of attachments and external wrenches on links below the joint during the last tick."""
         for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
             if load.link in self._subtree.links:
                 yield load
 
     def zero(self, count: int) -> Zeroing:
-        """Zeroes to the mean of the next `count` samples, unless zeroing already runs."""
+        """Starts to zero the sensor to the mean of its next `count` samples; returns the running zeroing, if any."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing
@@ -109,13 +111,18 @@ class ForceTorqueSensor(Sensor):
         return WrenchSample(self.name, self.frame_id, (x, y, z), (about_x, about_y, about_z))
 
     def _wrench(self, before: LinkStates, tick: int) -> npt.NDArray[np.float64]:
-        """Returns force and moment of the last tick, as mean of that tick.
+        """Returns force and moment as 6 numbers, averaged over the last tick.
 
-        With momentum p, angular momentum L about the joint's origin, which moves at v, first moment of mass s, weight
-        m g, and all other loads (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
+        The formulas are F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t. Here, p is the momentum of the links
+        below the joint, L their angular momentum about the joint's origin, v the velocity of that origin, s the first
+        moment of mass, m g the weight, and (f, t) are all other loads.
+
+        Args:
+            before: States of the links before the tick.
+            tick: Number of the tick, for the error message.
 
         Raises:
-            PhysicsError: If it is not finite.
+            PhysicsError: If the result is not finite.
         """
         old, new = self._subtree.momentum(before), self._subtree.momentum(self._subtree.states())
         contact_force, contact_moment = self._subtree.contact_wrench(old.origin)

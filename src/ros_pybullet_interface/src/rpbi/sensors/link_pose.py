@@ -10,7 +10,14 @@ from .sensor import SensedBody, Sensor
 
 
 def index_of_link(body: SensedBody, link: str | None) -> int | None:
-    """Returns PyBullet's index of a link by its name, -1 without one; None if there is no such link."""
+    """Returns PyBullet's index of a link.
+
+    Args:
+        link: Name of the link; None for the root link, whose index is -1.
+
+    Returns:
+        The index; None if the body has no such link.
+    """
     return -1 if link is None else next((i for i in (-1, *body.link_indices) if body.link_name(i) == link), None)
 
 
@@ -18,11 +25,11 @@ class LinkPoseSensor(Sensor):
     """Poses of the URDF frames of a body's links in the world.
 
     Args:
-        links: Whether to report every link as `rpbi/NAME/LINK`; otherwise the root link alone.
-        root_frame: TF frame of the root link; by default `rpbi/NAME/LINK`, as for all links.
+        links: Whether to report all links, with TF frames `rpbi/NAME/LINK`; otherwise only the root link.
+        root_frame: TF frame of the root link; by default `rpbi/NAME/LINK`, as for the other links.
 
     Attributes:
-        tf_frames: TF frames of its poses, without prefix, that of the root link first.
+        tf_frames: TF frames of the links, without prefix; the root link's frame comes first.
     """
 
     sample_type = LinkPoseSample
@@ -37,7 +44,7 @@ class LinkPoseSensor(Sensor):
         self.tf_frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
 
     def read(self, tick: int) -> LinkPoseSample:
-        """Reads the base and all links."""
+        """Reads the poses of the root link and, if configured, of all other links."""
         pb, body_id = self._body.pb, self._body.body_id
         base = self._body.base_pose()
         if not math.isfinite(sum(base.position)):

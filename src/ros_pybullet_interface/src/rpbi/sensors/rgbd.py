@@ -1,4 +1,4 @@
-"""RGB-D cameras in the world: their poses and scenes, from which the renderer draws images."""
+"""RGB-D cameras in the world, whose samples are scenes from which the renderer process draws images."""
 
 from collections.abc import Mapping
 
@@ -14,9 +14,11 @@ from .sensor import SensedBody, Sensor
 class RgbdSensor(Sensor):
     """Collects the scene for the renderer while the camera's images have viewers.
 
+    A scene consists of the camera's pose and the states of all bodies.
+
     Attributes:
-        topic_name: Its name in topics.
-        pose: Pose of the optical frame in the world, None as long as it is unknown.
+        topic_name: Name of the camera in topics.
+        pose: Pose of the camera's optical frame in the world; None while it is unknown.
     """
 
     Config = RgbdSensorConfig
@@ -36,11 +38,11 @@ class RgbdSensor(Sensor):
         self._clock = clock
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `pose`, the pose of the optical frame in the world."""
+        """Returns the only input `pose`, which sets the pose of the camera's optical frame in the world."""
         return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
 
     def read(self, tick: int) -> SceneSample | None:
-        """Returns the states of all bodies; None while the pose of the camera is unknown."""
+        """Returns the states of all bodies and the camera's pose; None while the camera's pose is unknown."""
         if self.pose is None:
             return None
         bodies = tuple(body.state() for body in self._bodies.values())

@@ -1,4 +1,4 @@
-"""Base classes of sensors, and what they read of the world."""
+"""Base classes of sensors, and protocols of the objects that sensors read."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rpbi.urdf.joints import Joint
 
 
 class SensedBody(Protocol):
-    """A `Body`."""
+    """The attributes of a `Body` that sensors use."""
 
     pb: Client
     name: str
@@ -27,17 +27,17 @@ class SensedBody(Protocol):
 
     @property
     def external_wrenches(self) -> ExternalWrenches:
-        """Forces and torques on its links from outside."""
+        """External forces and torques on the body's links."""
 
     @property
     def link_indices(self) -> tuple[int, ...]:
-        """PyBullet's indices of all links but the root."""
+        """PyBullet's indices of all links except the root."""
 
     def link_name(self, index: int) -> str:
-        """Returns the name of a link."""
+        """Returns the name of the link with a given PyBullet index; -1 is the root."""
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
-        """Returns PyBullet's dynamics of a link."""
+        """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index."""
 
     def base_pose(self) -> Pose:
         """Returns the pose of the root link's URDF frame in the world."""
@@ -46,99 +46,104 @@ class SensedBody(Protocol):
         """Returns the twist of the root link in the world."""
 
     def state(self) -> BodyState:
-        """Returns all that the renderer needs."""
+        """Returns the pose and joint positions that the renderer process needs; for soft bodies, also the nodes."""
 
 
 class SensedRobot(SensedBody, Protocol):
-    """A `JointedBody`."""
+    """The attributes of a `JointedBody` that sensors use."""
 
     @property
     def joints(self) -> Sequence[Joint]:
         """All joints, fixed ones included, in PyBullet's order."""
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motor efforts [N m or N] of all joints by what PyBullet reports."""
+        """Returns the motor efforts [N m or N] of all joints; replaces efforts that PyBullet reports wrongly.
+
+        Args:
+            reported: Efforts that PyBullet reports for all joints.
+        """
 
 
 class SensedWorld(Protocol):
-    """A `World`."""
+    """The attributes of a `World` that sensors use."""
 
     pb: Client
     clock: Clock
 
     @property
     def bodies(self) -> Mapping[str, Any]:
-        """All bodies by name."""
+        """All bodies, indexed by name."""
 
     @property
     def cameras(self) -> Mapping[str, Any]:
-        """All cameras by name, each an `RgbdSensor`."""
+        """All cameras (`RgbdSensor`), indexed by name."""
 
     @property
     def contacts(self) -> Any:
-        """Contacts of all bodies, a `ContactReader`."""
+        """The `ContactReader`, which returns the contacts of all bodies."""
 
     @property
     def attachments(self) -> Any:
-        """Attachments between bodies, an `Attachments`."""
+        """The `Attachments` between bodies."""
 
 
 class Sensor(ABC):
-    """Reads a quantity from the world at a rate; it has no timer or thread of its own.
+    """Reads a quantity of the world when the world calls `read`, without its own timer or thread.
 
     Attributes:
-        name: The body or sensor that its topics are named after.
-        hz: Rate [Hz] of the world's time, 0 is never; the world changes it.
-        wanted: Whether its samples have receivers; without any, it is not read.
+        name: Name in topics: the name of the body or of the sensor.
+        hz: Rate in the world's time [Hz], 0 is off; the world may change it.
+        wanted: Whether the samples have receivers; otherwise, the sensor is not read.
     """
 
     wanted: bool = True
     sample_type: ClassVar[type]
-    """Type of its samples."""
+    """Type of the samples that `read` returns."""
     keeps_state: ClassVar[bool] = True
-    """Whether its samples depend on more than the present state of the world, such as earlier ticks."""
+    """Whether samples depend on more than the present state of the world, for instance on earlier ticks."""
     ros_topic: ClassVar[str | None] = ""
-    """Place of its `Topic`, as `module:NAME`.
+    """Module and variable of the sensor's `Topic`, as `module:NAME`.
 
-    Empty stands for the topic of the sensors of this package with the same type of samples, None for no topic.
+    With an empty text, the sensor uses the topic of this package's sensor with the same type of samples. None means
+    that the sensor has no topic.
     """
     tf_frames: tuple[str, ...] = ()
-    """TF frames that it publishes, without prefix."""
+    """TF frames that the sensor publishes, without prefix."""
     not_in_keyframes: ClassVar[tuple[str, ...]] = ("wanted",)
-    """Attributes that are no part of the world's state."""
+    """Attributes that keyframes leave out, since they are not part of the world's state."""
     topic: str | None = None
-    """Name of its topic, if it differs from that of its `Topic`."""
+    """Name of the topic, if it differs from the name in the `Topic` of `ros_topic`."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name
         self.hz = hz
 
     def enter(self, world: SensedWorld) -> None:  # noqa: B027 (most sensors need nothing but their body)
-        """Enters its world, before it is read for the first time."""
+        """Called with the sensor's world before the first `read`; does nothing by default."""
 
     @abstractmethod
     def read(self, tick: int) -> Any:
-        """Returns a sample of the world at `tick`, None if there is none yet.
+        """Returns a sample of the world at `tick`; None if the sensor has no sample yet.
 
         Raises:
-            PhysicsError: If the world holds something that is not finite.
+            PhysicsError: If a number in the sample is not finite.
         """
 
     def before_step(self, tick: int) -> None:  # noqa: B027 (most sensors need nothing)
-        """Called just before the physics of each tick, whether the sensor is due or not."""
+        """Called before the physics of each tick, whether the sensor is due or not; does nothing by default."""
 
     def after_step(self, tick: int) -> None:  # noqa: B027
-        """Called just after the physics of each tick, before sensors are read."""
+        """Called after the physics of each tick, before sensors are read; does nothing by default."""
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns the inputs of the sensor by name."""
+        """Returns the inputs of the sensor, indexed by name; by default there are none."""
         return {}
 
 
 class BodySensor(Sensor):
-    """A sensor that any body can have in its `sensors`.
+    """A sensor that the YAML key `sensors` of any body can list.
 
-    A new one is a subclass with a `Config`, a `sample_type` and `read`; see docs/extending.md.
+    To add a type of sensor, write a subclass with `Config`, `sample_type` and `read`; see docs/extending.md.
     """
 
     Config: ClassVar[type[SensorConfig]] = SensorConfig

@@ -1,4 +1,4 @@
-"""Progress of a robot on its trajectory."""
+"""State of a robot's trajectory follower."""
 
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.trajectories.follower import TrajectoryFollower
@@ -19,5 +19,5 @@ class TrajectoryStateSensor(Sensor):
         self._follower = follower
 
     def read(self, tick: int) -> TrajectoryStateSample:
-        """Reads the joints that the follower drives."""
+        """Reads the desired and measured states of the joints that the follower drives."""
         return self._follower.state(tick * self._dt_s)

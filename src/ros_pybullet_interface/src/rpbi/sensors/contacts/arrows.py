@@ -10,7 +10,11 @@ from .mean import MeanContactsSensor
 
 
 class ContactArrowsSensor(Sensor):
-    """An arrow for each force on a body in the last tick."""
+    """An arrow for each force on a body in the last tick.
+
+    Args:
+        metres_per_newton: Length of the arrow for a force of 1 N [m/N].
+    """
 
     sample_type = ContactArrowsSample
     ros_topic = "rpbi.ros.publishers.sample_topics:CONTACT_ARROWS"
@@ -26,7 +30,7 @@ class ContactArrowsSensor(Sensor):
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:
-        """Reads the contacts and scales their forces; a force of zero has no arrow."""
+        """Returns an arrow for each contact point, scaled with the force; zero forces get no arrow."""
         assert self._reader is not None  # ensured by the world
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))
@@ -36,7 +40,7 @@ class ContactArrowsSensor(Sensor):
 
 
 def contact_sensors(body: SensedBody, config: ContactsConfig | None) -> tuple[Sensor, ...]:
-    """Returns the sensors of a body's contacts; none without a configuration."""
+    """Creates the contact sensors of a body; returns an empty tuple without a configuration."""
     if config is None:
         return ()
     contacts = (MeanContactsSensor if config.average else ContactsSensor)(body, config.hz)

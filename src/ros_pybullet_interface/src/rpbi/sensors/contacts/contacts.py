@@ -17,7 +17,7 @@ Touch = tuple[Any, ...]
 
 
 class ContactReader:
-    """Contacts of the last tick, by body; PyBullet is asked once a tick, for all of them."""
+    """Reads the contacts of the last tick of all bodies in one call of PyBullet, and sorts them by body."""
 
     def __init__(self, pb: Client, bodies: Mapping[str, SensedBody]) -> None:
         self._pb, self._bodies = pb, bodies
@@ -29,14 +29,14 @@ class ContactReader:
         self._are_finite = True
 
     def invalidate(self) -> None:
-        """Discards the contacts, since the world has advanced or has other bodies."""
+        """Discards the contacts, after the world has advanced or bodies were added or removed."""
         self._touches = None
 
     def sample(self, body: SensedBody, tick: int) -> ContactsSample:
-        """Returns the contacts of a body in the last tick, those between its own links included.
+        """Returns the contacts of a body in the last tick, including contacts between its own links.
 
         Raises:
-            PhysicsError: If a number in it is not finite any more.
+            PhysicsError: If a number in the contacts is no longer finite.
         """
         if self._touches is None:
             self._touches = self._ask()
@@ -49,7 +49,7 @@ class ContactReader:
         self._by_id = {body.body_id: body for body in self._bodies.values()}
         # PyBullet divides the impulse of the last sub-step by the whole time step.
         self._factor = max(1, self._pb.sub_steps)
-        # Given a body, PyBullet turns normals towards it but not friction directions; without one, it turns neither.
+        # With a body as argument, PyBullet would turn the normals towards it, but not the friction directions.
         all_touches = self._pb.getContactPoints()
         self._are_finite = _finite(all_touches)
         by_body: dict[int, list[list[Touch]]] = {}
@@ -67,7 +67,10 @@ class ContactReader:
 
 
 def _finite(touches: Iterable[Touch]) -> bool:
-    """Returns whether all numbers of contact points are finite; `dist` is finite only if both vectors are."""
+    """Returns whether all numbers of the contact points are finite.
+
+    The function `dist` returns a finite number only if both of its vectors are finite.
+    """
     sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
     return isfinite(sum(sizes))
 
@@ -75,7 +78,14 @@ def _finite(touches: Iterable[Touch]) -> bool:
 def _points(
     body: SensedBody, touches: list[list[Touch]], by_id: Mapping[int, SensedBody], factor: float
 ) -> tuple[ContactPoint, ...]:
-    """Returns contacts as seen from one of their bodies; PyBullet reports the effect of the second on the first."""
+    """Converts contacts to points with the forces on one body; PyBullet reports forces of the second body on the first.
+
+    Args:
+        body: The body that the forces act on.
+        touches: Contact points of the body, grouped by pairs of links.
+        by_id: All bodies, indexed by PyBullet's id.
+        factor: Factor for the forces that PyBullet reports.
+    """
     points = []
     for together in touches:
         _, first, second, first_link, second_link, *_ = together[0]
@@ -115,10 +125,10 @@ class ContactsSensor(Sensor):
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactsSample:
-        """Reads the contacts; there are none before the first tick.
+        """Reads the contact points of the last tick; before the first tick, there are none.
 
         Raises:
-            PhysicsError: If a number in them is not finite any more.
+            PhysicsError: If a number in the contacts is no longer finite.
         """
         assert self._reader is not None  # ensured by the world
         return self._reader.sample(self._body, tick)

@@ -1,4 +1,4 @@
-"""Contacts of a body as means over the ticks between two samples."""
+"""Contacts of a body, averaged over the ticks between two samples."""
 
 from collections.abc import Iterable
 from functools import partial, reduce
@@ -22,14 +22,14 @@ class MeanContactsSensor(ContactsSensor):
         self._latest: ContactsSample | None = None
 
     def after_step(self, tick: int) -> None:
-        """Stores the contacts of the tick, if their mean has subscribers."""
+        """Stores the contacts of the tick, if the sensor is on and has subscribers."""
         if self.wanted and self.hz:
             self._ticks.append(super().read(tick))
         else:
             self._ticks.clear()
 
     def read(self, tick: int) -> ContactsSample:
-        """Returns the means; while the world is stopped, the last ones again."""
+        """Returns the averaged contacts; while the world is stopped, returns the last averages again."""
         if self._ticks:
             self._latest = ContactsSample(self.name, partial(_mean_points, self._ticks))
             self._ticks = []
@@ -37,7 +37,13 @@ class MeanContactsSensor(ContactsSensor):
 
 
 def _mean_points(samples: list[ContactsSample]) -> tuple[ContactPoint, ...]:
-    """Returns a mean over samples, one a tick, for each two links: a tick in which they did not touch counts as 0 N."""
+    """Returns an averaged contact point for each pair of links.
+
+    A tick in which two links did not touch counts as 0 N.
+
+    Args:
+        samples: The contacts of each tick.
+    """
     by_links: dict[tuple[str, ...], list[ContactPoint]] = {}
     for sample in samples:
         for point in sample.points:
@@ -46,7 +52,12 @@ def _mean_points(samples: list[ContactsSample]) -> tuple[ContactPoint, ...]:
 
 
 def _mean(points: list[ContactPoint], ticks: int) -> ContactPoint:
-    """Returns the point with the mean force of these, at their centre of pressure."""
+    """Returns a contact point with the mean force of points between two links, at their centre of pressure.
+
+    Args:
+        points: The contact points of all ticks.
+        ticks: Number of ticks.
+    """
     pressed = sum(point.normal_force for point in points)
     weights = [point.normal_force / pressed if pressed else 1.0 / len(points) for point in points]
     pressure = _total(scaled(point.normal_force / ticks, point.normal) for point in points)

@@ -1,4 +1,4 @@
-"""AprilTags as a detector reports them from a camera's images."""
+"""AprilTag detections, as a detector reports them from a camera's images."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class TagConfig(ConfigModel):
 
     @property
     def pose(self) -> Pose:
-        """Its pose in the frame of its link."""
+        """Pose of the tag in the frame of its link."""
         return Pose(self.position, self.orientation)
 
 
@@ -96,7 +96,7 @@ class AprilTagsSensor(BodySensor):
         self._missing: set[str] = set()
 
     def enter(self, world: SensedWorld) -> None:
-        """Stores the world of the tags and the camera."""
+        """Stores the world with the tags' bodies and the camera, and starts noise, occlusion and latency."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._world, self._dt_ns = world, dt_ns
         seeds = {tag.id: config.seed_of(f"{self.name}/{tag.id}") + tag.id for tag in config.tags}
@@ -105,7 +105,10 @@ class AprilTagsSensor(BodySensor):
         self._delay: Delay[tuple[SeenTag, ...]] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> AprilTagsSample | None:
-        """Detects tags, and returns the detections of `latency_s` ago; None while the camera or its pose is missing."""
+        """Detects tags, and returns the detections of `latency_s` ago.
+
+        Returns None while the camera or its pose is missing, or detections are not old enough.
+        """
         camera = self._world.cameras.get(self.config.camera)
         if camera is None:
             known = ", ".join(self._world.cameras) or "none"

@@ -43,15 +43,15 @@ class TrackingSensorConfig(SensorConfig):
     seed: Count | None = optional("Seed of noise and occlusion; without it, one that follows from the names.")
 
     def seed_of(self, name: str) -> int:
-        """Returns the seed of the sensor of a name."""
+        """Returns the configured seed, or by default a seed computed from the sensor's name."""
         return zlib.crc32(name.encode()) if self.seed is None else self.seed
 
 
 class Occlusion:
-    """Random occlusion, which depends only on seed and tick.
+    """Random occlusion, which depends only on the seed and the tick.
 
     Args:
-        config: Share and length; None for no occlusion.
+        config: Share of time and length of occlusions; None for no occlusion.
         seed: Seed, 0 or greater.
         dt_s: Length of a tick [s].
     """
@@ -62,17 +62,17 @@ class Occlusion:
         self._seed = seed
 
     def hides(self, tick: int) -> bool:
-        """Returns whether it is hidden at a tick."""
+        """Returns whether the tracked object is hidden at a tick."""
         if not self._share:
             return False
         return bool(np.random.default_rng((self._seed, tick // self._ticks)).random() < self._share)
 
 
 class PoseNoise:
-    """Noise of poses, which depends only on seed and tick.
+    """Adds noise to poses; the noise depends only on the seed and the tick.
 
     Args:
-        config: Its deviations.
+        config: Configuration with the standard deviations [m, rad].
         seed: Seed, 0 or greater.
     """
 
@@ -80,7 +80,7 @@ class PoseNoise:
         self._noise = SeededNoise(seed, (*config.noise_m, *[config.noise_rad] * 3), [0.0] * 6)
 
     def on(self, pose: Pose, tick: int) -> Pose:
-        """Returns a pose with the noise of a tick added."""
+        """Returns a pose with the noise of a given tick added."""
         x, y, z, *turn = self._noise.at(tick).tolist()
         rotated = Pose((0.0, 0.0, 0.0), quaternion_of((turn[0], turn[1], turn[2]))) @ Pose(
             (0.0, 0.0, 0.0), pose.quat_xyzw
@@ -89,10 +89,10 @@ class PoseNoise:
 
 
 class Delay(Generic[Measured]):
-    """Delays measurements.
+    """Buffers measurements until they have a given age.
 
     Args:
-        ticks: Smallest age of a measurement that is returned [ticks].
+        ticks: Smallest age of a returned measurement [ticks].
     """
 
     def __init__(self, ticks: int) -> None:
@@ -100,12 +100,15 @@ class Delay(Generic[Measured]):
         self._waiting: deque[tuple[int, Measured]] = deque()
 
     def push(self, tick: int, measured: Measured) -> None:
-        """Appends the measurement of a tick; a second one for the same tick is ignored."""
+        """Adds the measurement of a tick; a second measurement of the same tick is ignored."""
         if not self._waiting or self._waiting[-1][0] != tick:
             self._waiting.append((tick, measured))
 
     def newest(self, tick: int) -> tuple[int, Measured] | None:
-        """Returns the newest measurement that is old enough at a tick, and its own tick; None if there is none."""
+        """Returns the newest measurement that is old enough at a given tick, as a pair of its tick and the measurement.
+
+        Returns None if all measurements are too new.
+        """
         while len(self._waiting) > 1 and tick - self._waiting[1][0] >= self._ticks:
             self._waiting.popleft()
         first = self._waiting[0] if self._waiting else None

@@ -1,4 +1,4 @@
-"""Poses of bodies as Vicon reports them."""
+"""Poses of links, as a Vicon motion capture system reports them."""
 
 from __future__ import annotations
 
@@ -46,14 +46,17 @@ class ViconSensor(BodySensor):
         self._noise = PoseNoise(config, config.seed_of(self.name))
 
     def enter(self, world: SensedWorld) -> None:
-        """Reads the length of a tick."""
+        """Starts occlusion and latency, which depend on the length of the world's ticks."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._dt_ns = dt_ns
         self._occlusion = Occlusion(config.occlusion, config.seed_of(self.name), dt_ns * 1e-9)
         self._delay: Delay[Pose | None] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> ViconSample | None:
-        """Measures the pose, and returns the measurement of `latency_s` ago; None if the link was occluded then."""
+        """Measures the pose, and returns the measurement of `latency_s` ago.
+
+        Returns None if the link was occluded then, or measurements are not old enough.
+        """
         self._delay.push(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
         newest = self._delay.newest(tick)
         seen_at, pose = newest or (tick, None)
