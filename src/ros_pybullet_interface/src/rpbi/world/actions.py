@@ -37,7 +37,7 @@ class RecordedTrajectory(NamedTuple):
     Attributes:
         request: The trajectory. Its stamp [ns] is relative to the stamp of the tick at which it was requested; 0 means
             an immediate start.
-        tolerances: Goal tolerances of the request; None if the request has none.
+        tolerances: Goal tolerances; None if the trajectory was requested without goal tolerances.
     """
 
     request: TrajectoryRequest

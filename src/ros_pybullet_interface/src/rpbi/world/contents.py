@@ -66,7 +66,7 @@ def _make(body: Body, config: Any) -> Sensor:
 
 
 class WorldContents:
-    """The bodies and cameras of a world with their sensors and inputs, and the log from which it can be rebuilt.
+    """The bodies and cameras of a world with their sensors and inputs, and the log from which the world can be rebuilt.
 
     Attributes:
         bodies: Bodies, indexed by name.
@@ -167,7 +167,10 @@ class WorldContents:
         self._append(LogEntry("", "physics", change))
 
     def clear(self) -> None:
-        """Removes attachments, bodies, scheduled sensors and the log. Later, `fill` or `rebuild` replaces the rest."""
+        """Removes attachments, bodies, scheduled sensors and the log.
+
+        Cameras and inputs remain until `fill` or `rebuild` replaces them.
+        """
         self.attachments.clear()
         for body in self.bodies.values():
             body.remove()

@@ -68,7 +68,7 @@ def check_is_world(data: Mapping[str, Any], file: str) -> None:
     """Checks that the content of a main file is not the content of an object's or camera's file.
 
     Raises:
-        ConfigError: If it is; the message names the list of the main file to which the file belongs.
+        ConfigError: If the file is an object's or camera's file; the message names the list to which the file belongs.
     """
     section = _section_of(data)
     if section and not any(key in data for key in _OF_WORLDS):

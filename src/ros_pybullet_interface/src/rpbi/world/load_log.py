@@ -21,8 +21,8 @@ from rpbi.plugins import plugin_errors, raise_plugin_error
 def refuse_non_finite(body: Body) -> None:
     """Checks that all masses, poses, joint limits and sizes of a rigid body are finite.
 
-    Other numbers come from `nan` in a URDF, which PyBullet loads without a warning, or from sizes that are too large.
-    They would spread to all bodies that touch the body.
+    Numbers that are not finite come from `nan` in a URDF, which PyBullet loads without a warning, or from sizes that
+    are too large. Such numbers would spread to all bodies that touch the body.
 
     Raises:
         PhysicsError: If a number is not finite; the message names the link or joint.

@@ -40,7 +40,7 @@ CAMERAS = "rgbd_sensors"
 
 
 class CameraConfig(NamedTuple):
-    """A camera to be put into a world.
+    """Configuration of a camera of a world, and its source.
 
     Attributes:
         config: Configuration of the camera.
@@ -76,7 +76,8 @@ def load_world(
 
     Args:
         path: The main file; `{package}/path` and `package://package/path` are resolved.
-        robot_description: URDF file to be used where a file name is the word `robot_description`; None leaves the word.
+        robot_description: URDF file that is loaded in place of the file name `robot_description`; None if there is no
+            such file.
         overrides: Keys and values that replace keys of the main file; mappings are merged key by key.
 
     Raises:
@@ -184,8 +185,12 @@ class _Reader:
                 yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
 
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yields content, name and context of each file in the list of a section; notes names of objects that are not
-        unique.
+        """Yields content, name and context of each file in a list of the main file.
+
+        Collects problems of files that cannot be read, and of objects whose names are not unique.
+
+        Args:
+            section: Key of the list.
         """
         search_paths = self._search_paths()
         for index, entry in _object_entries(self._data.get(section)):
@@ -210,7 +215,7 @@ class _Reader:
             self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
-        """Notes the name of an object as taken, or notes a problem if another object has the name already."""
+        """Registers the name of an object, or collects a problem if another object has the same name."""
         name = name_in(data)
         if name in self._owner_of:
             message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
@@ -229,9 +234,7 @@ class _Reader:
 
 
 def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
-    """Yields the valid entries of a list of objects with their indices; the model of the main file reports invalid
-    ones.
-    """
+    """Yields the index and content of each valid entry of a list; the main file's model reports invalid entries."""
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
             yield index, parse_object_entry(entry)

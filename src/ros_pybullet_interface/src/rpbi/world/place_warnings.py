@@ -149,7 +149,7 @@ def _needs_points(body: Body) -> bool:
 
 
 def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool:
-    """Returns whether a body rests on a plane or floor, or will rest on it after a fall.
+    """Returns whether a body rests on `plane`, or will rest on `plane` after a fall.
 
     Args:
         world: The world.

@@ -60,8 +60,8 @@ def file_schemas() -> dict[str, Schema]:
 def schemas() -> dict[str, Schema]:
     """Returns the schemas for editors, indexed by kind of file.
 
-    They extend `file_schemas` by keys of older worlds, and by entries of the main file's lists with overrides. Such an
-    entry names a file and may override every key of the file. The schema of an entry is the definition `entry` in the
+    The schemas extend `file_schemas` by keys of older worlds, and by list entries with overrides. An entry with
+    overrides names a file and may override every key of the file. The entry's schema is the definition `entry` in the
     schema of the file's kind, such as `robot.schema.json#/$defs/entry`.
     """
     files = file_schemas()

@@ -166,7 +166,7 @@ class SensorSchedule:
         return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Reads sensors of a stopped world as if it were running, see `World.read_idle`; returns their samples."""
+        """Reads sensors of a stopped world as if the world were running, see `World.read_idle`; returns the samples."""
         now = self._clock.tick
         return _present(each.read(now) for each in self._rated() if each.schedule.is_due(tick, since))
 

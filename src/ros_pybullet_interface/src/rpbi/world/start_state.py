@@ -41,9 +41,10 @@ class DynamicsChange(NamedTuple):
 class StartState:
     """The state of a world before its first tick, saved in PyBullet's memory.
 
-    PyBullet's `restoreState` restores this state bit by bit. It would lose the history of contacts, but before the
-    first tick contacts have no history. Motor targets and dynamics are not part of PyBullet's saved state: `restore`
-    restarts the robots, and undoes changes of dynamics. After any other change, the world has to be built again.
+    PyBullet's `restoreState` restores this state bit by bit. At later ticks, `restoreState` would lose the history of
+    contacts, but before the first tick contacts have no history. Motor targets and dynamics are not part of PyBullet's
+    saved state: `restore` restarts the robots, and undoes changes of dynamics. After any other change, the world has
+    to be built again.
 
     A world is not suitable if its bodies may sleep, since PyBullet does not restore sleep. Worlds with several free
     bodies are not suitable either: PyBullet does not restore the order of body pairs in collision detection, in which
@@ -64,7 +65,7 @@ class StartState:
 
     @staticmethod
     def suits(contents: WorldContents) -> bool:
-        """Returns whether the start state of a world can be restored exactly, see the class."""
+        """Returns whether the start state of a world can be restored exactly, see `StartState`."""
         bodies = contents.bodies.values()
         others = (is_foreign(each) or each.is_soft or _is_rigid(each) or _may_sleep(each) for each in bodies)
         if any(others) or contents.attachments.configs or contents.sensors.keep_state:
@@ -97,7 +98,7 @@ class StartState:
         self._pb.removeState(self._state_id)
 
     def _end_contacts(self) -> None:
-        """Moves all bodies far apart, so that PyBullet drops their contacts; `restoreState` alone would keep these."""
+        """Moves all bodies far apart, so that PyBullet drops their contacts, which `restoreState` alone would keep."""
         for index, body in enumerate(self._contents.bodies.values()):
             self._pb.resetBasePositionAndOrientation(body.body_id, (0.0, 0.0, APART_M * (index + 1)), NO_TURN)
         self._pb.performCollisionDetection()

@@ -218,7 +218,7 @@ class World:
     def add_camera(self, config: RgbdSensorConfig | Mapping[str, Any], file: str | None = None) -> RgbdSensor:
         """Adds a camera. After an error, the world is unchanged.
 
-        The first camera has the topics `rpbi/camera/...`. If it is removed, the next added camera gets these topics.
+        The first camera has the topics `rpbi/camera/...`. After its removal, the next added camera gets these topics.
 
         Args:
             config: Configuration of the camera, or a mapping of configuration keys to values.
@@ -387,7 +387,7 @@ class World:
 
     @property
     def cameras(self) -> dict[str, RgbdSensor]:
-        """Cameras, indexed by name; when a camera is added or removed, a new dictionary replaces the former."""
+        """Cameras, indexed by name; adding or removing a camera creates a new dictionary."""
         return self._contents.cameras
 
     def sensors_of(self, name: str) -> list[Sensor]:
@@ -411,7 +411,7 @@ class World:
     def apply_inputs(self) -> None:
         """Applies the inputs that arrived since the last call; inputs of removed bodies and cameras are ignored.
 
-        Every step calls this method first. While the world is stopped, it applies poses from TF.
+        Every step calls this method first. While the world is stopped, a call still applies poses from TF.
         """
         for slot, value in self.mailbox.drain().items():
             if slot in self.inputs:
@@ -469,10 +469,11 @@ class World:
         return self._sensors.read_due()
 
     def run_idle(self, ticks: float, end_s: float) -> int:
-        """Advances the world as long as only PyBullet's physics acts, faster than the same number of calls of `step`.
+        """Advances the world by ticks in which only PyBullet's physics acts.
 
-        Stops before a tick at which a body, an external wrench, an attachment with a limited force or a sensor has to
-        be updated. Stops within MAX_IDLE_ROW ticks after a new input has arrived.
+        The result is the same as with `step`, but takes less time. Stops before a tick at which a body, an external
+        wrench, an attachment with a limited force or a sensor has to be updated. Stops within MAX_IDLE_ROW ticks after
+        a new input has arrived.
 
         Args:
             ticks: Largest number of ticks.
@@ -510,14 +511,15 @@ class World:
         """Reads the sensors of a stopped world that would be due if the world were running, and returns their samples.
 
         Args:
-            tick: Tick that the running world would have reached.
-            since: Tick that it would have reached at the last call. Sensors due after it, up to `tick`, are read.
+            tick: Tick that a running world would have reached by now.
+            since: Tick that a running world would have reached at the last call of this method. Sensors are read if
+                they are due at a tick after `since` and up to `tick`.
         """
         return self._sensors.read_idle(tick, since)
 
     @_recorded
     def halt(self, reason: str) -> None:
-        """Aborts all actions of bodies that last several ticks, such as timed motions.
+        """Aborts all running actions of the world's bodies, such as timed motions.
 
         Args:
             reason: Reason that the aborted actions report.
@@ -528,7 +530,7 @@ class World:
 
     @_recorded
     def pause(self, reason: str) -> None:
-        """Aborts all actions of bodies that cannot be paused while the world is stopped.
+        """Aborts those running actions of the world's bodies that cannot be paused while the world is stopped.
 
         Args:
             reason: Reason that the aborted actions report.
@@ -538,7 +540,7 @@ class World:
         self._note("", "pause", reason)
 
     def reset(self, rebuild: bool = True) -> None:
-        """Returns the world to the state in which it was built, bit by bit. Stamps continue to increase.
+        """Resets the world to exactly the state in which it was built. Stamps continue to increase.
 
         Objects that were added are removed, and objects that were removed are added again. Running motions are aborted
         and waiting inputs are dropped. Cameras keep their poses. Gravity, engine parameters and sensor rates are set
@@ -621,7 +623,7 @@ class World:
             raise InterfaceError(f"the keyframe at tick {self.clock.tick} is not the recorded one: '{part}' differs")
 
     def keyframe_in_parts(self) -> Iterator[None]:
-        """Makes a keyframe as `keyframe` does, but in parts: each item of the iterator is yielded after a part.
+        """Makes a keyframe as `keyframe` does, but in parts, and yields after each part.
 
         Each part builds one body in the fresh client. The world may step between parts. If bodies are added, removed or
         changed meanwhile, all bodies are built again. The world moves into the fresh client in the last part.
@@ -724,7 +726,7 @@ class World:
             pass
 
     def restoring(self, state: WorldState, trust: Collection[str] | None = ()) -> Generator[int, None, None]:
-        """Restores a state as `restore` does, but without its checks of the state; yields each simulated tick.
+        """Restores a state as `restore` does, but without checking the state first; yields each simulated tick.
 
         If the generator is closed before its end, the world is reset.
         """
@@ -830,7 +832,7 @@ class World:
 
     @contextmanager
     def _followed(self) -> Iterator[Shadow]:
-        """Yields the shadow of this world after it has reached the present state; an error ends the shadow."""
+        """Yields the shadow process of this world after it has reached the present state; an error ends the process."""
         self._require_recorded()
         try:
             self.prepare_forks()

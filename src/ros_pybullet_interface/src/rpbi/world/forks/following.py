@@ -1,4 +1,4 @@
-"""The side of the shadow process: repeats the commands of a world, and forks itself for forks and predictions."""
+"""Code of the shadow process, which repeats the commands of a world, and forks itself for copies and predictions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def end_with(parent: int) -> None:
 
 
 def serve(connection: Connection, build: Callable[[], Any]) -> None:
-    """Answers requests of a `Shadow` until it closes the connection.
+    """Answers requests of a `Shadow` until the `Shadow` closes the connection.
 
     Args:
         connection: Connection to the `Shadow`.

@@ -1,4 +1,4 @@
-"""The side of the world's process: starts the shadow process, and sends requests to the shadow and to forks."""
+"""Starts the shadow process of a world, and sends requests to the shadow and its forks."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ class _Copy:
 
 
 class Shadow:
-    """A process that follows a world: it repeats the world's commands, and is forked for forks and predictions.
+    """A process that repeats a world's commands, and is forked to make copies of the world and predictions.
 
     The shadow has no ROS node, no window and a single thread, so it can be forked safely. It starts while this process
     continues; the first request waits until the shadow has reached the world's state.

@@ -44,7 +44,7 @@ class GraphWriter:
     """Converts objects to plain values for JSON.
 
     Args:
-        fixed: Types whose objects are not written. The reader uses the objects that its own world has in their place.
+        fixed: Types whose objects are not written; the reader uses the corresponding objects of its own world.
         anchors: Objects that are written as their names only, indexed by name.
     """
 

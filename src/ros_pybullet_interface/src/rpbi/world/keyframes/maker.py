@@ -82,7 +82,7 @@ class KeyframeMaker:
         self._finish(fail)
 
     def _finish(self, state: Callable[[], WorldState]) -> None:
-        """Ends a keyframe, and completes the futures of all requests with the state or its InterfaceError."""
+        """Ends a keyframe, and completes the futures of all requests with the result or InterfaceError of `state`."""
         asked, self._asked, self._parts = self._asked, [], None
         for each in asked:
             if each.set_running_or_notify_cancel():

@@ -1,4 +1,4 @@
-"""The log of the commands that entered a world after its start, and how recorded commands are applied again."""
+"""Logs the commands that changed a world after its start, and applies recorded commands again."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class CommandLog:
     """The commands since a world was built or reset.
 
     Attributes:
-        count: Number of commands since then, including forgotten commands.
+        count: Number of commands since the world was built or reset, including commands that `forget` dropped.
         first: Index of the first command that `records` yields; 0 unless `forget` dropped earlier commands.
     """
 
@@ -119,8 +119,9 @@ class CommandLog:
         self.forget()
 
     def forget(self) -> None:
-        """Drops the records of all commands so far, since a new keyframe replaces them; `since` still returns the
-        newest.
+        """Drops the records of all commands so far, because a new keyframe replaces them.
+
+        The newest commands, which are not compressed yet, can still be read with the method `since`.
         """
         self._packing, self._packed = zlib.compressobj(), bytearray()
         self._fault = ""
@@ -163,7 +164,7 @@ def apply_command(world: Any, command: RecordedCommand, trust: Collection[str] |
     Args:
         world: World to which the command is applied.
         command: The recorded command.
-        trust: Packages that the command's value may import, see `trusting`.
+        trust: Packages from which the command's value may import classes, see `trusting`.
 
     Raises:
         InterfaceError: If the world refuses the command, or the command's value contains a configuration that is not

@@ -150,7 +150,7 @@ class FreshClient:
         self._bodies: dict[str, Body] = {}
 
     def build(self) -> Iterator[None]:
-        """Builds the bodies; each item of the iterator is yielded after an entry of the recipe has been applied.
+        """Builds the bodies, and yields after each applied entry of the recipe.
 
         Raises:
             ConfigError: If a body cannot be loaded again, for instance because its file is missing.
@@ -188,7 +188,7 @@ def _merge(values: dict[str, Any], change: Mapping[str, Any]) -> None:
 
 
 def _change(body: Body, link: str, values: dict[str, Any]) -> ChangeDynamics:
-    """Returns the change that gives a link of a newly loaded body the present dynamics of this link of `body`.
+    """Returns the change of dynamics that a newly loaded copy of a body needs to equal the present body in one link.
 
     Args:
         body: The present body.
