@@ -123,7 +123,7 @@ class Replay:
 
     Args:
         recording: The recording to replay.
-        progress: Called after each section, with the number of ticks replayed since the last call.
+        progress: Called at each checkpoint, with the number of ticks replayed since the last call.
         observe: Called after every tick, and whenever the replay begins with a built or reset world or with a recorded
             keyframe. The arguments are the world, the number of resets so far in the recording, and the sensor samples.
 

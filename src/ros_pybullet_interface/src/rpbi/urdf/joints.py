@@ -177,7 +177,7 @@ class JointModel:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
     def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
-        """Returns the coupling of a mimic joint to its leader, the last joint in a chain of mimic joints."""
+        """Returns the coupling of a mimic joint to its leader, even if there are other mimic joints between both."""
         leader, multiplier, offset = followed(name, mimics)
         if leader not in self._by_name or not self[leader].is_driven:
             movable = ", ".join(joint.name for joint in self.moving)
@@ -189,7 +189,8 @@ class JointModel:
     def effort_limit(self, joint: Joint) -> float:
         """Returns the largest effort of a driven joint's motor [N m or N].
 
-        The motor also drives the mimic joints that follow the joint, so their largest efforts are added.
+        The motor also drives the mimic joints that follow the joint. Therefore, the largest efforts of these mimic
+        joints are added, each multiplied by the absolute multiplier of the coupling.
         """
         return joint.max_effort + sum(
             abs(multiplier) * self.joints[index].max_effort
@@ -201,9 +202,8 @@ class JointModel:
         """Adds the values of mimic joints to values of their leaders.
 
         Args:
-            positions: Values of joints, indexed by PyBullet's joint index: positions [rad or m], or with `offsets`
-                False velocities.
-            offsets: Whether to add the offsets of couplings, which apply to positions only.
+            positions: Positions [rad or m] or velocities [rad/s or m/s], indexed by PyBullet's joint index.
+            offsets: Whether to add the offsets of couplings: True for positions, False for velocities.
 
         Returns:
             The given values and the values of the mimic joints that follow these joints.
@@ -244,11 +244,11 @@ class JointModel:
         return resolved
 
     def resolve_driven(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Checks and converts values as `resolve` does, and also requires that at least one joint is driven.
+        """Checks and converts values as `resolve` does; also refuses values if none of the named joints is driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
-            ValueError: See `resolve`; also if joints are named, but all of them are not driven.
+            ValueError: See `resolve`; also if joints are named and none of them is driven.
         """
         resolved = self.resolve(names, values)
         if names and not resolved:

@@ -51,7 +51,7 @@ def urdf_problems(path: str) -> list[str]:
     Meshes that were not loaded on this machine before are loaded in another process as a trial.
 
     Returns:
-        A sentence for each fault; empty if the file can be loaded.
+        A sentence for each fault; empty if no fault was found.
     """
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
