@@ -1,4 +1,4 @@
-"""One tick of force feedback, for any clock: tests in virtual time run the code that users feel."""
+"""Computes one tick of force feedback. The caller passes the time, so tests can run the same code in virtual time."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .passivity import PassivityController
 from .readings import ReadingCheck
 
 SILENCE_S = 0.02
-"""Time without input from the device after which it is engaged anew [s]."""
+"""Time without a reading after which the handle is engaged again from its present position [s]."""
 SMOOTHING_S = 0.002
 """Time constant of the velocity filter for devices that do not measure velocity [s]."""
 
 
 class ForceLimiter:
-    """Shortens forces to a largest force and a largest slew rate.
+    """Limits the magnitude and the slew rate of forces.
 
-    Directions are kept, so that a braking force still brakes. A force may become smaller, or zero, at once.
+    The direction of a force stays unchanged, so a braking force still brakes. A force may decrease at any rate.
 
     Args:
         max_force_n: Largest force [N].
@@ -38,7 +38,7 @@ class ForceLimiter:
         self.not_finite = 0
 
     def limited(self, force: Vector, dt_s: float) -> Vector:
-        """Returns the limited force [N], `dt_s` after the last one."""
+        """Returns the limited force [N]; `dt_s` is the time since the last call [s]."""
         length = norm(force)
         if not math.isfinite(length):
             self.not_finite += 1
@@ -53,21 +53,21 @@ class ForceLimiter:
         return self._last
 
     def note(self, force: Vector) -> None:
-        """Sets the force that was finally sent [N]; the next one grows from it."""
+        """Sets the force that was finally sent [N]. The growth of the next force is limited relative to this force."""
         self._last = force
 
 
 class Snapshot(NamedTuple):
-    """Result of the last sample of the device.
+    """Result of the controller for one reading of the device.
 
     Attributes:
-        reading: The sample.
-        velocity: Velocity of the handle [m/s].
-        deviation: Displacement of the handle since it was engaged [m]; 0 while it is not.
-        displacement: Displacement of the target since the start, in the axes of the tool [m].
-        force: Force that is sent to the device, in its axes [N].
+        reading: The reading.
+        velocity: Velocity of the handle, in the device's axes [m/s].
+        deviation: Displacement of the handle since it was engaged, in the device's axes [m]; 0 while disengaged.
+        displacement: Displacement of the target since the start, in the tool's axes [m].
+        force: Force that is sent to the device, in the device's axes [N].
         is_engaged: Whether handle and tool are coupled.
-        time_s: Time of the sample, by the monotonic clock [s].
+        time_s: Time of the reading, by the monotonic clock [s].
     """
 
     reading: HapticReading
@@ -80,24 +80,24 @@ class Snapshot(NamedTuple):
 
 
 class HapticController:
-    """Computes a target for the tool and a force from readings of the handle and the state of the tool in the
-    simulator.
+    """Computes the target of the tool and the force on the handle.
 
-    Forces pass the coupling, the damper of the passivity controller, clamp and slew limit, and a last check of
-    passivity.
+    The inputs are readings of the handle, and the force or the displacement of the tool in the simulator. A force
+    passes four stages: the coupling, the damper of the passivity controller, the limits of force and slew rate, and a
+    final check of passivity.
 
     Args:
-        config: The mapping and the forces.
+        config: Parameters of the mapping and the forces.
         device: Properties of the device.
         sample_hz: Rate at which the device is read [Hz].
-        displacement: Displacement of the target from its start, in the axes of the tool [m].
+        displacement: Initial displacement of the target from its start, in the tool's axes [m].
 
     Attributes:
-        force: Force that is sent to the device now [N].
-        fault: Last fault of a refused reading; empty if readings are valid.
-        faults: Number of refused readings, by fault.
-        snapshot: Result of the last sample; None before the first.
-        stiffness_bound: Stiffness up to which a wall is passive by itself [N/m].
+        force: Force that is sent to the device now, in the device's axes [N].
+        fault: Fault of the last reading; empty if the last reading was valid.
+        faults: Number of refused readings, keyed by fault.
+        snapshot: Result for the last reading; None before the first.
+        stiffness_bound: Stiffness up to which a virtual wall is passive without the passivity controller [N/m].
     """
 
     def __init__(
@@ -137,33 +137,33 @@ class HapticController:
         self.awaits_reset = False
 
     def observe_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Updates the force on the tool, in its axes [N], finite."""
+        """Updates the force on the tool, in the tool's axes [N], finite; `delay_s` is the age of the force [s]."""
         if self._config.mode == "wrench":
             self.coupling.observe(turned_about_z(force, -self._yaw), now_s, delay_s)
 
     def observe_tool(self, displacement: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Updates the displacement of the tool from its start, in its axes [m]."""
+        """Updates the tool's displacement from its start, in the tool's axes [m]; `delay_s` is the sample's age [s]."""
         if self._config.mode == "coupling":
             self._tool_displacement = self._handle_displacement(displacement)
             self.coupling.observe(self._tool_displacement, now_s, delay_s)
 
     def reset(self) -> None:
-        """Returns the target to its start; the handle continues from there."""
+        """Moves the target back to its start. From there, the target follows the handle again."""
         self.awaits_reset = True
 
     def lose(self) -> None:
-        """Resets the state after the device has gone."""
+        """Sets the force to zero and disengages the handle, after the device has disconnected."""
         self._drop()
         self._clutch.release()
         self._check.forget()
         self._position = None
 
     def tick(self, now_s: float, reading: HapticReading | None) -> Vector:
-        """Returns the force for the device [N].
+        """Processes a reading, and returns the force for the device, in the device's axes [N].
 
         Args:
-            now_s: By the monotonic clock [s].
-            reading: The reading since the last tick, if there is one.
+            now_s: Present time, by the monotonic clock [s].
+            reading: Reading since the last tick; None without a new reading.
         """
         if reading is not None:
             try:
@@ -178,7 +178,7 @@ class HapticController:
         return self.force
 
     def refuse(self, error: ReadingError) -> None:
-        """Counts an invalid reading."""
+        """Records and counts the fault of an invalid reading."""
         self.fault = f"{error.fault}: {error}"
         self.faults[error.fault] = self.faults.get(error.fault, 0) + 1
 
@@ -194,7 +194,7 @@ class HapticController:
             self.force = ZERO
 
     def _process(self, reading: HapticReading, now_s: float) -> None:
-        """Processes one sample."""
+        """Updates the force, the target and the snapshot with one valid reading."""
         position, dt_s = reading.position, now_s - self._seen_s
         was_away = self._position is None or self._check.has_moved or dt_s > SILENCE_S
         step = ZERO if self._position is None or self._check.has_moved else minus(position, self._position)
@@ -204,7 +204,7 @@ class HapticController:
             self._velocity = ZERO
             dt_s = self._period_s
         self.passivity.observe(step)
-        velocity = ZERO if was_away else scaled(1.0 / dt_s, step)  # as the passivity controller expects it
+        velocity = ZERO if was_away else scaled(1.0 / dt_s, step)  # mean over the period, for passivity
         self._velocity = reading.velocity if reading.velocity is not None else self._smoothed(velocity, dt_s)
         self._position, self._seen_s = position, now_s
         self._engage(position, reading.buttons, now_s)
@@ -227,7 +227,7 @@ class HapticController:
         )
 
     def _handle_displacement(self, displacement: Vector) -> Vector:
-        """Returns the displacement of the handle for one of the tool, 0 along axes that are held."""
+        """Converts a displacement of the tool [m] to one of the handle [m]; 0 along axes with a motion scale of 0."""
         x, y, z = (part / scale if scale else 0.0 for part, scale in zip(displacement, self._config.motion_scale))
         return turned_about_z((x, y, z), -self._yaw)
 

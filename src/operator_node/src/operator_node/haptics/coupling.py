@@ -1,4 +1,4 @@
-"""Coupling between handle and tool: displacement by a clutch, force by a spring and a damper."""
+"""Couples handle and tool. A clutch passes displacements to the tool; spring and damper pass forces to the handle."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -9,14 +9,14 @@ Mode = Literal["wrench", "coupling"]
 
 
 class Clutch:
-    """Couples displacements: after engaging, the tool moves with the handle, from the present positions of both.
+    """Couples the displacement of the tool to that of the handle, from the positions of both when they are engaged.
 
     Args:
-        button: Index of the button that has to be held; None couples all the time.
+        button: Index of the button that engages the clutch while it is held; None engages it always.
 
     Attributes:
-        engaged: Whether they are coupled.
-        deviation: Displacement of the handle since it was engaged [m].
+        engaged: Whether handle and tool are coupled.
+        deviation: Displacement of the handle since it was engaged [m]; 0 while disengaged.
     """
 
     def __init__(self, button: int | None = None) -> None:
@@ -26,11 +26,11 @@ class Clutch:
 
     @property
     def displacement(self) -> Vector:
-        """Displacement of the tool since the start, in metres of the handle."""
+        """Displacement of the tool since the start, before the motion scale is applied [m]."""
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Updates the position of the handle [m]; returns whether it was engaged just now."""
+        """Updates the clutch with position [m] and buttons of the handle. Returns whether this call engaged it."""
         is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
@@ -42,22 +42,22 @@ class Clutch:
         return False
 
     def release(self) -> None:
-        """Disengages: the tool keeps its position. While the button is held, the next update engages again."""
+        """Disengages the handle. The tool keeps its position. If the button is held, the next update engages again."""
         self._kept, self.deviation, self.engaged = self.displacement, ZERO, False
 
     def set_displacement(self, displacement: Vector) -> None:
-        """Sets the displacement of the tool [m] and disengages; the next motion of the handle continues from it."""
+        """Disengages the handle, and sets the displacement of the tool before the motion scale is applied [m]."""
         self._kept, self.engaged, self.deviation = displacement, False, ZERO
 
 
 class TargetFollower:
-    """Target of the tool: it follows the handle up to a largest speed, and stays in a box.
+    """Moves the target of the tool after the handle, at a limited speed and within a box.
 
     Args:
-        scale: Displacement of the tool for each metre of the handle, by axis; 0 holds an axis.
-        low: Least displacement from the start, by axis [m].
-        high: Largest displacement from the start, by axis [m].
-        max_speed: Largest speed [m/s].
+        scale: Displacement of the tool per metre of the handle's displacement, for each axis; 0 fixes an axis.
+        low: Smallest displacement from the start for each axis [m].
+        high: Largest displacement from the start for each axis [m].
+        max_speed: Largest speed of the target [m/s].
     """
 
     def __init__(self, scale: Vector, low: Vector, high: Vector, max_speed: float) -> None:
@@ -65,7 +65,12 @@ class TargetFollower:
         self.displacement: Vector = ZERO
 
     def follow(self, displacement: Vector, dt_s: float) -> Vector:
-        """Returns the displacement of the tool from the start [m], `dt_s` after the last call."""
+        """Moves the target towards a displacement of the handle [m]; returns the target's displacement [m].
+
+        Args:
+            displacement: Displacement of the handle, in the tool's axes [m].
+            dt_s: Time since the last call [s].
+        """
         x, y, z = (value * scale for value, scale in zip(displacement, self._scale))
         goal = self.limited((x, y, z))
         step = minus(goal, self.displacement)
@@ -80,25 +85,24 @@ class TargetFollower:
 
 
 def stiffest_n_per_m(device_damping: float, coupling_damping: float, period_s: float) -> float:
-    """Returns the stiffness up to which a virtual wall is passive by itself; 0 if there is none.
+    """Returns the stiffness K up to which a virtual wall is passive [N/m]; 0 if no wall is passive.
 
-    K < 2 (b - |B|) / T, with the damping b of the device and the hand that holds it, B of the wall, and the sample time
-    T (J. E. Colgate and G. G. Schenkel, "Passivity of a class of sampled-data systems: application to haptic
-    interfaces", J. Robotic Systems 14(1), 1997).
+    K < 2 (b - |B|) / T (J. E. Colgate and G. G. Schenkel, "Passivity of a class of sampled-data systems: application to
+    haptic interfaces", J. Robotic Systems 14(1), 1997).
 
     Args:
-        device_damping: b [N s/m].
-        coupling_damping: B [N s/m].
-        period_s: T [s].
+        device_damping: Damping b of the device together with the hand [N s/m].
+        coupling_damping: Damping B of the wall [N s/m].
+        period_s: Sample time T [s].
     """
     return max(0.0, 2.0 * (device_damping - abs(coupling_damping)) / period_s)
 
 
 class ToolSample(NamedTuple):
-    """Last sample of the tool from the simulator, in the axes of the device.
+    """Last sample of the tool from the simulator, in the device's axes.
 
     Attributes:
-        value: Force on the tool [N], or its displacement in metres of the handle [m].
+        value: Force on the tool [N], or displacement of the tool divided by the motion scale [m].
         rate: Rate of change of the displacement [m/s].
         arrived_s: Time of arrival, by the monotonic clock [s].
         delay_s: Age of the sample at arrival [s].
@@ -111,19 +115,20 @@ class ToolSample(NamedTuple):
 
 
 class VirtualCoupling:
-    """Virtual coupling between handle and tool (J. E. Colgate, M. C. Stanley and J. M. Brown, "Issues in the haptic
-    display of tool use", IROS 1995): samples of a slow simulator act through a spring and a damper that are computed at
-    the rate of the device, so that device and simulator are each passive.
+    """Virtual coupling between handle and tool by a spring and a damper.
 
-    In the mode `wrench`, the force on the tool is rendered as it is, and the damper brakes the handle alone.
+    The spring and the damper are computed at the rate of the device, also with samples of a slower simulator. Device
+    and simulator can then each be passive (J. E. Colgate, M. C. Stanley and J. M. Brown, "Issues in the haptic display
+    of tool use", IROS 1995). In the mode `wrench`, the force on the tool replaces the spring, and the damper brakes the
+    handle.
 
-    A sample is valid for `expiry_s`; during the second half of that time its effect fades to zero.
+    A sample is valid for `expiry_s`. During the second half of this time, its effect fades to zero.
 
     Args:
-        mode: `coupling`, or `wrench`.
+        mode: `coupling` or `wrench`.
         stiffness: Stiffness of the spring [N/m].
-        damping: Damping of the damper [N s/m].
-        force_scale: Factor of forces in the mode `wrench`.
+        damping: Damping coefficient of the damper [N s/m].
+        force_scale: Factor from the force on the tool to the rendered force, in the mode `wrench`.
         expiry_s: Time for which a sample is valid [s].
     """
 
@@ -133,7 +138,14 @@ class VirtualCoupling:
         self._last: ToolSample | None = None
 
     def observe(self, value: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Stores a sample of the simulator, finite and in the axes of the device."""
+        """Stores a sample of the tool.
+
+        Args:
+            value: Force on the tool [N], or displacement of the tool divided by the motion scale [m]; both finite and
+                in the device's axes.
+            now_s: Time of arrival, by the monotonic clock [s].
+            delay_s: Age of the sample at arrival [s].
+        """
         last, rate = self._last, ZERO
         if self._mode == "coupling" and last is not None and last.arrived_s < now_s < last.arrived_s + self._expiry_s:
             rate = scaled(1.0 / (now_s - last.arrived_s), minus(value, last.value))
@@ -144,12 +156,12 @@ class VirtualCoupling:
         self._last = None
 
     def delay_s(self, now_s: float) -> float:
-        """Returns the age of the sample that is rendered [s]; infinite without any."""
+        """Returns the age of the sample that is rendered [s]; infinite without a sample."""
         last = self._last
         return float("inf") if last is None else now_s - last.arrived_s + last.delay_s
 
     def freshness(self, now_s: float) -> float:
-        """Returns the weight of the last sample: 1, decreasing in the second half of its time, then 0."""
+        """Returns the weight of the last sample: 1, falling to 0 during the second half of `expiry_s`."""
         last = self._last
         if last is None:
             return 0.0
@@ -157,12 +169,12 @@ class VirtualCoupling:
         return min(max(left, 0.0), 1.0)
 
     def force(self, position: Vector, velocity: Vector, now_s: float) -> Vector:
-        """Returns the force to render [N].
+        """Returns the force to render, in the device's axes [N].
 
         Args:
-            position: Displacement of the handle since it was engaged [m].
+            position: `Clutch.displacement` [m].
             velocity: Velocity of the handle [m/s].
-            now_s: By the monotonic clock [s].
+            now_s: Present time, by the monotonic clock [s].
         """
         share, last = self.freshness(now_s), self._last
         if share == 0.0 or last is None:

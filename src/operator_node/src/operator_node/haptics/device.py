@@ -1,4 +1,4 @@
-"""Interface of all haptic devices: pose in, force out."""
+"""Interface of haptic devices, which measure the pose of a handle and render forces."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
@@ -15,8 +15,8 @@ class HapticReading(NamedTuple):
 
     Attributes:
         position: Position of the handle, from the middle of the workspace [m].
-        velocity: Velocity of the handle as measured by the device [m/s]; None if it does not measure it.
-        quat_xyzw: Orientation of the handle.
+        velocity: Velocity of the handle as measured by the device [m/s]; None if the device does not measure velocity.
+        quat_xyzw: Orientation of the handle, x, y, z, w.
         buttons: 1 for each button that is held, 0 for the others.
     """
 
@@ -27,7 +27,7 @@ class HapticReading(NamedTuple):
 
 
 class ReadingError(ValueError):
-    """A device sent invalid data; `fault` is a short name under which such data are counted."""
+    """A device sent invalid data. `fault` is a short name of the kind of error, under which errors are counted."""
 
     def __init__(self, fault: str, message: str) -> None:
         self.fault = fault
@@ -35,7 +35,7 @@ class ReadingError(ValueError):
 
 
 class DeviceEnded(DeviceError):  # noqa: N818 (nothing went wrong)
-    """The user has finished with the device, for example closed its window; it must not be opened again."""
+    """The user has closed the device, for example its window. It must not be opened again."""
 
 
 class HapticConfig(ConfigModel):
@@ -54,16 +54,15 @@ class HapticConfig(ConfigModel):
 
 
 class HapticDevice(ABC):
-    """A haptic device; one thread, that of the loop in a process of its own, opens it, reads it, sends forces and
-    closes it.
+    """Base class of haptic devices. Only the haptic loop, in a separate process, opens, reads and closes a device.
 
-    A device only reports the state of its hardware, in the axes of `HapticReading`. The loop does the rest: checks,
-    limits, retries, and zero forces when an input falls silent. The device itself ends each force at its expiry, as far
-    as the hardware can.
+    A device reports the state of its hardware in the axes of `HapticReading`, and renders forces. The loop checks
+    readings, limits forces, opens the device again after failures, and sends zero force when inputs cease. The device
+    ends each force at its expiry time, as far as the hardware allows.
 
     Attributes:
-        Config: Model of its options.
-        faults: Number of invalid inputs, by fault.
+        Config: Model of the device's options.
+        faults: Number of invalid inputs, keyed by fault.
     """
 
     Config: ClassVar[type[HapticConfig]]
@@ -74,20 +73,20 @@ class HapticDevice(ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Connects to the device; reconnects after `close`.
+        """Connects to the device. May be called again after `close`.
 
         Raises:
-            DeviceError: If it is absent. It may appear later.
-            MissingDependency: If it needs a library that is not installed.
+            DeviceError: If the device is absent. The caller tries again later.
+            MissingDependency: If the device needs a library that is not installed.
         """
 
     @abstractmethod
     def read(self) -> HapticReading | None:
-        """Returns the newest reading if there is a new one since the last call; does not wait.
+        """Returns the newest reading; None if no new reading has arrived since the last call. Does not wait.
 
         Raises:
-            DeviceError: If the device has gone; the caller closes it then.
-            ReadingError: If it sent invalid data; it remains usable.
+            DeviceError: If the device has disconnected. The caller then closes the device.
+            ReadingError: If the device sent invalid data. The device remains usable.
         """
 
     @abstractmethod
@@ -96,23 +95,23 @@ class HapticDevice(ABC):
 
         Args:
             force: x, y, z in the axes of `HapticReading` [N], finite and within the limit.
-            expires_s: Time until which it is valid, by `time.monotonic` [s]; then the force is zero.
+            expires_s: Time at which the force becomes zero, by `time.monotonic` [s].
 
         Raises:
-            DeviceError: If the device has gone.
+            DeviceError: If the device has disconnected.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Releases the device, with zero force if that can be sent; may be called at any time, and repeatedly."""
+        """Sends zero force if possible, and releases the device. May be called at any time, and repeatedly."""
 
     def silence(self) -> None:  # noqa: B027 (most hardware ends forces by itself)
-        """Sends zero force from an instance that is not open, in the node's process: at the start, and after the loop's
-        process died.
+        """Sends zero force without opening the device.
 
-        Implemented by devices that would otherwise hold the last force forever.
+        The node's process calls this method at its start, and after the loop's process has crashed. Devices implement
+        it if their hardware would otherwise hold the last force forever.
         """
 
     def count(self, fault: str) -> None:
-        """Counts an invalid input."""
+        """Counts an invalid input in `faults`."""
         self.faults[fault] = self.faults.get(fault, 0) + 1

@@ -1,4 +1,4 @@
-"""A hand on a handle, modelled as a mass on a spring, and the base of devices without hardware."""
+"""Simulates a hand on a handle as a mass on a spring; base class of haptic devices without hardware."""
 
 import time
 from abc import abstractmethod
@@ -10,11 +10,11 @@ from .device import HapticDevice, HapticReading
 
 STEP_S = 0.001
 MAX_STEP_S = 0.05
-"""Longest time that is simulated at once [s]; the rest is dropped, and the handle does not move in it."""
+"""Longest time that one call simulates [s]. The rest of a longer time is skipped without motion of the handle."""
 
 
 class Hand:
-    """A handle with a mass: a hand pulls it to a goal, and the device applies a force.
+    """A handle with a mass. A simulated hand pulls the handle to a goal, and the device applies a force.
 
     Args:
         mass: Mass of handle and hand [kg].
@@ -35,7 +35,7 @@ class Hand:
 
     @property
     def max_acceleration(self) -> float:
-        """Largest acceleration from the hand alone [m/s^2]; that from the device's force adds to it."""
+        """Largest acceleration that the hand causes [m/s^2]. The device's force causes a further acceleration."""
         return self._max_force_n / self._mass
 
     def step(self, goal: Vector, force: Vector, dt_s: float) -> None:
@@ -58,7 +58,7 @@ class Hand:
 
 
 class PressMotion(NamedTuple):
-    """A hand that moves down along z, waits and moves back, smoothly and from rest to rest.
+    """Motion of a hand that moves down along z, waits, and moves back up. The motion is smooth, from rest to rest.
 
     Attributes:
         depth_m: Depth of the motion [m].
@@ -78,39 +78,39 @@ class PressMotion(NamedTuple):
         return 2.0 * (self.wait_s + self.move_s) + self.hold_s
 
     def goal(self, time_s: float) -> Vector:
-        """Returns the position to which the hand pulls the handle, some time after its start [m]."""
+        """Returns the position to which the hand pulls the handle [m], `time_s` [s] after the start of the motion."""
         ahead_s = min(time_s - self.wait_s, self.duration_s - self.wait_s - time_s)
         s = min(max(ahead_s / self.move_s, 0.0), 1.0)
         return 0.0, 0.0, -self.depth_m * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)  # minimum jerk
 
 
 class EmulatedDevice(HapticDevice):
-    """A handle that a hand pulls to a goal and a force displaces; its time is the monotonic clock."""
+    """Base class of devices whose handle is simulated: a hand pulls it to a goal. Simulates in real time."""
 
     hand: Hand
     buttons: tuple[int, ...] = ()
 
     @abstractmethod
     def goal(self, time_s: float) -> Vector:
-        """Returns the position to which the hand pulls the handle, some time after `open` [m]."""
+        """Returns the position to which the hand pulls the handle [m], `time_s` [s] after `open`."""
 
     def open(self) -> None:
-        """Starts with the handle at rest in the middle."""
+        """Starts the simulation with the handle at rest in the middle of the workspace."""
         self.hand = self.make_hand()
         self._start_s = self._now_s = time.monotonic()
         self._force, self._expires_s = ZERO, 0.0
 
     def make_hand(self) -> Hand:
-        """Returns the hand, at rest in the middle."""
+        """Returns a new hand, at rest in the middle of the workspace."""
         return Hand()
 
     @property
     def force(self) -> Vector:
-        """Force that is rendered now [N]."""
+        """Force on the handle now [N]; zero after the force has expired."""
         return self._force if self._now_s < self._expires_s else ZERO
 
     def read(self) -> HapticReading | None:
-        """Simulates the time since the last call, and returns the handle's state."""
+        """Simulates the time since the last call, and returns the handle's state; None within half a `STEP_S`."""
         now_s = time.monotonic()
         self._now_s = max(self._now_s, now_s - MAX_STEP_S)
         if now_s - self._now_s < 0.5 * STEP_S:

@@ -1,4 +1,4 @@
-"""`haptic_node.py`: a haptic device moves a TF frame and renders the forces on the tool there."""
+"""`haptic_node.py`: moves a TF frame with a haptic device, and renders the forces on a tool that follows the frame."""
 
 import re
 import sys
@@ -23,7 +23,7 @@ from .loop_client import LoopClient
 
 
 class HapticNode:
-    """Connects a haptic device to a tool; the loop between them runs in a process of its own.
+    """Connects a haptic device to a tool. The 1 kHz loop between device and tool runs in a separate process.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -71,7 +71,7 @@ class HapticNode:
                 rospy.signal_shutdown(self.loop.report.trouble)
 
     def _on_report(self, report: LoopReport) -> None:
-        """Publishes a report of the loop, in the thread that receives it."""
+        """Logs and publishes a report of the loop. Called in the thread that receives reports."""
         last, self._last, name = self._last, report, self._config.device
         if report.trouble != last.trouble:
             if report.is_connected:
@@ -91,17 +91,17 @@ class HapticNode:
 
 
 def _setup(config: HapticNodeConfig) -> Setup:
-    """Returns the setup of the loop, with the device.
+    """Returns the first message to the loop's process: class and options of the device, and the configuration.
 
     Raises:
-        ConfigError: If there is no such device, or its options are wrong.
+        ConfigError: If the device is unknown or its options are wrong.
     """
     device = HAPTIC_DEVICES.configured(config.device, rospy.get_name(), "device")
     return Setup(device, device.Config.parse(config.device_options, f"{rospy.get_name()}/device_options"), config)
 
 
 def _arguments() -> list[str]:
-    """Returns the remappings for the loop's process, for devices that make it a node, too."""
+    """Returns remappings, namespace and node name for the loop's process, which some devices turn into a ROS node."""
     *_, name = rospy.get_name().split("/")
     given = [each for each in sys.argv[1:] if ":=" in each and not re.match("_[^_]|__(name|ns|log):=", each)]
     return [*given, f"__ns:={rospy.get_namespace()}", f"__name:={name}_device"]

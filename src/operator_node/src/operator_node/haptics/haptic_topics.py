@@ -1,4 +1,4 @@
-"""Topics of the haptic node: handle, force, target and state; force and position of the tool."""
+"""Topics and TF frames of the haptic node: publishes handle, force, target and state, and receives the tool's state."""
 
 import math
 import time
@@ -33,19 +33,19 @@ from .loop_client import LoopClient
 QUEUE_SIZE = 10
 _publisher = partial(rospy.Publisher, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 TOOL_HZ = 500.0
-"""Rate at which TF is queried for the tool."""
+"""Rate at which TF is queried for the tool's pose [Hz]."""
 LOOK_HZ = 50.0
-"""Rate at which TF is queried for the orientation of the sensor."""
+"""Rate at which TF is queried for the orientation of the force sensor [Hz]."""
 TF_CACHE_S = 2.0
 NO_ROTATION: geometry.Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 class HandlePublisher:
-    """Publishes handle, force and target.
+    """Publishes the state of the handle, the force, and the TF frames of handle and target.
 
     Args:
-        config: Names of the frames.
-        workspace_m: Radius of the device's workspace, the unit of the axes of `joy` [m].
+        config: Parameters with the names of the frames.
+        workspace_m: Radius of the device's workspace [m]. It corresponds to 1 in the axes of `joy`.
     """
 
     def __init__(self, config: HapticNodeConfig, workspace_m: float) -> None:
@@ -59,14 +59,14 @@ class HandlePublisher:
         self._tf = tf2_ros.TransformBroadcaster()
 
     def publish(self, report: LoopReport, start: geometry.Pose | None) -> None:
-        """Publishes a report; `start` is the initial pose of the target, None until it is known."""
+        """Publishes a report of the loop. `start` is the initial pose of the target; None until it is known."""
         header = Header(stamp=rospy.Time.now(), frame_id=self._config.base_frame_id)
         message = WrenchStamped(header=header)
         message.wrench.force = Vector3(*report.force)
         self._force.publish(message)
         snapshot = report.snapshot
         if snapshot is None or snapshot == self._sent:
-            return  # no new sample of the device
+            return  # no new reading of the device
         self._sent = snapshot
         reading = snapshot.reading
         self._pose.publish(PoseStamped(header, Pose(Point(*reading.position), Quaternion(*reading.quat_xyzw))))
@@ -98,8 +98,8 @@ class HapticStatePublisher:
     """Publishes `haptics/state`.
 
     Args:
-        config: The constant part.
-        stiffness_bound: Colgate's bound [N/m].
+        config: Parameters that each message repeats.
+        stiffness_bound: Stiffness up to which a virtual wall is passive (Colgate) [N/m].
     """
 
     def __init__(self, config: HapticNodeConfig, stiffness_bound: float) -> None:
@@ -109,7 +109,7 @@ class HapticStatePublisher:
         self._state = _publisher("haptics/state", HapticState)
 
     def note(self, report: LoopReport) -> None:
-        """Records the lateness of the loop."""
+        """Records the lateness of the loop for the next message."""
         self._lateness_s = max(self._lateness_s, report.lateness_s)
 
     def publish(self, report: LoopReport) -> None:
@@ -142,10 +142,10 @@ class HapticStatePublisher:
 
 
 class ToolFeed:
-    """Sends forces on `haptics/wrench` and poses from TF to the loop.
+    """Forwards the tool's forces (from `haptics/wrench`) and the tool's displacements (from TF) to the loop.
 
     Attributes:
-        start: Initial pose of the tool, where the target starts; None until TF has it.
+        start: Initial pose of the tool in the parent frame, where the target starts; None until TF has the pose.
     """
 
     def __init__(self, config: HapticNodeConfig, loop: LoopClient) -> None:
@@ -180,7 +180,7 @@ class ToolFeed:
         self._look_up_sensor()
 
     def _look_up_sensor(self) -> None:
-        """Looks up the orientation of the force's frame in TF."""
+        """Looks up the orientation of the frame in which forces are given, in TF."""
         frame = self._frame.strip("/")
         if not frame:
             return
@@ -192,7 +192,7 @@ class ToolFeed:
             self._warn("haptics/wrench", f"refused, since its frame '{frame}' is not known: {error}")
 
     def _tool(self) -> tuple[geometry.Pose, rospy.Time] | None:
-        """Returns pose and stamp of the tool, None while TF does not have it."""
+        """Returns pose and stamp of the tool; None while TF does not have the pose."""
         frame = self._config.tool_frame_id
         if frame is None:
             return geometry.Pose(), rospy.Time(0)
@@ -208,7 +208,7 @@ class ToolFeed:
             return None
 
     def _observe_tool(self) -> None:
-        """Sends the position of the tool to the loop, if TF has a new one."""
+        """Sends the displacement of the tool from its start to the loop, if TF has a new pose."""
         if self.start is None or (found := self._tool()) is None:
             return
         tool, stamp = found
@@ -219,5 +219,5 @@ class ToolFeed:
 
 
 def _age_s(stamp: rospy.Time) -> float:
-    """Returns the age of a stamp [s]; 0 without one."""
+    """Returns the age of a stamp [s]; 0 for a stamp of 0."""
     return max((rospy.Time.now() - stamp).to_sec(), 0.0) if stamp else 0.0

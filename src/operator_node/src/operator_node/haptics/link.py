@@ -1,4 +1,4 @@
-"""Connection between the node and the loop's process: messages, and their transport."""
+"""Connection between the haptic node and the loop's process: message types, and their transport."""
 
 import math
 import pickle
@@ -21,8 +21,8 @@ class LoopInput(NamedTuple):
     """A sample of the tool from the simulator.
 
     Attributes:
-        value: Force on the tool [N], or displacement of the tool since the start [m], in its axes.
-        at_s: Time of arrival, by the monotonic clock, which all processes share [s].
+        value: Force on the tool [N], or displacement of the tool since the start [m], in the tool's axes.
+        at_s: Time of arrival, by the monotonic clock, which is the same in all processes [s].
         delay_s: Age of the sample at arrival [s].
     """
 
@@ -32,14 +32,14 @@ class LoopInput(NamedTuple):
 
 
 class LoopCommand(NamedTuple):
-    """Command of the node to the loop; repeated, so that the loop detects when the node has stopped.
+    """Command of the node to the loop. The node repeats commands, so that the loop detects when the node has stopped.
 
     Attributes:
-        is_on: Whether the device is to be open.
-        switched: Number of times that this was changed.
-        resets: Number of times that the target was returned to its start.
-        wrench: The newest force on the tool.
-        tool: The newest displacement of the tool.
+        is_on: Whether the device should be open.
+        switched: Number of times that the node switched the device on or off.
+        resets: Number of times that the node moved the target back to its start.
+        wrench: The newest force on the tool; None before the first.
+        tool: The newest displacement of the tool; None before the first.
     """
 
     is_on: bool = False
@@ -55,9 +55,9 @@ class Setup(NamedTuple):
     Attributes:
         device: Class of the device.
         options: Options of the device.
-        config: The mapping, the forces, and the rate of reports.
+        config: Parameters of the mapping and the forces, and the rate of reports.
         command: The present command.
-        displacement: Displacement of the target from its start [m]; not 0 if an earlier process has moved it.
+        displacement: Displacement of the target from its start, in the tool's axes [m]; not 0 after a restart.
     """
 
     device: type[HapticDevice]
@@ -71,20 +71,20 @@ class LoopReport(NamedTuple):
     """State of the loop.
 
     Attributes:
-        obeyed: `LoopCommand.switched` of the command that has been carried out.
-        resets: `LoopCommand.resets` of the command that has been carried out.
+        obeyed: `LoopCommand.switched` of the last executed command.
+        resets: `LoopCommand.resets` of the last executed command.
         is_connected: Whether the device is open.
-        has_ended: Whether the user has finished with it, or a library is missing.
-        trouble: Why it is not open; empty if it is.
-        samples: Number of readings.
+        has_ended: Whether the device must not be opened again: the user closed it, or a library is missing.
+        trouble: Reason why the device is not open; empty while it is open.
+        samples: Number of readings so far.
         lateness_s: Largest lateness of a tick since the last report [s].
-        force: Force that is sent to the device [N].
-        snapshot: Result of the last valid reading.
-        delay_s: Age of the sample that is rendered; infinite without any [s].
-        fault: Last fault of a refused reading; empty if readings are valid.
-        faults: Number of refused readings, by fault.
-        energy_j: Energy that the user has put in, less the energy given back [J].
-        energy_bound_j: Least value of that energy [J].
+        force: Force that is sent to the device, in the device's axes [N].
+        snapshot: Result for the last valid reading; None before the first.
+        delay_s: Age of the tool sample that is rendered [s]; infinite without a sample.
+        fault: Fault of the last reading; empty if the last reading was valid.
+        faults: Number of refused readings, keyed by fault.
+        energy_j: Energy that the user has put in, minus the energy that the device has returned [J].
+        energy_bound_j: Lower bound of `energy_j` [J].
         interventions: Number of samples at which the passivity controller changed the force.
     """
 
@@ -108,14 +108,14 @@ class LoopReport(NamedTuple):
 class Link:
     """Sends and receives picklable objects over a connected socket that preserves messages (SOCK_SEQPACKET).
 
-    The kernel buffers some 200 messages that the other side has not read yet; further ones are dropped. When a process
-    ends, for whatever reason, its side is closed at that moment.
+    The kernel buffers some 200 unread messages and drops further messages. When a process ends, for whatever reason,
+    the kernel closes its end of the connection at once.
 
     Args:
-        connection: The socket; it belongs to the link from now on.
+        connection: The socket. The link closes it.
 
     Attributes:
-        is_closed: Whether one of both sides has gone.
+        is_closed: Whether one end of the connection is closed.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -125,7 +125,7 @@ class Link:
         self.is_closed = False
 
     def send(self, item: Any) -> bool:
-        """Sends an object; returns False if it was dropped because the other side is too far behind."""
+        """Sends an object. Returns False if the object was dropped because the buffer is full."""
         try:
             self._socket.send(pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL))
         except BlockingIOError:
@@ -135,28 +135,28 @@ class Link:
         return True
 
     def receive(self) -> Iterator[Any]:
-        """Yields the objects received since the last call, in order."""
+        """Yields the objects that were received since the last call, in order."""
         return map(pickle.loads, self._packets())
 
     def newest(self) -> Any:
-        """Returns the last of them, or None; drops the others."""
+        """Returns the last object that was received since the last call, or None. Drops earlier objects."""
         newest = None
         for packet in self._packets():
             newest = packet
         return newest and pickle.loads(newest)
 
     def wait(self, timeout_s: float | None = None) -> None:
-        """Waits until something is received or the other side goes, for at most `timeout_s`."""
+        """Waits until a message arrives or the connection is closed, for at most `timeout_s` [s]."""
         if not self.is_closed:
             select.select([self._socket], [], [], timeout_s)
 
     def close(self) -> None:
-        """Closes the connection; wakes up the other side and any `wait` here."""
+        """Closes the connection. Calls of `wait` return, in this process and at the other end."""
         self.is_closed = True
         try:
             self._socket.shutdown(socket.SHUT_RDWR)
         except OSError:
-            return  # the other side has gone
+            return  # the other end is closed already
 
     def _packets(self) -> Iterator[bytes]:
         while not self.is_closed:

@@ -1,10 +1,10 @@
-"""The 1 kHz loop between a haptic device and its controller, in a process of its own.
+"""Runs the 1 kHz loop between a haptic device and its controller, in a separate process.
 
-The node starts that process: `python -m operator_node.haptics.loop FD`. Further arguments are those of a node, for
-devices that communicate through ROS.
+The haptic node starts the process by `python -m operator_node.haptics.loop FD`, where FD is the file descriptor of a
+socket. Further arguments are those of a ROS node, for devices that communicate through ROS.
 
-Python runs one thread at a time: in the process of a ROS node, a tick would wait for any thread that has the lock, and
-on a busy machine until that thread gets a processor.
+A separate process is needed because Python runs one thread at a time. In the node's process, a tick would have to wait
+for the other threads of the node.
 """
 
 import contextlib
@@ -29,25 +29,26 @@ from .link import Link, LoopCommand, LoopReport, Setup
 _log = logging.getLogger(__name__)
 HZ = 1000.0
 RETRY_S = 1.0
-"""Period at which an absent device is tried again [s]."""
+"""Time between two attempts to open an absent device [s]."""
 NODE_SILENCE_S = 0.2
-"""Time without messages from the node after which the handle is disengaged [s]; it is engaged anew afterwards. Forces
-end earlier, since the samples of the tool come from the node, too.
+"""Time without messages from the node after which the handle is disengaged [s].
+
+Forces end earlier, because the samples of the tool come from the node and expire.
 """
 SWITCH_S = 0.0002
 """Longest time for which a thread of the device may hold Python's lock [s]; Python's default is 5 ms."""
 
 
 class HapticLoop:
-    """Reads the device, runs the controller, and sends the force, at absolute deadlines of the monotonic clock.
+    """Reads the device, runs the controller, and sends the force, at a fixed rate.
 
-    A late tick skips the ticks that it has missed. After any failure the device is sent zero force and is opened again
-    when it is back.
+    A late tick shifts the following ticks; missed ticks are not repeated. After any failure, the loop sends zero force
+    and tries to open the device again.
 
     Args:
-        device: The device; it belongs to the loop from now on.
+        device: The device. Only the loop may use it.
         controller: Computes forces from readings.
-        config: Expiry of forces when the loop falls silent, and the rate of reports.
+        config: Parameters with the expiry time of forces and the rate of reports.
         link: Connection to the node.
         command: Initial command of the node.
     """
@@ -67,7 +68,7 @@ class HapticLoop:
         self._samples, self._lateness_s = 0, 0.0
 
     def run(self) -> None:
-        """Keeps the device open while the node requests it, until the node has gone."""
+        """Keeps the device open while the node requests it. Returns when the connection to the node is closed."""
         _use_real_time_scheduling()
         try:
             self._run()
@@ -88,7 +89,7 @@ class HapticLoop:
                 self._link.wait(self._report_s)
 
     def _use_device(self) -> None:
-        """Keeps the device open until it goes, or the node requests otherwise."""
+        """Opens the device, exchanges readings and forces, and closes the device after a failure or a new command."""
         has_ended = False
         try:
             self._device.open()
@@ -99,17 +100,17 @@ class HapticLoop:
             trouble, has_ended = str(error), True
         except DeviceError as error:
             trouble = str(error)
-        except Exception as error:  # devices of other packages may raise anything; the force must end first
+        except Exception as error:  # user-defined devices may raise any exception; the force must end
             trouble = f"{type(error).__name__}: {error}"
             _log.exception("the device failed")
         self._controller.lose()
-        with contextlib.suppress(Exception):  # it may have gone, or never been there; it is closed next in any case
+        with contextlib.suppress(Exception):  # the device may be absent
             self._device.send(ZERO, time.monotonic())
         self._device.close()
         self._send_report(is_connected=False, trouble=trouble, has_ended=has_ended)
 
     def _exchange(self) -> None:
-        """Ticks until the device goes, or the node requests otherwise."""
+        """Runs ticks until the device fails, the node switches the device, or the link is closed."""
         device, controller, period_s = self._device, self._controller, 1.0 / HZ
         due_s = time.monotonic()
         while self._command.switched == self._report.obeyed and not self._link.is_closed:
@@ -153,7 +154,7 @@ class HapticLoop:
             self._send_report()
 
     def _send_report(self, **changed: Any) -> None:
-        """Sends a report to the node."""
+        """Sends a report to the node, with the given fields of `LoopReport` changed."""
         controller, now_s = self._controller, time.monotonic()
         faults = {**controller.faults, **self._device.faults}
         if controller.not_finite:
@@ -178,7 +179,7 @@ class HapticLoop:
 
 
 def _use_real_time_scheduling() -> None:
-    """Requests real-time scheduling; without the permission, scheduling stays as it is."""
+    """Requests real-time scheduling. Without the permission, scheduling stays unchanged."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     except OSError:
@@ -188,18 +189,18 @@ def _use_real_time_scheduling() -> None:
 def _use_ordinary_scheduling() -> None:
     """Restores ordinary scheduling for all threads of this process.
 
-    While ROS shuts down, a thread of rospy spins until the process has ended; with real-time priority it would starve
-    the thread that ends the process on a machine with one processor.
+    While ROS shuts down, a thread of rospy spins until the process has ended. With real-time priority, this thread
+    would starve the thread that ends the process, on a machine with one processor.
     """
     for thread in os.listdir("/proc/self/task"):
-        with contextlib.suppress(OSError):  # it has just ended
+        with contextlib.suppress(OSError):  # the thread has just ended
             os.sched_setscheduler(int(thread), os.SCHED_OTHER, os.sched_param(0))
 
 
 def main() -> None:
-    """Runs the loop until the node has gone, or has closed the link."""
+    """Runs the loop until the node ends or closes the link."""
     link = Link(socket.socket(fileno=int(sys.argv[1])))
-    # The node decides when this ends; a signal to this process alone makes it send zero first
+    # The node ends this process by closing the link. SIGTERM closes the link, too, so that zero force is sent first
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: link.close())
     link.wait()
@@ -210,7 +211,7 @@ def main() -> None:
     device = setup.device(setup.options)
     controller = HapticController(setup.config, setup.options, HZ, setup.displacement)
     gc.collect()
-    gc.freeze()  # existing objects stay, so that later collections take next to no time
+    gc.freeze()  # excludes existing objects from later collections, which become fast
     HapticLoop(device, controller, setup.config, link, setup.command).run()
 
 

@@ -1,4 +1,4 @@
-"""The node's side of the loop's process."""
+"""Starts and supervises the process of the haptic loop, on behalf of the haptic node."""
 
 from __future__ import annotations
 
@@ -18,43 +18,41 @@ from .link import Link, LoopCommand, LoopInput, LoopReport, Setup
 
 _log = logging.getLogger(__name__)
 LOOP = "operator_node.haptics.loop"
-"""Program of the loop's process."""
+"""Module that the loop's process runs."""
 SEND_PERIOD_S = 0.02
-"""Longest time between two messages to the loop, repeated if nothing has changed [s]; the loop detects by them that the
-node has stopped.
-"""
+"""Longest time between two messages to the loop [s]. Unchanged commands are repeated as a sign of life."""
 MAX_CLOSE_S = 5.0
 STABLE_AFTER_S = 10.0
 MAX_FAILURES = 3
-"""Number of consecutive processes that end within `STABLE_AFTER_S` after which no further one is started."""
+"""Number of consecutive processes ending within `STABLE_AFTER_S` after which the client does not restart the loop."""
 
 
 class LoopClient:
-    """Keeps a process alive in which the haptic loop runs; any thread may call its methods.
+    """Runs the haptic loop in a separate process, and restarts the process if it ends. The methods are thread-safe.
 
-    The process is in a session of its own: a signal to the node's process group leaves it time to send zero force. It
-    detects at once when the node has gone, and ends.
+    The process has its own session, so a signal to the node's process group does not end it before it sends zero force.
+    The process ends when the node ends.
 
     Args:
         setup: First message to the process.
-        on_report: Called with each report, in a thread of the client.
-        arguments: Further arguments of the process.
+        on_report: Function that is called with each report, in a thread of the client.
+        arguments: Further command-line arguments of the process.
 
     Attributes:
         report: The newest report.
-        ended: Set when the device must not be opened again.
-        failure: Why the process is not started again; empty unless that is so.
+        ended: Event that is set when the device must not be opened again.
+        failure: Reason why the process is not restarted any more; empty while it is restarted.
     """
 
     def __init__(self, setup: Setup, on_report: Callable[[LoopReport], None], arguments: Sequence[str] = ()) -> None:
         self._setup, self._on_report, self._arguments = setup, on_report, arguments
-        self._device = setup.device(setup.options)  # never opened here
+        self._device = setup.device(setup.options)  # this instance only sends zero force, and is never opened
         self._device.silence()
         self.report, self.failure = LoopReport(), ""
         self.ended = threading.Event()
         self._command, self._lock = setup.command, threading.Lock()
         self._resets = 0
-        """Number of requested resets that the loop has done."""
+        """Number of requested resets that the loop has executed."""
         self._news = threading.Condition()
         self._is_closing = False
         self._start()
@@ -63,24 +61,24 @@ class LoopClient:
 
     @property
     def process_id(self) -> int:
-        """Id of the loop's process."""
+        """Process id (PID) of the loop's process."""
         return self._process.pid
 
     @property
     def is_real_time(self) -> bool:
-        """Whether the process has real-time scheduling, which a system may refuse."""
+        """Whether the loop's process has real-time scheduling, which the system may refuse."""
         try:
             return os.sched_getscheduler(self.process_id) == os.SCHED_FIFO
         except ProcessLookupError:
             return False
 
     def start(self) -> None:
-        """Opens the device, and again whenever it has gone."""
+        """Requests that the loop opens the device, and opens it again after each disconnection."""
         with self._lock:
             self._send(self._command._replace(is_on=True, switched=self._command.switched + 1))
 
     def stop(self) -> None:
-        """Sends zero force and closes the device; returns when both are done."""
+        """Makes the loop send zero force and close the device. Waits until both are done, for at most `MAX_CLOSE_S`."""
         with self._lock:
             self._send(self._command._replace(is_on=False, switched=self._command.switched + 1))
             wanted = self._command.switched
@@ -88,22 +86,22 @@ class LoopClient:
             self._news.wait_for(lambda: self.report.obeyed >= wanted or self.failure, MAX_CLOSE_S)
 
     def reset(self) -> None:
-        """Returns the target to its start."""
+        """Moves the target back to its start."""
         with self._lock:
             self._send(self._command._replace(resets=self._command.resets + 1))
 
     def observe_wrench(self, force: Vector, delay_s: float) -> None:
-        """Sends the force on the tool, in its axes [N], finite."""
+        """Sends the force on the tool to the loop, in the tool's axes [N]. Components must be finite."""
         with self._lock:
             self._send(self._command._replace(wrench=LoopInput(force, time.monotonic(), delay_s)))
 
     def observe_tool(self, displacement: Vector, delay_s: float) -> None:
-        """Sends the displacement of the tool from its start, in its axes [m]."""
+        """Sends the displacement of the tool from its start to the loop, in the tool's axes [m]."""
         with self._lock:
             self._send(self._command._replace(tool=LoopInput(displacement, time.monotonic(), delay_s)))
 
     def close(self) -> None:
-        """Ends the process, after zero force."""
+        """Makes the loop send zero force, and ends the loop's process."""
         self.stop()
         with self._lock:
             self._is_closing = True
@@ -135,7 +133,7 @@ class LoopClient:
         self._send(self._command)
 
     def _run(self) -> None:
-        """Forwards reports, and restarts the process after its end, until the client is closed."""
+        """Forwards reports, repeats commands, and restarts the process after its end, until the client is closed."""
         failures = 0
         while True:
             self._link.wait(SEND_PERIOD_S)

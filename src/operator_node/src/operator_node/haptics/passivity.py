@@ -1,56 +1,55 @@
-"""Time-domain passivity: the device never gives out more energy than the user has put in."""
+"""Time-domain passivity control: keeps the device from returning more energy than the user has put in."""
 
 import math
 
 from robot_model.geometry import ZERO, Vector, dot, minus, norm, scaled
 
 MAX_DAMPING = 30.0
-"""Largest gain of the controller's damper [N s/m]; higher gains are cut off."""
+"""Largest gain of the controller's damper [N s/m]; higher gains are limited to this value."""
 
 
 class PassivityController:
-    """Observes the energy at the handle, and reduces forces that would make it negative.
+    """Observes the energy that the user puts into the device, and reduces forces that would make the energy negative.
 
-    Observer: between two samples the device holds the last force, so that the energy which went into it is exactly
-    minus the sum of force held times displacement (J.-H. Ryu, Y. S. Kim and B. Hannaford, "Sampled- and
-    continuous-time passivity and stability of virtual environments", IEEE Trans. Robotics 20(4), 2004).
+    Observer: Between two samples, the device holds the last force F. The energy that enters the device is therefore
+    exactly minus the sum of the held forces times the displacements (J.-H. Ryu, Y. S. Kim and B. Hannaford, "Sampled-
+    and continuous-time passivity and stability of virtual environments", IEEE Trans. Robotics 20(4), 2004).
 
-    Controller: a damper in series. Its gain brings the energy that is expected after the next sample back to zero (B.
-    Hannaford and J.-H. Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation
-    18(1), 2002). The expected displacement is v dt. The gain has a limit, since a stronger sampled damper would make a
-    light handle chatter.
+    Controller: A damper is added to the force. Its gain brings the expected energy after the next sample back to zero
+    (B. Hannaford and J.-H. Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and
+    Automation 18(1), 2002). The expected displacement is v dt. The gain is limited, because a stronger sampled damper
+    would make a light handle chatter.
 
-    Leak: the displacement differs from v dt by at most a dt^2 if no hand accelerates the handle by more than a. One
-    sample may therefore take the energy below zero by F a dt^2, with the largest force F: that is the leak. Every force
-    is shortened such that the energy stays above minus the leak, whatever such a hand does; it is never below
-    `floor_j`.
+    Leak: If the hand's acceleration is at most a, the displacement differs from v dt by at most a dt^2. One sample may
+    therefore take the energy below zero by F a dt^2, with the largest force F. This amount is the leak. Every force is
+    shortened such that the energy stays above `floor_j`, whatever such a hand does.
 
-    Resolution: each measured position is off by up to e, the half diagonal of a cube of the device's steps. A measured
-    displacement may differ by 4 e more from the v dt before it. Forces times displacements are off by e times the last
-    force, once, and by e times each change of the force (summation by parts): changes are subtracted from the energy,
-    and the amount needed to release the force is reserved. The leak is then F (a dt^2 + 5 e).
+    Resolution: Each measured position has an error of up to e, half the diagonal of a cube of the device's steps. A
+    measured displacement may therefore differ from v dt by another 4 e. Summation by parts shows two errors of the
+    energy: e times the last force, and e times each change of the force. The controller subtracts the latter from the
+    energy, and reserves the energy needed to release the force. The leak is then F (a dt^2 + 5 e).
 
-    Allowance: energy that may be given out once beyond what was put in. Without it, a tool that something else pushes
-    cannot push a hand at rest, and the first touch feels weaker if the simulator lags. A refill restores the allowance
-    at a power, so that over a time t no more than floor and refill times t is given out.
+    Allowance: The device may return this energy beyond the energy that was put in. Without an allowance, a tool pushed
+    by another object cannot push a hand at rest, and a first touch feels weaker if the simulator lags. A refill power
+    restores the allowance. Over a time t, the device returns at most minus `floor_j` plus refill power times t.
 
-    Energy beyond a reserve is dropped: otherwise a user who stirs against a damper for long could get all of it back at
-    once. The observed energy is then less than the real one, so that the bound still holds.
+    Reserve: The observer drops energy beyond the reserve. Otherwise, a user who stirs against a damper for long could
+    get all of this energy back at once. The observed energy is then less than the real energy, so the bound holds.
 
     Args:
-        max_force_n: Largest force F that is held [N].
-        max_acceleration: a [m/s^2].
-        reserve_j: Largest energy that is stored [J].
-        period_s: dt, the time between two samples [s].
-        allowance_j: Energy that may be given out without having been put in [J].
+        max_force_n: Largest force F that the device holds [N].
+        max_acceleration: Largest acceleration a of the hand [m/s^2].
+        reserve_j: Largest energy that the observer stores [J].
+        period_s: Time dt between two samples [s].
+        allowance_j: Energy that may be returned without having been put in [J].
         refill_w: Power at which the allowance is restored [W]; 0 is strictly passive.
-        resolution_m: Steps in which the device measures each axis [m].
+        resolution_m: Step width of the measured position along each axis [m].
 
     Attributes:
-        energy_j: Energy that the user has put in, less the energy given back [J].
+        energy_j: Energy that the user has put in, minus the energy that the device has returned [J].
         interventions: Number of samples at which a force was changed.
-        is_on: Whether forces are changed; the observer runs in any case.
-        floor_j: Least value of the energy: minus allowance and leak [J].
+        is_on: Whether forces are changed. The observer always runs.
+        floor_j: Lower bound of `energy_j`: minus allowance and leak [J].
     """
 
     def __init__(
@@ -75,15 +74,15 @@ class PassivityController:
         self._held, self._before, self._was_cut = ZERO, ZERO, False
 
     def reset(self) -> None:
-        """Drops the energy that the user has put in, but not a deficit; called when the handle is engaged anew."""
+        """Sets a positive energy to zero, but keeps a negative energy. Called when the handle is engaged."""
         self.energy_j = min(self.energy_j, 0.0)
 
     def observe(self, displacement: Vector) -> None:
-        """Accounts for the displacement of the handle since the last sample [m]."""
+        """Updates the energy with the displacement of the handle since the last sample [m]."""
         given_j = dot(self._held, displacement)
         changed_j = self._error_m * norm(minus(self._held, self._before))
         self._before = self._held
-        if self._was_cut:  # it is not known at which part of the displacement
+        if self._was_cut:  # the force ended at an unknown part of the displacement: assume the worse case
             given_j = max(given_j, 0.0)
         self.energy_j = min(self.energy_j - given_j - changed_j, self._reserve_j)
         if self.energy_j < 0.0:
@@ -96,7 +95,7 @@ class PassivityController:
         self._was_cut = True
 
     def damped(self, force: Vector, velocity: Vector) -> Vector:
-        """Returns a force with the necessary damper added [N], at a velocity [m/s]."""
+        """Returns a force [N] with the damping that passivity requires at the velocity of the handle [m/s]."""
         if not self.is_on:
             return force
         expected_j = self.energy_j + self._allowance_j - dot(force, velocity) * self._period_s
@@ -108,10 +107,10 @@ class PassivityController:
         return force[0] - velocity[0] * brake, force[1] - velocity[1] * brake, force[2] - velocity[2] * brake
 
     def hold(self, force: Vector, velocity: Vector) -> Vector:
-        """Returns the force to hold until the next sample: the given one, possibly shortened.
+        """Shortens a force if passivity requires it, records the force as held until the next sample, and returns it.
 
         Args:
-            force: Damped force after the limits [N]: the same direction, and not longer.
+            force: Result of `damped` [N], after the limits of force and slew rate.
             velocity: Velocity of the handle [m/s].
         """
         if self.is_on:

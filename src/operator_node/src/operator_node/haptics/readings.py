@@ -1,4 +1,4 @@
-"""Plausibility checks of readings of a haptic device."""
+"""Checks the plausibility of a haptic device's readings."""
 
 import itertools
 import math
@@ -8,28 +8,28 @@ from robot_model.geometry import ZERO, Vector, angle_between, minus, norm, plus,
 from .device import HapticConfig, HapticReading, ReadingError
 
 MAX_DISTANCE_RADII = 3.0
-"""Largest distance from the middle, in radii of the workspace; readings beyond it are refused."""
+"""Largest distance of a reading from the middle of the workspace, in radii of the workspace."""
 SLACK_M = 0.01
-"""Distance by which a reading may differ from the last one at any speed [m]: noise and late readings."""
+"""Tolerance of the distance between two readings, for noise and late readings [m]. Added to the largest motion."""
 TURN_SLACK = 0.3
-"""Angle by which an orientation may differ from the last one at any speed [rad]."""
+"""Tolerance of the angle between two orientations [rad]. Added to the largest rotation."""
 MAX_TURN = 30.0
 """Largest rate at which a hand rotates a handle [rad/s]."""
 MOVED_AFTER = 50
-"""Number of consistent readings elsewhere after which the device counts as moved; it is engaged anew then."""
+"""Number of consistent readings at another place after which this place is accepted and the handle engaged again."""
 WINDOW_S = 0.1
 """Time span over which displacement and velocity are compared [s]."""
 GAP_S = 0.01
-"""Gap between readings beyond which the comparison restarts [s]."""
+"""Time between two readings above which the comparison of displacement and velocity restarts [s]."""
 MIN_DISPLACEMENT_M = 0.005
-"""Displacement in that time span below which they are not compared [m]."""
+"""Displacement within `WINDOW_S` below which displacement and velocity are not compared [m]."""
 
 
 class ReadingCheck:
     """Refuses implausible readings, and reports the likely cause.
 
-    A velocity that the device measures itself is compared with the displacement, which reveals millimetres, swapped
-    axes and a sensor that is stuck.
+    If the device measures its velocity, the velocity is compared with the displacement. Differences reveal positions in
+    millimetres, swapped axes and a stuck sensor.
 
     Args:
         config: Properties of the device.
@@ -44,18 +44,18 @@ class ReadingCheck:
         self._moved = self._claimed = ZERO
         self._suspect: ReadingError | None = None
         self.has_moved = False
-        """Whether the last reading was accepted at a new place, without continuity to the one before."""
+        """Whether the last reading was accepted although its position is not continuous with the previous reading."""
 
     def forget(self) -> None:
-        """Accepts the next reading at any place."""
+        """Drops the last reading, so that the next reading is accepted at any position."""
         self._last = None
         self._elsewhere.clear()
 
     def checked(self, reading: HapticReading, now_s: float) -> HapticReading:
-        """Returns a reading with a unit quaternion.
+        """Checks a reading, and returns the reading with a normalized quaternion.
 
         Raises:
-            ReadingError: If it is implausible.
+            ReadingError: If the reading is implausible.
         """
         self.has_moved = False
         reading = self._possible(reading)
@@ -73,7 +73,7 @@ class ReadingCheck:
         return reading
 
     def _possible(self, reading: HapticReading) -> HapticReading:
-        """Returns a reading with a unit quaternion, after checks that need no other reading."""
+        """Does the checks that do not depend on earlier readings; returns the reading with a normalized quaternion."""
         position, velocity, quat, _ = reading
         if not math.isfinite(sum(position) + sum(quat) + sum(velocity or ZERO)):
             raise ReadingError("not finite", f"position {position}, velocity {velocity}, quaternion {quat}")
@@ -121,10 +121,10 @@ class ReadingCheck:
         self._moved = self._claimed = ZERO
 
     def _compare(self, displacement: Vector, velocity: Vector | None, dt_s: float) -> None:
-        """Compares the displacement over a window with the velocity that the device measured."""
+        """Compares the displacement over a time window with the integral of the measured velocity."""
         if velocity is None or self.has_moved:
             return
-        if dt_s > GAP_S:  # its velocity in between is unknown
+        if dt_s > GAP_S:  # the velocity during the gap is unknown
             self._begin_window()
             return
         self._window_s += dt_s
@@ -144,7 +144,12 @@ class ReadingCheck:
 
 
 def _likely_fault(moved: Vector, claimed: Vector) -> str:
-    """Returns the fault that best explains the difference of displacement and velocity."""
+    """Returns the fault that best explains why the displacement differs from the integrated velocity.
+
+    Args:
+        moved: Measured displacement [m].
+        claimed: Integral of the measured velocity over the same time [m].
+    """
     moved_m, claimed_m = norm(moved), norm(claimed)
     if moved_m < 1e-9:
         return "stuck"

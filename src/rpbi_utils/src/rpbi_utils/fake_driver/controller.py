@@ -296,7 +296,7 @@ class RobotController:
         return None
 
     def _silent(self, now_s: float) -> Reflex | None:
-        """Returns a reflex if commands have stopped while the robot moves. At rest, ends the motion, without a reflex."""
+        """Returns a reflex if commands have stopped while the robot moves. If the robot is at rest, returns None."""
         if self.mode is not Mode.MOVE or now_s - self._arrivals_s[-1] <= self._config.timeout_s or self._waiting:
             return None
         shares = [abs(v) / limits.velocity for v, limits in zip(self._motion.velocity, self._limits)]
