@@ -1,4 +1,4 @@
-"""The simulator: worlds, bodies, sensors, renderer and, in `rpbi.ros`, its node."""
+"""The simulator: worlds, bodies, sensors and renderer. The ROS node is in `rpbi.ros`."""
 
 import os
 import sys
@@ -8,9 +8,9 @@ _GREETING = b"pybullet build time: "
 
 
 def _import_pybullet() -> None:
-    """Imports PyBullet without the line about its build, which its first import prints on standard error.
+    """Imports PyBullet, and suppresses the line about PyBullet's build on standard error.
 
-    All other output of the import, such as a warning of NumPy, is printed afterwards.
+    All other output of the import, such as a warning from NumPy, is printed after the import.
     """
     try:
         stderr = os.dup(2)

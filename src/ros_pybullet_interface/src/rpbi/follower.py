@@ -1,4 +1,7 @@
-"""Entry point of a process that follows a world and forks itself: `python -m rpbi.follower FD`."""
+"""Entry point of a process that keeps a copy of a world and forks it on request: `python -m rpbi.follower FD`.
+
+FD is the file descriptor of a connection to the process that runs the world.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from .world import World
 
 
 def main() -> None:
-    """Follows the world whose state is received first."""
+    """Receives the state of a world from the connection, and then follows the world."""
     connection = Connection(int(sys.argv[1]))
     state: WorldState = connection.recv()
     serve(connection, lambda: World.from_state(state, trust=None, max_ticks=state.tick))

@@ -1,7 +1,7 @@
-"""Poses and twists of the simulator, with PyBullet's arithmetic, and loads on links.
+"""Poses, twists and wrenches of the simulator, computed by PyBullet.
 
-PyBullet chains poses and turns vectors in single precision. The results of a simulation depend on it to the last bit,
-so PyBullet also chains a pose of this module with one of `robot_model.geometry`.
+PyBullet computes in another precision than Python, and the results of a simulation depend on the last bit. PyBullet
+therefore computes all products of poses in which one pose is a `Pose` of this module.
 """
 
 from __future__ import annotations
@@ -15,29 +15,33 @@ from robot_model.geometry import Quaternion, Vector
 
 
 class Pose(geometry.Pose):
-    """Pose of a frame in another, see `robot_model.geometry.Pose`."""
+    """Pose of one frame in another frame, see `robot_model.geometry.Pose`."""
 
     __slots__ = ()
 
     def __matmul__(self, other: geometry.Pose) -> Pose:
-        """Chains poses: `pose_b_in_a @ pose_c_in_b` is the pose of c in a."""
+        """Returns the product of two poses: `pose_b_in_a @ pose_c_in_b` is the pose of c in a."""
         return Pose(*pybullet.multiplyTransforms(*self, *other))
 
     def __rmatmul__(self, other: geometry.Pose) -> Pose:
         return Pose(*pybullet.multiplyTransforms(*other, *self))
 
     def inverse(self) -> Pose:
-        """Returns the pose of the other frame in this one."""
+        """Returns the inverse: for the pose of b in a, the pose of a in b."""
         return Pose(*pybullet.invertTransform(*self))
 
 
 class Twist(geometry.Twist):
-    """Velocity of a frame's origin and rotation of the frame, see `robot_model.geometry.Twist`."""
+    """Linear velocity of a frame's origin and angular velocity of the frame, see `robot_model.geometry.Twist`."""
 
     __slots__ = ()
 
     def seen_from(self, quat_xyzw: Quaternion) -> Twist:
-        """Returns the same twist in the axes of a frame of that orientation."""
+        """Returns the twist expressed in the axes of a rotated frame.
+
+        Args:
+            quat_xyzw: Orientation of the rotated frame, in the axes in which the twist is given.
+        """
         return Twist(rotated_back(quat_xyzw, self.linear), rotated_back(quat_xyzw, self.angular))
 
 
@@ -48,7 +52,7 @@ class LinkWrench(NamedTuple):
         link: PyBullet's index of the link, -1 for the base.
         force: Force [N].
         torque: Torque [N m].
-        point: Where the force acts, in the world [m].
+        point: Point of application, in the world [m].
     """
 
     link: int
@@ -58,12 +62,12 @@ class LinkWrench(NamedTuple):
 
 
 def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Returns a vector of a frame of that orientation in the axes of the frame around it."""
+    """Rotates a vector by a quaternion: from the axes of a frame with this orientation to the parent frame's axes."""
     result: Vector = pybullet.rotateVector(quat_xyzw, a)
     return result
 
 
 def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Returns a vector in the axes of a frame of that orientation."""
+    """Rotates a vector by the inverse of a quaternion: from the parent frame's axes to a rotated frame's axes."""
     x, y, z, w = quat_xyzw
     return rotated((-x, -y, -z, w), a)

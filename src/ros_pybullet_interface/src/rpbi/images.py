@@ -1,4 +1,4 @@
-"""Camera images as arrays, without ROS and without a renderer process, for scripts and notebooks."""
+"""Renders camera images as arrays in scripts and notebooks, without ROS and without a renderer process."""
 
 from __future__ import annotations
 
@@ -26,20 +26,19 @@ __all__ = ["CameraImages", "Frame", "drawing_times", "looking_at"]
 
 STREAMS = ("colour", "depth", "segmentation")
 TRIES = 3
-"""Images of each camera that are timed; the first one also loads what is drawn."""
+"""Number of timed images per camera, after one image that also loads the scene."""
 LONGEST_S = 60.0
-"""Time [s] after which images are not timed."""
+"""Longest wall time of the measurement of drawing times [s]."""
 
 
 class CameraImages:
-    """Renders the cameras of a world in the calling thread, which must always be the same.
+    """Renders the cameras of a world at its present tick, also while the world is stopped.
 
-    The renderer is opened on construction, and draws the scene of the present tick, also while the world is stopped.
+    The constructor opens the renderer. One thread must make all calls.
 
     Args:
-        world: The world, with one camera or more.
-        use_egl: Whether to draw by EGL, which is faster where there is a graphics card. A driver that fails may end the
-            process.
+        world: The world, with at least one camera.
+        use_egl: Whether to render with EGL, which is faster on a graphics card. A faulty driver may crash the process.
     """
 
     def __init__(self, world: World, use_egl: bool = False) -> None:
@@ -54,14 +53,16 @@ class CameraImages:
         return self._renderer
 
     def frame(self, camera: str = "") -> Frame:
-        """Returns the present frame of a camera, also at ticks at which the camera is not due.
+        """Applies waiting inputs of the world, and renders the present frame of a camera.
+
+        The camera's configured rate does not matter.
 
         Args:
-            camera: Its name; the first one by default.
+            camera: Name of the camera; empty for the first one.
 
         Raises:
-            UnknownNameError: If there is none of that name.
-            ValueError: If its pose is unknown.
+            UnknownNameError: If there is no camera with this name.
+            ValueError: If the camera's pose is unknown.
         """
         world = self._world
         world.apply_inputs()
@@ -80,12 +81,12 @@ class CameraImages:
         return self._mirror.frame(self._renderer, DrawnScene(sample, body_ids), known, STREAMS)
 
     def close(self) -> None:
-        """Disconnects from PyBullet and deletes the files that it made."""
+        """Closes the renderer, and deletes the files that the renderer's copy of the world needed."""
         self._mirror.close()
         self._renderer.pb.disconnect()
 
     def __enter__(self) -> CameraImages:
-        """Closes itself at the end of a `with` block."""
+        """Returns itself; the end of the `with` block calls `close`."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -93,14 +94,14 @@ class CameraImages:
 
 
 def drawing_times(world: World) -> dict[str, float]:
-    """Returns the processor time [s] that an image takes on this machine, by camera, divided among its processors.
+    """Measures how much processor time this machine needs to render an image of each camera.
 
-    It hardly depends on what else runs, and never exceeds the time that drawing takes.
-
-    A fork of this process draws, since a driver may end it. Cameras whose pose is unknown look from the origin.
+    The processor time of all threads is divided by the number of processors. The result hardly depends on other
+    programs, and never exceeds the wall time of rendering. A fork of this process renders, since a graphics driver may
+    crash. Cameras with an unknown pose are at the origin.
 
     Returns:
-        Times of all cameras; none if they cannot be measured within `LONGEST_S`.
+        Times [s], keyed by camera name; empty if they cannot be measured within `LONGEST_S`.
     """
     if not world.cameras:
         return {}

@@ -1,4 +1,4 @@
-"""Former place of `robot_model.linear_algebra`, for controllers that import it from here."""
+"""Former import path of `robot_model.linear_algebra`, kept for controllers that import it."""
 
 from robot_model.linear_algebra import inverse, solve
 

@@ -1,4 +1,4 @@
-"""Plain Python data instead of named tuples, for scripts: mappings, lists and arrays."""
+"""Converts plain Python data of scripts (mappings, lists and arrays) to named tuples."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ Tuple = TypeVar("Tuple", bound=tuple)
 
 
 def as_tuple(kind: type[Tuple], given: Any) -> Tuple:
-    """Returns a named tuple of that kind; an instance is returned as it is.
+    """Converts plain data to a named tuple of a class; returns an instance of the class unchanged.
 
     Args:
         kind: A class of named tuples.
-        given: Such a tuple, or a mapping of its fields, or a list of them; fields may be arrays.
+        given: An instance of `kind`, a mapping from field names to values, or a list of the fields' values. Values may
+            be arrays.
 
     Raises:
-        ValueError: If it is something else, or a number in it is not finite; it names the field.
+        ValueError: If `given` does not fit `kind`, or contains a non-finite number. The message names the field.
     """
     if isinstance(given, kind):
         return given
@@ -42,10 +43,10 @@ def as_tuple(kind: type[Tuple], given: Any) -> Tuple:
 
 
 def joint_values(given: Mapping[Any, Any]) -> dict[str, float]:
-    """Returns numbers by joint name.
+    """Checks a mapping from joint names to numbers, and returns the numbers as floats.
 
     Raises:
-        ValueError: If a key is no text, or a value no number.
+        ValueError: If a key is not a string, or a value is not a number.
     """
     for name, value in given.items():
         if not isinstance(name, str):

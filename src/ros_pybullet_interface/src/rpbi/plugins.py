@@ -1,4 +1,4 @@
-"""Errors that name the class of another package when it fails, and checks of its samples."""
+"""Errors in code of other packages, with the name of the failing class, and checks of sensors' samples."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -14,22 +14,22 @@ own_folders.append(str(Path(__file__).parent))
 
 
 def is_foreign(thing: Any) -> bool:
-    """Returns whether a class, a function, or the class of an object comes from another package."""
+    """Returns whether a class, a function, or an object's class comes from another package than this one."""
     return full_name(thing).split(":")[0].split(".")[0] != _OWN_PACKAGE
 
 
 def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
-    """Raises a PluginError for an error in code of another package, unless it is an InterfaceError.
+    """Raises a PluginError from an error in code of another package; returns if there is no need.
 
-    Errors of this package's own classes are bugs, and keep their traceback.
+    An InterfaceError needs no PluginError. Errors in this package's own classes are bugs, and keep their type.
 
     Args:
         thing: The class, function or object that failed.
-        doing: Its action, for the message.
-        error: The error that it raised.
+        doing: What it did, for the message, such as `compute`.
+        error: The error.
 
     Raises:
-        PluginError: In that case.
+        PluginError: If `thing` is from another package, and `error` is not an InterfaceError.
     """
     if is_foreign(thing) and not isinstance(error, InterfaceError):
         raise PluginError(full_name(thing), doing, cause_of(error)) from error
@@ -37,7 +37,7 @@ def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
 
 @contextmanager
 def plugin_errors(thing: Any, doing: str) -> Iterator[None]:
-    """Passes all errors of its block to `raise_plugin_error`."""
+    """Converts errors in a `with` block as `raise_plugin_error` does; other errors are raised unchanged."""
     try:
         yield
     except Exception as error:
@@ -48,9 +48,14 @@ def plugin_errors(thing: Any, doing: str) -> Iterator[None]:
 def check_sample(sample: Any, sample_type: Any, name: str) -> None:
     """Checks a sample of a sensor.
 
+    Args:
+        sample: The sample.
+        sample_type: Expected class of the sample.
+        name: Expected name in the sample: that of the sensor.
+
     Raises:
-        TypeError: If it has another type.
-        ValueError: If it has another name, or a number in it is not finite.
+        TypeError: If the sample has another class.
+        ValueError: If the sample has another name, or contains a non-finite number.
     """
     if type(sample) is not sample_type:
         raise TypeError(f"expected a {sample_type.__qualname__}, as sample_type says; got {sample!r}")

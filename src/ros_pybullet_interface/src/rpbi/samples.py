@@ -1,4 +1,4 @@
-"""Samples of sensors: immutable values, all SI units, poses in `rpbi/world` unless noted otherwise."""
+"""Samples of sensors: immutable values in SI units. Poses are in `rpbi/world` unless noted otherwise."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .geometry import Pose, Twist
 
 
 class JointStateSample(NamedTuple):
-    """State of all joints of a robot, fixed ones included, in PyBullet's index order.
+    """State of all joints of a robot, including fixed joints, in PyBullet's index order.
 
     Attributes:
-        name: The robot.
-        joint_names: n names.
+        name: Name of the robot.
+        joint_names: n joint names.
         position: n positions [rad or m].
         velocity: n velocities [rad/s or m/s].
         effort: n torques or forces [N m or N] that the motors applied in the last tick.
@@ -33,9 +33,9 @@ class LinkPoseSample(NamedTuple):
     """Poses of a body's links in the world.
 
     Attributes:
-        name: The body.
-        frames: n TF frame ids (`rpbi/NAME` or `rpbi/NAME/LINK`).
-        poses: n poses of the links' URDF frames, not of their centres of mass.
+        name: Name of the body.
+        frames: n TF frame ids of the links (`rpbi/NAME` or `rpbi/NAME/LINK`).
+        poses: n poses of the links' URDF frames, not of the links' centres of mass.
     """
 
     name: str
@@ -47,10 +47,10 @@ class BaseStateSample(NamedTuple):
     """Pose and velocity of the base of a robot.
 
     Attributes:
-        name: The robot.
-        frame: TF frame id of its root link.
+        name: Name of the robot.
+        frame: TF frame id of the root link.
         pose: Pose of the root link's URDF frame in the world.
-        twist: Velocity of that frame's origin [m/s] and its rotation [rad/s], in the axes of that frame.
+        twist: Linear [m/s] and angular velocity [rad/s] of the root link's URDF frame, in the frame's own axes.
     """
 
     name: str
@@ -60,13 +60,13 @@ class BaseStateSample(NamedTuple):
 
 
 class BodyState(NamedTuple):
-    """State of a body, as a mirror of the world needs it.
+    """State of a body, from which a copy of the world can place the body.
 
     Attributes:
-        name: The body.
-        base: Position [m] and quaternion xyzw of the base's inertial frame, as in PyBullet.
-        joints: Positions of all joints [rad or m] in index order, of a ball joint its rotation as x, y, z, w.
-        nodes: Positions of the simulated corners of a soft body [m]; rigid bodies have none.
+        name: Name of the body.
+        base: Position [m] and quaternion x, y, z, w of the base's inertial frame, as in PyBullet.
+        joints: Positions of all joints [rad or m] in index order; for a ball joint a quaternion x, y, z, w.
+        nodes: Positions of the simulated corners of a soft body [m]; empty for a rigid body.
     """
 
     name: str
@@ -76,14 +76,14 @@ class BodyState(NamedTuple):
 
 
 class SceneSample(NamedTuple):
-    """The scene of a camera, for the renderer.
+    """The scene that the renderer draws for a camera.
 
     Attributes:
-        name: The camera.
-        tick: The tick shown.
-        stamp_ns: Its stamp [ns].
-        camera: Pose of the optical frame (x right, y down, z forward), None as long as it is unknown.
-        bodies: State of every body.
+        name: Name of the camera.
+        tick: Tick of the scene.
+        stamp_ns: Stamp of the tick [ns].
+        camera: Pose of the camera's optical frame (x right, y down, z forward); None if unknown.
+        bodies: State of every body in the world.
     """
 
     name: str
@@ -98,9 +98,9 @@ class WrenchSample(NamedTuple):
 
     Attributes:
         name: `ROBOT/JOINT`.
-        frame_id: Frame of the joint's child link, in whose axes the vectors are.
+        frame_id: TF frame of the joint's child link. Force and torque are in the axes of this frame.
         force: Force [N].
-        torque: Moment about the origin of that frame, which is the joint's [N m].
+        torque: Moment about the origin of the frame [N m], where the joint is.
     """
 
     name: str
@@ -110,20 +110,20 @@ class WrenchSample(NamedTuple):
 
 
 class ContactPoint(NamedTuple):
-    """A point where a body touches another, or one of its links another one.
+    """A contact point of a body with another body, or between two links of the body.
 
-    Forces are those on the body, as mean over the last tick, or with `average` over all ticks since the last sample.
+    Forces act on the body. They are means over the last tick, or with `average` over all ticks since the last sample.
 
     Attributes:
-        link: The body's link.
-        other_body: The body that it touches; the body itself if two of its links touch.
+        link: Link of the body.
+        other_body: Name of the other body; name of the body itself if two of its links touch.
         other_link: Link of the other body.
-        position: Position on the surface of the body [m].
-        normal: Unit vector of the contact, from the other one towards the body.
-        depth: Penetration [m]; negative where force bridges a gap.
+        position: Position of the contact on the surface of the body [m].
+        normal: Contact normal, a unit vector from the other body towards the body.
+        depth: Penetration depth [m]; negative if a contact force acts across a gap.
         normal_force: Force along the normal [N], not negative.
-        friction_directions: Two unit vectors across the normal.
-        friction_forces: Forces along these two [N].
+        friction_directions: Two unit vectors perpendicular to the normal.
+        friction_forces: Forces along the two friction directions [N].
     """
 
     link: str
@@ -138,7 +138,7 @@ class ContactPoint(NamedTuple):
 
     @property
     def force(self) -> Vector:
-        """The whole force on the body [N]."""
+        """Total force of the contact on the body [N]: normal force plus friction."""
         first, second = map(scaled, self.friction_forces, self.friction_directions)
         return plus(scaled(self.normal_force, self.normal), plus(first, second))
 
@@ -146,8 +146,9 @@ class ContactPoint(NamedTuple):
 class ContactsSample:
     """Contact points of a body.
 
-    Attributes:
-        name: The body.
+    Args:
+        name: Name of the body.
+        points: Function that computes the contact points.
     """
 
     not_in_keyframes = ("_points",)
@@ -158,11 +159,11 @@ class ContactsSample:
 
     @cached_property
     def points(self) -> tuple[ContactPoint, ...]:
-        """All contact points; computed on first use, since many are never used."""
+        """All contact points, computed at first use, since most samples are never used."""
         return self._points()
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are of the same body and have the same points."""
+        """Returns whether both samples have the same body and the same points."""
         return isinstance(other, ContactsSample) and (self.name, self.points) == (other.name, other.points)
 
     def __hash__(self) -> int:
@@ -177,7 +178,7 @@ class ContactsSample:
 
     @property
     def force(self) -> Vector:
-        """Sum of the forces of others on the body [N]."""
+        """Sum of the contact forces of other bodies on the body [N]."""
         total = (0.0, 0.0, 0.0)
         for point in self.points:
             if point.other_body != self.name:
@@ -190,11 +191,11 @@ def _contacts_of(name: str, points: tuple[ContactPoint, ...]) -> ContactsSample:
 
 
 class ContactArrowsSample(NamedTuple):
-    """Forces on a body as arrows.
+    """Contact forces on a body as arrows for RViz.
 
     Attributes:
-        name: The body.
-        arrows: Start and end of each [m].
+        name: Name of the body.
+        arrows: Start point and end point of each arrow [m].
     """
 
     name: str
@@ -205,9 +206,9 @@ class SurfaceSample(NamedTuple):
     """The surface of a soft body.
 
     Attributes:
-        name: The body.
-        corners: Corners of its triangles, three for each [m].
-        rgba: Its colour and opacity, each from 0 to 1.
+        name: Name of the body.
+        corners: Corners of the surface's triangles [m]; three consecutive corners are one triangle.
+        rgba: Colour and opacity of the surface, each from 0 to 1.
     """
 
     name: str
@@ -216,12 +217,12 @@ class SurfaceSample(NamedTuple):
 
 
 class ViconSample(NamedTuple):
-    """A body as reported by Vicon.
+    """Pose of a body as Vicon, a motion capture system, reports it.
 
     Attributes:
-        name: `BODY/SENSOR`, which are Vicon's subject and segment.
-        frame: TF frame that is reported.
-        pose: Its pose in the world.
+        name: `BODY/SENSOR`. BODY is Vicon's subject, SENSOR is Vicon's segment.
+        frame: TF frame of the reported pose.
+        pose: Pose of the frame in the world.
         age_ns: Age of the pose [ns].
     """
 
@@ -235,9 +236,10 @@ class SeenTag(NamedTuple):
     """An AprilTag that a camera sees.
 
     Attributes:
-        id: Its number.
-        size: Side of its black square [m].
-        pose: Its pose in the camera's optical frame; x to the right, y up, z out of the tag.
+        id: Number of the tag.
+        size: Edge length of the tag's black square [m].
+        pose: Pose of the tag in the camera's optical frame. The tag's x axis points to the right, y up, z out of the
+            tag.
     """
 
     id: int
@@ -249,9 +251,9 @@ class AprilTagsSample(NamedTuple):
     """The AprilTags that a camera sees.
 
     Attributes:
-        name: The sensor.
-        frame: TF frame of the camera, an optical one.
-        tags: Those that are seen.
+        name: Name of the sensor.
+        frame: TF frame of the camera, an optical frame.
+        tags: The tags.
         age_ns: Age of the detections [ns].
     """
 

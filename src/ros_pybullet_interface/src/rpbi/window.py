@@ -1,4 +1,4 @@
-"""PyBullet's own window: keys, mouse, camera, image."""
+"""PyBullet's own window: key events, mouse events, camera and image."""
 
 import shutil
 import time
@@ -14,16 +14,16 @@ from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
 from rpbi.engine.client import Client
 
 RECORD = "--mp4="
-"""Beginning of the option of `connect` that records the window."""
+"""Prefix of the option of `connect` that records a video of the window."""
 MEASURED_CALLS = 10
 
 
 class WindowKeyEvent(NamedTuple):
-    """Event of a key.
+    """Event of a key in the window.
 
     Attributes:
-        key: ASCII code, or PyBullet's code of a key without one.
-        state: Sum of pybullet.KEY_IS_DOWN, KEY_WAS_TRIGGERED and KEY_WAS_RELEASED.
+        key: ASCII code of the key, or PyBullet's code if the key has no ASCII code.
+        state: Sum of pybullet.KEY_IS_DOWN, KEY_WAS_TRIGGERED and KEY_WAS_RELEASED, as far as they apply.
     """
 
     key: int
@@ -31,14 +31,14 @@ class WindowKeyEvent(NamedTuple):
 
 
 class MouseEvent(NamedTuple):
-    """Event of the mouse.
+    """Event of the mouse in the window.
 
     Attributes:
-        kind: 1 it moved, 2 a button changed.
-        x: From the left edge of the window [px].
-        y: From its top edge [px].
-        button: 0 left, 1 middle, 2 right; -1 on a move.
-        state: State of the button, as for a key.
+        kind: 1 if the mouse moved, 2 if a button changed.
+        x: Distance of the pointer from the left edge of the window [px].
+        y: Distance of the pointer from the top edge of the window [px].
+        button: 0 for left, 1 for middle, 2 for right; -1 if the mouse moved.
+        state: State of the button, as in `WindowKeyEvent`; 0 if the mouse moved.
     """
 
     kind: int
@@ -49,7 +49,9 @@ class MouseEvent(NamedTuple):
 
 
 class Window:
-    """The window of a client, if it has one; only the simulation thread may use it.
+    """Reads events and images of a client's window, and controls its camera.
+
+    Only the simulation thread may make calls.
 
     Args:
         pb: The client.
@@ -60,18 +62,21 @@ class Window:
         self._keys, self._buttons = ButtonHistory(), ButtonHistory()
 
     def disable_shortcuts(self) -> None:
-        """Disables the keys of the window itself, such as `i`, which pauses it; Escape still closes it."""
+        """Disables the keyboard shortcuts of the window, such as `i` to pause it. Escape still closes the window."""
         self._pb.configureDebugVisualizer(pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS, 0)
 
     def key_events(self) -> Iterator[WindowKeyEvent]:
-        """Yields key events since the last call, and one for each key that is held; a call takes half a microsecond."""
+        """Yields key events since the last call, and one event for each key that is held.
+
+        A call takes half a microsecond.
+        """
         for key, state in self._pb.getKeyboardEvents().items():
             if key >= 0:  # PyBullet reports all keys without a code as -1
                 for happened in self._keys.observe(key, state):
                     yield WindowKeyEvent(key, happened)
 
     def mouse_events(self) -> Iterator[MouseEvent]:
-        """Yields events of the mouse since the last call."""
+        """Yields mouse events since the last call, and one event for each button that is held."""
         for kind, x, y, button, state in self._pb.getMouseEvents():
             if button < 0:
                 yield MouseEvent(kind, x, y, button, 0)
@@ -80,7 +85,7 @@ class Window:
                     yield MouseEvent(kind, x, y, button, happened)
 
     def camera(self) -> ResetDebugVisualizerCamera:
-        """Returns the present view of the window, which the mouse may have changed."""
+        """Returns the present camera of the window, which the user may have moved with the mouse."""
         found = self._pb.getDebugVisualizerCamera()
         yaw, pitch, distance, target = found[8:12]
         return ResetDebugVisualizerCamera.model_construct(
@@ -88,23 +93,25 @@ class Window:
         )
 
     def look(self, camera: ResetDebugVisualizerCamera) -> None:
-        """Sets the view of the window."""
+        """Sets the camera of the window."""
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
 
     def seconds_per_call(self) -> float:
-        """Returns the present duration of a call of PyBullet, answered between two frames of the window [s]."""
+        """Measures the mean duration of a call of PyBullet [s]. PyBullet answers calls between frames of the window."""
         begin_s = time.monotonic()
         for _ in range(MEASURED_CALLS):
             self._pb.getPhysicsEngineParameters()
         return (time.monotonic() - begin_s) / MEASURED_CALLS
 
     def image(self, width_px: int, height_px: int) -> npt.NDArray[np.uint8]:
-        """Returns the view of the window, drawn again in another size with the same vertical opening.
+        """Renders the window's view as an image with the same vertical field of view; the world does not advance.
 
-        The world does not advance meanwhile.
+        Args:
+            width_px: Width of the image [px].
+            height_px: Height of the image [px].
 
         Returns:
-            Colours red, green, blue, alpha; shape (height, width, 4).
+            Red, green, blue and alpha, shape (height, width, 4).
         """
         found = self._pb.getDebugVisualizerCamera()
         projection = list(found[3])
@@ -123,13 +130,13 @@ class Window:
 
 
 def check_recording(options: str) -> None:
-    """Checks that a requested video of the window can be recorded.
+    """Checks that a video of the window can be recorded, if the options request one.
 
     Args:
         options: The options of `connect`.
 
     Raises:
-        MissingDependency: If ffmpeg is missing, which PyBullet does not report.
+        MissingDependency: If ffmpeg is missing. PyBullet would not report this.
     """
     if RECORD in options and shutil.which("ffmpeg") is None:
         raise MissingDependency("ffmpeg", f"connect.options {RECORD} needs it: apt-get install ffmpeg")
@@ -142,24 +149,25 @@ PRESSED = DOWN | TRIGGERED
 
 
 class ButtonHistory:
-    """Splits PyBullet's state of a button, which may hold both a press and a release.
+    """Reconstructs the presses and releases of keys or mouse buttons from PyBullet's reports.
 
-    PyBullet reports only the last event between two frames of the window: a short tap as a release, a release and a new
-    press as a press. The previous state separates them: presses and releases always alternate.
+    PyBullet reports only the last event between two frames of the window. A short tap is reported as a release only; a
+    release followed by a press is reported as a press only. Since presses and releases alternate, the previous state of
+    the button shows which events are missing.
     """
 
     def __init__(self) -> None:
         self._held: set[int] = set()
 
     def observe(self, button: int, state: int) -> list[int]:
-        """Returns the events of a button since the last call, in order.
+        """Returns the events of a button since the last call, in order of time.
 
         Args:
-            button: Its code.
-            state: Sum of DOWN, TRIGGERED and RELEASED.
+            button: Code of the key or mouse button.
+            state: State that PyBullet reports: a sum of DOWN, TRIGGERED and RELEASED.
 
         Returns:
-            PRESSED, DOWN (held) or RELEASED each.
+            Events, each PRESSED, RELEASED, or DOWN if the button is still held.
         """
         was_held, is_held = button in self._held, bool(state & DOWN)
         (self._held.add if is_held else self._held.discard)(button)

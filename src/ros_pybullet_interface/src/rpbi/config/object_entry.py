@@ -1,4 +1,4 @@
-"""Entries of the main file's lists: files of objects, and instances of one file that differ in some keys."""
+"""Entries of the main YAML file's lists of objects: an object's file, and keys that override the file."""
 
 import copy
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ FILE = "file"
 
 
 class ObjectEntry(NamedTuple):
-    """One object: its file, and what is different for it.
+    """The file of an object, and overrides of the file's keys.
 
     Attributes:
-        file: The file as the user wrote it.
-        overrides: Keys and values that replace those of the file; mappings are merged key by key, and null removes a
+        file: Name of the file, as in YAML.
+        overrides: Values that replace those of the file, by key. Mappings are merged key by key, and null removes a
             key.
     """
 
@@ -25,15 +25,22 @@ class ObjectEntry(NamedTuple):
     overrides: Mapping[str, Any]
 
     def apply_overrides(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns the file's content with the overrides applied; neither is altered."""
+        """Returns a copy of a file's content with the overrides applied.
+
+        Args:
+            data: Content of the file.
+        """
         return _merged(data, self.overrides)
 
 
 def parse_object_entry(entry: Any) -> ObjectEntry:
-    """Reads one entry of a list of objects: a file name, or a mapping with `file` and the keys that differ.
+    """Parses one entry of a list of objects.
+
+    Args:
+        entry: A file name, or a mapping with the key `file` and the keys to override.
 
     Raises:
-        ValueError: If it is neither.
+        ValueError: If the entry is neither.
     """
     file = entry.get(FILE) if isinstance(entry, Mapping) else entry
     if not isinstance(file, str) or not file:
@@ -68,4 +75,4 @@ FileOrOverrides = Annotated[
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object", "required": [FILE]}]}),
     Expects(FILES),  # error text for the list; the validator reports errors of entries
 ]
-"""A file of an object, or `{file: FILE, KEY: VALUE, ...}`."""
+"""An entry of a list of objects: a file name, or `{file: FILE, KEY: VALUE, ...}`."""

@@ -1,4 +1,4 @@
-"""PyBullet's constants by name, as in YAML files."""
+"""Parses PyBullet's constants from names or numbers in YAML."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,14 +16,14 @@ from custom_ros_tools.schema.type_names import shown, type_name
 
 @dataclass(frozen=True)
 class Constants:
-    """A family of PyBullet constants that exclude each other, such as the shape types.
+    """A family of PyBullet constants of which one is chosen, such as the shape types.
 
-    `Annotated[int, SHAPE_TYPES]` makes a field that accepts a name or its number and holds the number.
+    A field of type `Annotated[int, SHAPE_TYPES]` accepts the name or the number of a constant, and holds the number.
 
     Attributes:
-        kind: Their kind, for messages.
-        names: Their names in PyBullet.
-        own: Numbers of names that PyBullet does not have.
+        kind: Noun for one constant of the family, for messages.
+        names: Names of the constants.
+        own: Numbers of constants that PyBullet does not define, keyed by name.
     """
 
     kind: str
@@ -31,10 +31,10 @@ class Constants:
     own: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def parse(self, given: Any) -> int:
-        """Returns the number of one constant from its name or number.
+        """Returns the number of a constant that is given by name or number.
 
         Raises:
-            ValueError: If it is not of this family.
+            ValueError: If the name or number does not belong to the family.
         """
         if isinstance(given, str):
             return self._named(given.strip())
@@ -54,7 +54,7 @@ class Constants:
         return self.schema()
 
     def schema(self) -> dict[str, Any]:
-        """Returns the JSON Schema of accepted values."""
+        """Returns the JSON Schema of the accepted values."""
         return {"kind": self.kind, "enum": [*self.names, *sorted(set(map(self._named, self.names)))]}
 
     def one_or_several_schema(self) -> dict[str, Any]:
@@ -65,13 +65,16 @@ class Constants:
 
 @dataclass(frozen=True)
 class Flags(Constants):
-    """A family of PyBullet constants that are bits: `A|B`, a list of names and numbers, or one number."""
+    """A family of PyBullet constants that are bits and can be combined."""
 
     def parse(self, given: Any) -> int:
-        """Returns the numbers of all constants, or-ed, of `"A|B"`, a number, or a list of both.
+        """Combines constants with bitwise or, and returns the number.
+
+        Args:
+            given: Names as `"A|B"`, a number, or a list of names and numbers.
 
         Raises:
-            ValueError: If one of them is not of this family.
+            ValueError: If a name does not belong to the family, or a number is negative or 2^31 or larger.
         """
         if isinstance(given, str):
             return _union(self._named(name.strip()) for name in given.split("|"))
@@ -110,7 +113,7 @@ SHAPE_TYPES = Constants(
     ),
 )
 IMPEDANCE_CONTROL = 100
-"""Joints are held by springs and dampers; a control mode that PyBullet does not have."""
+"""Control mode in which springs and dampers hold the joints; PyBullet does not have this mode."""
 CONTROL_MODES = Constants(
     "control mode",
     ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"),

@@ -1,7 +1,7 @@
-"""Arguments of PyBullet's functions for bodies, soft ones included, as YAML keys; each model is named after a function.
+"""YAML keys for the arguments of PyBullet's functions for bodies, including soft bodies.
 
-The fields are the function's keyword arguments, less those that name the body. A test checks that PyBullet accepts each
-of them, with values of that type.
+Each model is named after a PyBullet function. Its fields are the function's keyword arguments, without those that
+identify the body. A test checks that PyBullet accepts each field with values of the field's type.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ Gains = Annotated[
     AlsoTakes({"type": "number", "minimum": 0}),
     Expects("a number, a list of numbers or a mapping of joints to numbers"),
 ]
-"""One gain for all joints, one for each, or some by joint."""
+"""Gains of joints: one gain for all joints, a list with one gain per joint, or a mapping from joint names to gains."""
 Stiffness = Annotated[NonNegative, Unit("N/m")]
 Pressure = Annotated[NonNegative, Unit("Pa")]
 
@@ -70,12 +70,12 @@ class PybulletModel(ConfigModel):
     """Keyword arguments of one PyBullet function."""
 
     def kwargs(self) -> dict[str, Any]:
-        """Returns the arguments that the user wrote, with constants as numbers."""
+        """Returns the keyword arguments that YAML sets, with constants as numbers."""
         return self.model_dump(exclude_unset=True, exclude_none=True)
 
 
 class LoadURDF(PybulletModel):
-    """Where a robot description is and how it is put into the world."""
+    """File of a robot description, and its placement in the world."""
 
     fileName: RobotFile = Field(description="URDF file, or the word `robot_description` for the parameter.")
     basePosition: Position | None = optional("Position of the base in the world.")
@@ -227,7 +227,7 @@ class ObjectTf(ConfigModel):
 
 
 class LoadSoftBody(PybulletModel):
-    """A soft body: its mesh, where it is put, and what it is made of."""
+    """A soft body: mesh, placement and material."""
 
     fileName: ExistingFile = Field(description="Mesh: tetrahedra (.vtk) or a surface (.obj).")
     simFileName: ExistingFile | None = optional("Mesh to simulate (.vtk) where `fileName` is only what it looks like.")
@@ -255,18 +255,18 @@ class LoadSoftBody(PybulletModel):
 
 
 class ChangeVisualShape(PybulletModel):
-    """Another colour."""
+    """Colours that replace those of the file."""
 
     rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
     specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")
 
 
 class CreateSoftBodyAnchor(PybulletModel):
-    """A corner that is attached to the world or to a link, at the distance that they have at the start.
+    """A corner of a soft body that is tied to the world or to a link, at the distance between both at the start.
 
-    YAML has a list of the function's arguments: `[node, body, link, position]`, of which all but the first may be left
-    out. `body` is a name, or -1 for the world; `link` a name, or an index where -1 is the base. A leading id of the
-    soft body itself, as in PyBullet, is accepted and ignored.
+    In YAML, this is a list of the function's arguments, `[node, body, link, position]`. All arguments but `node` are
+    optional. `body` is a name, or -1 for the world. `link` is a name or an index, where -1 is the base. A leading id of
+    the soft body itself, as in PyBullet, is accepted and ignored.
     """
 
     node: Count = Field(description="Number of the corner in the simulated mesh.")
@@ -302,7 +302,7 @@ AnchorEntry = Annotated[
 
 
 def _has_own_id(arguments: list[Any]) -> bool:
-    """Returns whether PyBullet's first argument, the id of the soft body itself, is in the list."""
+    """Returns whether a list of arguments begins with the id of the soft body itself, as in PyBullet."""
     texts = [index for index, each in enumerate(arguments) if isinstance(each, str)]
     if texts:
         return texts[0] == 2

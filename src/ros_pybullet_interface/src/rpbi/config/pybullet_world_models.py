@@ -1,4 +1,4 @@
-"""Arguments of PyBullet's functions for the world, as YAML keys; each model is named after a function."""
+"""YAML keys for the arguments of PyBullet's functions for the world; each model is named after a function."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Connect(PybulletModel):
         return self
 
     def kwargs(self) -> dict[str, Any]:
-        """Returns the arguments that the user wrote, and `connection_mode` in any case."""
+        """Returns the keyword arguments that YAML sets, and `connection_mode` in any case."""
         return {"connection_mode": self.connection_mode, **super().kwargs()}
 
 
@@ -70,7 +70,7 @@ class SetGravity(PybulletModel):
     gravZ: Acceleration = Field(0.0, description="Acceleration along z, -9.81 on Earth.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Returns all three, as PyBullet wants them."""
+        """Returns all three keyword arguments, which PyBullet requires."""
         return self.model_dump()
 
 
@@ -110,11 +110,11 @@ class SetPhysicsEngineParameter(PybulletModel):
 
 
 PhysicsChange = SetGravity | SetPhysicsEngineParameter
-"""Changes of a world's physics while it runs."""
+"""Settings of the physics that can change while a world runs."""
 
 
 def _as_list(given: Any) -> Any:
-    """Splits `A|B`; anything that is no list is a list of one."""
+    """Converts one flag, or flags as `A|B`, to a list; returns a list unchanged."""
     if isinstance(given, str):
         return given.split("|")
     return given if isinstance(given, (list, tuple)) else [given]
@@ -143,13 +143,13 @@ class ConfigureDebugVisualizer(PybulletModel):
     rgbBackground: Rgb | None = optional("Colour of the background, each from 0 to 1.")
 
     def calls(self) -> list[dict[str, Any]]:
-        """Returns the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
+        """Returns keyword arguments of one call per flag, since PyBullet accepts only one flag in a call."""
         others = {"enable": self.enable, **self.kwargs()}
         return [{**others, "flag": flag} for flag in self.flag]
 
 
 class ResetDebugVisualizerCamera(PybulletModel):
-    """Where PyBullet's window looks from."""
+    """Camera of PyBullet's window."""
 
     cameraDistance: PositiveMetres = Field(1.0, description="Distance from the target.")
     cameraYaw: Degrees = Field(0.0, description="Angle about the vertical.")
@@ -157,5 +157,5 @@ class ResetDebugVisualizerCamera(PybulletModel):
     cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="Point that it looks at.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Returns all four, as PyBullet wants them."""
+        """Returns all four keyword arguments, which PyBullet requires."""
         return self.model_dump()

@@ -1,4 +1,4 @@
-"""Keys of sensors in YAML."""
+"""YAML keys of sensors."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .pybullet_models import ObjectTf
 
 
 class SensorConfig(ConfigModel):
-    """An entry of a body's `sensors`; a sensor with more keys has a subclass of this as its `Config`."""
+    """Keys that every entry of a body's `sensors` has; a sensor adds its own keys in a subclass."""
 
-    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # those of subclasses
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # subclasses have further keys
 
     type: Text = Field(description="Its class, as `module:Class`.")
     name: Name = Field(description="Its name, by which its body has no other sensor; topics are named after it.")
@@ -62,7 +62,7 @@ Deviation = Annotated[
     BeforeValidator(_one_for_each_axis),
     AlsoTakes({"type": "number", "minimum": 0}),
 ]
-"""A standard deviation: one number, or one of each axis."""
+"""Standard deviations along x, y and z: three numbers, or one number for all axes."""
 
 
 class ForceTorqueConfig(ConfigModel):
@@ -93,11 +93,11 @@ def _from_name(given: Any) -> Any:
 ForceTorqueEntry = Annotated[
     ForceTorqueConfig, BeforeValidator(_from_name), AlsoTakes({"type": "string", "minLength": 1})
 ]
-"""A sensor with all of its keys, or only the name of its joint."""
+"""A sensor as a mapping with its keys, or only the name of the sensor's joint."""
 
 
 FIRST_TOPIC_NAME = "camera"
-"""Name of the first camera in topics, whatever its own."""
+"""Name of the first camera in topics, independent of its configured name."""
 
 ImageSide = Annotated[int, Field(gt=0, le=8192, json_schema_extra={"unit": "px"})]
 

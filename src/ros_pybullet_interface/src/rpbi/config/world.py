@@ -1,4 +1,4 @@
-"""Keys of the main YAML file."""
+"""YAML keys of the main file."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ def _as_list(given: Any) -> Any:
 
 LONGEST_STEP_S = 10.0
 MIN_REAL_TIME_FACTOR = 1e-3
-"""Smallest factor: below it, motions would last for hours, and services that wait for them seem to hang."""
+"""Smallest real-time factor. With a smaller one, motions would last for hours and services would seem to hang."""
 
 
 def checked_real_time_factor(factor: float) -> float:
-    """Returns a factor of real time.
+    """Checks a real-time factor, and returns it.
 
     Raises:
-        ValueError: If it is neither 0 (as fast as possible) nor a finite number of at least MIN_REAL_TIME_FACTOR.
+        ValueError: If the factor is neither 0 (as fast as possible) nor a finite number from MIN_REAL_TIME_FACTOR on.
     """
     if factor == 0.0 or MIN_REAL_TIME_FACTOR <= factor < math.inf:
         return factor
@@ -87,7 +87,7 @@ Folders = Annotated[
 
 
 WORLD_FRAME = "rpbi/world"
-"""The TF frame that all poses are in."""
+"""The TF frame in which all poses are given."""
 
 
 class StaticFrame(ConfigModel):
@@ -111,7 +111,7 @@ class StaticFrame(ConfigModel):
 
     @property
     def pose(self) -> Pose:
-        """Its pose in the parent."""
+        """Pose of the frame in its parent frame."""
         x, y, z, w = quat_of(self.rpy).tolist() if self.rpy else self.orientation or (0.0, 0.0, 0.0, 1.0)
         return Pose(self.position, (x, y, z, w))
 
@@ -123,14 +123,14 @@ class ControlsConfig(ConfigModel):
 
 
 class AttachmentPose(ConfigModel):
-    """Where an attachment is on a link, in the link's URDF frame."""
+    """Pose of an attachment on a link, in the link's URDF frame."""
 
     position: Position = Field((0.0, 0.0, 0.0), description="Its position.")
     orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation, x, y, z, w.")
 
     @property
     def pose(self) -> Pose:
-        """The same as a pose."""
+        """The position and orientation as a `Pose`."""
         return Pose(self.position, self.orientation)
 
 
@@ -151,7 +151,7 @@ class AttachmentConfig(ConfigModel):
 
 
 class WorldConfig(ConfigModel):
-    """The main YAML file, but for the lists of files of objects, see `main_file_model`; here they are ignored."""
+    """Keys of the main YAML file, without its lists of object files, which `main_file_model` adds."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -235,7 +235,7 @@ class WorldConfig(ConfigModel):
         return self
 
     def pose_of(self, frame: str) -> Pose | None:
-        """Returns the pose of a TF frame in the world from `poses`; None if it is not there."""
+        """Returns the pose of a TF frame in the world, computed from `poses`; None if `poses` lacks a frame."""
         poses = {each.tf_id: each for each in self.poses}
         pose = Pose()
         while (frame := self.without_prefix(frame)) != WORLD_FRAME:
@@ -246,18 +246,22 @@ class WorldConfig(ConfigModel):
         return pose
 
     def without_prefix(self, frame: str) -> str:
-        """Returns the name of a TF frame without `tf_prefix`, if it has it."""
+        """Returns the name of a TF frame without a leading `tf_prefix`."""
         return frame if self.tf_prefix is None else frame.removeprefix(f"{self.tf_prefix}/")
 
     @classmethod
     def from_main_file(cls, content: WorldConfig) -> WorldConfig:
-        """Returns the keys of a validated main file, without its lists."""
+        """Returns the configuration of a validated main file, without the file's lists of objects."""
         values = {key: getattr(content, key) for key in cls.model_fields}
         return cls.model_construct(content.model_fields_set & cls.model_fields.keys(), **values)
 
 
 def main_file_model(sections: Mapping[str, type[ConfigModel]]) -> type[WorldConfig]:
-    """Returns the model of a main file with these lists of files; it refuses unknown keys."""
+    """Returns the model of a main file with lists of object files; the model refuses unknown keys.
+
+    Args:
+        sections: Model of the files in each list, keyed by the list's name.
+    """
     return _main_file_model(tuple(sections.items()))
 
 

@@ -1,7 +1,7 @@
-"""Entry point of the process in which meshes are tried: `python -m rpbi.meshes FD USE FILE ...`.
+"""Loads meshes in a process of its own: `python -m rpbi.meshes FD USE FILE ...`.
 
-It writes a line to the file descriptor for each mesh: empty, or PyBullet's reason to refuse it. A broken mesh may crash
-this process instead of the caller's.
+The process writes one line per mesh to the file descriptor FD. The line is empty, or holds the reason why PyBullet
+cannot load the mesh. A broken mesh may crash this process, but not the caller's.
 """
 
 import ctypes
@@ -22,11 +22,11 @@ from .checks import check_obj
 from .trial import MAX_CPU_S, Use, limit_resources
 
 FOUND_NOTHING = b"cannot extract anything useful"
-"""Output of PyBullet for a mesh that it leaves out; for a visual one there is no other sign."""
+"""What PyBullet prints when it leaves a mesh out. For a visual mesh there is no other sign."""
 
 
 def main() -> None:
-    """Tries all meshes that the arguments name."""
+    """Loads all meshes that the command line names, and reports the result for each one."""
     limit_resources(MAX_CPU_S)
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()
@@ -46,9 +46,9 @@ def main() -> None:
 
 
 def _check_numbers(file: str) -> None:
-    """Refuses an STL file with non-finite numbers, and an invalid OBJ file.
+    """Refuses STL files with non-finite numbers, and invalid OBJ files, by raising pybullet.error.
 
-    PyBullet crashes with these only sometimes, so a trial may not show it.
+    Such files crash PyBullet only sometimes, so loading a file is not a sufficient test.
     """
     if file.lower().endswith(".obj"):
         try:
@@ -62,7 +62,12 @@ def _check_numbers(file: str) -> None:
 
 
 def _has_printed(said: IO[bytes], words: bytes) -> bool:
-    """Returns whether PyBullet, which prints by C, has printed something since the last call."""
+    """Returns whether PyBullet's C code has printed certain words since the last call.
+
+    Args:
+        said: File that receives standard output.
+        words: The words.
+    """
     ctypes.CDLL(None).fflush(None)
     found = words in os.pread(said.fileno(), 1 << 20, 0)
     os.ftruncate(said.fileno(), 0)

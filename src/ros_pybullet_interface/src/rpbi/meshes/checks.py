@@ -1,4 +1,4 @@
-"""Errors in meshes that PyBullet would load without a message."""
+"""Checks for errors in meshes that PyBullet does not report."""
 
 import math
 import os
@@ -13,7 +13,7 @@ SOFT_MESH_FORMATS = (".obj", ".vtk")
 
 
 def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
-    """Returns key and message of each fault in the mesh of a shape."""
+    """Returns a key of YAML and a message for each error in the mesh of a shape."""
     problems = []
     if shape.fileName is not None and (problem := mesh_file_problem(shape.fileName)):
         problems.append(("fileName", f"{problem}: {shape.fileName}"))
@@ -27,17 +27,23 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
 
 
 def mesh_file_problem(path: str) -> str:
-    """Returns the fault of a mesh file that PyBullet would omit without a message; empty if none is found."""
+    """Returns a description of the error in a mesh file that PyBullet would omit without a message.
+
+    Returns an empty string if no error is found.
+    """
     if path.lower().endswith(".stl") and not _is_binary_stl(path):
         return "expected a whole binary STL file, got another kind or a part"
     return ""
 
 
 def check_obj(lines: Iterable[bytes]) -> None:
-    """Checks that the faces of an OBJ file refer to existing corners; PyBullet would read invalid memory.
+    """Checks that the faces of an OBJ file refer to existing corners. Otherwise PyBullet would read invalid memory.
+
+    Args:
+        lines: Lines of the file.
 
     Raises:
-        ValueError: If one does not, or a corner is not at three finite numbers.
+        ValueError: If a face refers to a missing corner, or a corner does not have three finite coordinates.
     """
     counts = {b"v": 0, b"vt": 0, b"vn": 0}
     furthest = [0, 0, 0]
@@ -64,14 +70,17 @@ def _is_binary_stl(path: str) -> bool:
 
 
 def soft_mesh_problems(path: str) -> list[str]:
-    """Returns a sentence for each fault in the mesh of a soft body, an existing file."""
+    """Returns a message for each error in the mesh file of a soft body. The file must exist."""
     status = os.stat(path)
     return list(_soft_mesh_problems(path, status.st_size, status.st_mtime_ns))
 
 
 @lru_cache(maxsize=32)
 def _soft_mesh_problems(path: str, size: int, changed_ns: int) -> list[str]:
-    """Does the same, cached: unchanged files are not read again, which matters in the simulation's thread."""
+    """Computes the result of `soft_mesh_problems`, cached so that unchanged files are not read again.
+
+    Reading a file would delay the simulation thread.
+    """
     kind = Path(path).suffix.lower()
     if kind not in SOFT_MESH_FORMATS:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]
@@ -85,7 +94,7 @@ def _soft_mesh_problems(path: str, size: int, changed_ns: int) -> list[str]:
 
 
 def _check_soft_obj(lines: list[list[str]]) -> bool:
-    """Returns whether the mesh has faces; raises ValueError if a number is none or names no corner."""
+    """Returns whether the mesh has faces; raises ValueError if a number is invalid or a corner does not exist."""
     corners = sum(1 for words in lines if words[:1] == ["v"] and _finite(words[1:4]))
     faces = [words[1:] for words in lines if words[:1] == ["f"]]
     for number in (int(corner.split("/")[0]) for face in faces for corner in face):
@@ -95,7 +104,7 @@ def _check_soft_obj(lines: list[list[str]]) -> bool:
 
 
 def _check_soft_vtk(lines: list[list[str]]) -> bool:
-    """Returns whether the mesh has tetrahedra; raises ValueError if a number is none or names no corner."""
+    """Returns whether the mesh has tetrahedra; raises ValueError if a number is invalid or a corner does not exist."""
     rest = iter(lines)
     points = int(_after(rest, "POINTS")[1])
     for number in range(points):

@@ -1,7 +1,7 @@
-"""Concave meshes as convex parts, by PyBullet's V-HACD.
+"""Decomposes concave meshes into convex parts with PyBullet's V-HACD.
 
-V-HACD needs seconds, and does not check its input: it runs in a process of its own, `python -m
-rpbi.meshes.decomposition MESH PARTS PARAMETERS`. The parts are kept in the cache by the content of the mesh and by the
+V-HACD takes seconds and does not check its input. It therefore runs in a process of its own, `python -m
+rpbi.meshes.decomposition MESH PARTS PARAMETERS`. The parts are cached; the key is a hash of the mesh's content and the
 parameters.
 """
 
@@ -20,16 +20,16 @@ from .trial import limit_resources
 from .triangles import read_triangles
 
 MAX_CPU_S = 600
-"""Longest processor time of V-HACD [s]; beyond it, the process is ended."""
+"""Processor time after which the process of V-HACD is ended [s]."""
 MAX_WALL_S = 900.0
-"""Longest wall time of V-HACD [s]; beyond it, the process is ended."""
+"""Wall time after which the process of V-HACD is ended [s]."""
 _PARTS = "parts.obj"
 _without_cache: dict[str, Path] = {}
-"""Folders of this process with the parts of meshes, where the cache cannot be written."""
+"""Temporary folders with parts of meshes, used if the cache cannot be written; keyed by the name of the cache entry."""
 
 
 def convex_parts(mesh: str, parameters: Mapping[str, float]) -> str:
-    """Returns an OBJ file with the convex parts of a mesh, each an object of its own.
+    """Decomposes a mesh, and returns the path of an OBJ file in which each convex part is an object.
 
     Args:
         mesh: An OBJ or STL file.
@@ -55,7 +55,7 @@ def convex_parts(mesh: str, parameters: Mapping[str, float]) -> str:
 
 
 def _decompose(mesh: str, parameters: Mapping[str, float], folder: Path) -> None:
-    """Writes the parts of a mesh into a folder."""
+    """Runs V-HACD for a mesh in a child process, and writes the parts into a folder."""
     source, parts = folder / "mesh.obj", folder / _PARTS
     corners = [corner for part in read_triangles(mesh) for triangle in part.tolist() for corner in triangle]
     numbers = {corner: number for number, corner in enumerate(dict.fromkeys(map(tuple, corners)), start=1)}
@@ -80,7 +80,7 @@ def _decompose(mesh: str, parameters: Mapping[str, float], folder: Path) -> None
 
 
 def main() -> None:
-    """Runs V-HACD on the files that the arguments name."""
+    """Runs V-HACD on the files that the command line names."""
     limit_resources(MAX_CPU_S)
     source, parts, parameters = sys.argv[1:]
     pybullet.vhacd(source, parts, "/dev/null", **json.loads(parameters))

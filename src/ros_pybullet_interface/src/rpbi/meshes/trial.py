@@ -1,7 +1,7 @@
-"""Trial of meshes: those that this machine has not loaded before are first loaded in a process of their own.
+"""Tries meshes: loads each mesh that is new on this machine in a separate process first.
 
-PyBullet's loaders of OBJ, STL and COLLADA do not check files: a broken one may end the process. The hash of each good
-mesh is kept in the user's cache folder, so that every mesh is tried once.
+PyBullet's loaders of OBJ, STL and COLLADA do not check files, so a broken file may crash the process. The user's cache
+folder keeps the hashes of meshes that were loaded, so that each mesh is tried once.
 """
 
 import enum
@@ -20,21 +20,21 @@ from custom_ros_tools.child_process import start_child
 from robot_model.mesh_cache import cache_folder, content_hash
 
 TRIAL = 3
-"""Version of the trial; meshes that passed another version are tried again."""
+"""Version of the trial. Meshes that passed another version are tried again."""
 MAX_BYTES = 2 * 2**30
-"""Largest memory of a trial [bytes]; beyond it, its allocations fail."""
+"""Memory limit of the trial process [bytes]; further allocations fail."""
 MAX_CPU_S = 20
-"""Longest processor time of a trial [s]; beyond it, the mesh is refused."""
+"""Processor time of the trial process after which a mesh is refused [s]."""
 LONGEST_TRIAL_S = 45.0
-"""Longest wall time of a trial [s]; beyond it, the mesh is refused."""
+"""Wall time of the trial process after which a mesh is refused [s]."""
 MAX_BATCH = 100
-"""Largest number of meshes that one process tries."""
+"""Largest number of meshes that one trial process loads."""
 
 log = logging.getLogger(__name__)
 
 
 class Use(enum.Enum):
-    """Use of a mesh; PyBullet has a loader for each."""
+    """Use of a mesh; PyBullet loads a mesh differently for each use."""
 
     VISUAL = "visual"
     COLLISION = "collision"
@@ -45,18 +45,25 @@ class Use(enum.Enum):
 
 
 class Mesh(NamedTuple):
-    """A mesh file, and its use."""
+    """A mesh file, and the use for which PyBullet loads the file."""
 
     use: Use
     file: str
 
 
 _tried: set[tuple[Mesh, int, int]] = set()
-"""Meshes that passed, by size and time of the last change [ns]: unchanged files are not read again."""
+"""Meshes that this process has checked, each with file size [bytes] and time of the last change [ns].
+
+A file is not read again unless size or time changes.
+"""
 
 
 def limit_resources(cpu_s: int) -> None:
-    """Limits memory and processor time [s] of this process, and disables core dumps."""
+    """Limits memory and processor time of this process, and disables core dumps.
+
+    Args:
+        cpu_s: Limit of the processor time [s].
+    """
     for limit, most in ((resource.RLIMIT_AS, MAX_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
         already = resource.getrlimit(limit)[0]
         most = most if already == resource.RLIM_INFINITY else min(already, most)
@@ -64,7 +71,7 @@ def limit_resources(cpu_s: int) -> None:
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
-    """Returns the faults of meshes that PyBullet cannot load."""
+    """Tries meshes as needed, and returns a message for each mesh that PyBullet cannot load."""
     faults: dict[Mesh, str] = {}
     unknown: dict[Mesh, Path] = {}
     for mesh in dict.fromkeys(meshes):
@@ -88,7 +95,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
 
 
 def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
-    """Yields the fault of each mesh, or an empty text."""
+    """Tries meshes in child processes, and yields an error message for each one; empty if the mesh is good."""
     done = 0
     while done < len(meshes):
         batch = meshes[done : done + MAX_BATCH]
@@ -101,7 +108,11 @@ def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
 
 
 def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
-    """Returns a process's lines for the meshes that it finished, and the reason of an early end."""
+    """Runs one trial process.
+
+    Returns:
+        Messages for the meshes that the process finished, and a message for the next mesh if the process ended early.
+    """
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
     with open(reading, "rb") as report:
@@ -130,7 +141,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
 
 
 def _reason(returncode: int) -> str:
-    """Returns the meaning of the process's exit code."""
+    """Returns an error message for the exit code of a trial process; empty for success."""
     if returncode == -signal.SIGXCPU or returncode == -signal.SIGKILL:
         return f"PyBullet takes more than {MAX_CPU_S} s to load it"
     if returncode < 0:

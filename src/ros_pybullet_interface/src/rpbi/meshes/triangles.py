@@ -1,4 +1,4 @@
-"""Triangles of mesh files, and how much larger their convex hulls are."""
+"""Reads triangles from mesh files, and computes volumes of meshes and of their convex hulls."""
 
 import json
 from pathlib import Path
@@ -10,17 +10,17 @@ from custom_ros_tools.config import read_file
 from robot_model.mesh_cache import cached, content_hash
 
 MAX_BYTES = 64_000_000
-"""Largest length of a file [bytes]; a longer one is an error."""
+"""Largest size of a mesh file [bytes]; a larger file is an error."""
 Triangles = npt.NDArray[np.float64]
 """Corners of triangles [m], shape (n, 3, 3)."""
 
 
 def read_triangles(path: str) -> list[Triangles]:
-    """Returns the triangles of each part of an OBJ or STL file; PyBullet makes a convex hull of each part.
+    """Reads the triangles of an OBJ or STL file, one array per part. PyBullet makes a convex hull of each part.
 
     Raises:
-        ValueError: If it is of another format, has no triangles, or is broken.
-        OSError: If it cannot be read, or is too long.
+        ValueError: If the file has another format, contains no triangles, or is broken.
+        OSError: If the file cannot be read, or is too large.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".obj", ".stl"):
@@ -61,9 +61,10 @@ def _read_obj(text: str) -> list[Triangles]:
 
 
 def volumes(path: str) -> tuple[float, float] | None:
-    """Returns the volume that a mesh encloses, and that of the convex hulls of its parts [m^3].
+    """Returns the volume that a mesh encloses, and the total volume of its parts' convex hulls [m^3].
 
-    It is remembered by the file's content. None if the surface is not closed, or the mesh cannot be read.
+    Returns None if the surface is not closed, or the mesh cannot be read. Results are cached; the key is a hash of the
+    file's content.
     """
     found = "volumes.json"
     try:
@@ -78,7 +79,7 @@ def _write(path: Path, value: tuple[float, float] | None) -> None:
 
 
 def _volumes(path: str) -> tuple[float, float] | None:
-    from scipy.spatial import ConvexHull, QhullError  # takes a while to import, and most worlds have no meshes
+    from scipy.spatial import ConvexHull, QhullError  # slow to import, and most worlds have no meshes
 
     try:
         parts = read_triangles(path)
@@ -87,13 +88,13 @@ def _volumes(path: str) -> tuple[float, float] | None:
         hulls = sum(float(ConvexHull(part.reshape(-1, 3)).volume) for part in parts)
     except (OSError, ValueError, QhullError):
         return None
-    # Tetrahedra between the origin and each triangle
+    # sum of tetrahedra between each triangle and one corner of the part
     enclosed = sum(abs(float(np.linalg.det(part - part[0, 0]).sum())) / 6.0 for part in parts)
     return enclosed, hulls
 
 
 def _is_closed(triangles: Triangles) -> bool:
-    """Returns whether each edge has a triangle on either side, both turning the same way."""
+    """Returns whether each edge belongs to two triangles with consistent orientation."""
     _, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = corners.reshape(-1, 3)
     count = int(corners.max()) + 1

@@ -1,4 +1,4 @@
-"""The page of all YAML files and their keys, and the JSON Schemas of these files."""
+"""Generates the reference page of all YAML files and their keys, and the JSON Schemas of these files."""
 
 import re
 from collections.abc import Container, Iterator, Mapping
@@ -57,21 +57,21 @@ GUIDES = {
     "changeDynamics": "dynamics.md",
     "sensors": "extending.md",
 }
-"""Page that explains the keys under a heading."""
+"""Page that explains the keys under a heading, keyed by heading."""
 HEAD = ("key", "type", "default", "meaning")
 FIRST_EXAMPLES = "basic_example_kuka_lwr"
-"""Folder whose files are examples of their kind; others are if it has none."""
+"""Folder from which the example of each kind of file is taken first; other folders follow."""
 _SCHEMA_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 class Place(NamedTuple):
-    """Place of a mapping on the page.
+    """Section of the page about one mapping inside files.
 
     Attributes:
-        heading: The heading: its path in the first file that has it.
-        root: Schema of that file.
+        heading: Heading of the section: the mapping's path in the first file that contains the mapping.
+        root: Schema of this first file.
         mapping: Schema of the mapping.
-        files: Kinds of the files that have it.
+        files: Kinds of all files that contain the mapping.
     """
 
     heading: str
@@ -81,11 +81,15 @@ class Place(NamedTuple):
 
 
 Places = dict[str, Place]
-"""By the name of the mapping's definition, which is the same in all files."""
+"""Places, keyed by the name of the mapping's definition, which is the same in all files."""
 
 
 def config_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the page and of all schemas of a workspace, by their paths."""
+    """Returns the texts of the page and of all schemas, keyed by file path.
+
+    Args:
+        root: Folder of the workspace.
+    """
     nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
     return {
         **schema_texts(root / "src/ros_pybullet_interface/schema", schemas()),
@@ -95,7 +99,7 @@ def config_files(root: Path) -> dict[Path, str]:
 
 
 def _examples(root: Path) -> dict[str, str]:
-    """Returns an example of each kind of file, without its first line, which names the schema for editors."""
+    """Returns one example text per kind of file, without the first line, which names the schema for editors."""
     examples: dict[str, str] = {}
     paths = (root / "src/rpbi_examples/configs").rglob("*.yaml")
     for path in sorted(paths, key=lambda path: (path.parent.name != FIRST_EXAMPLES, len(path.parts), path)):
@@ -107,12 +111,12 @@ def _examples(root: Path) -> dict[str, str]:
 
 
 def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], examples: Mapping[str, str]) -> str:
-    """Returns the page.
+    """Returns the text of the reference page.
 
     Args:
-        files: Schema of each kind of file.
-        nodes: Schema of the parameter `~config` of each node that has one.
-        examples: YAML text to show for some of the files.
+        files: Schema of each kind of file, keyed by kind.
+        nodes: Schema of the parameter `~config` of nodes, keyed by node.
+        examples: YAML text to show for some kinds of files, keyed by kind.
     """
     places = _places(files)
     parts = [WRITTEN_BY, "# Configuration reference", INTRODUCTION, "## Files", _overview(files)]
@@ -144,7 +148,7 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
 
 
 def _places(files: Mapping[str, Schema]) -> Places:
-    """Assigns a heading to each mapping inside of the files."""
+    """Returns the place of each mapping inside the files."""
     places: Places = {}
     for kind, root in files.items():
         for path, reference in _inside(root, root, "", files):
@@ -154,7 +158,14 @@ def _places(files: Mapping[str, Schema]) -> Places:
 
 
 def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> Iterator[tuple[str, Schema]]:
-    """Yields the mappings inside of one, with their paths, but for those that are files too."""
+    """Yields path and schema of each mapping inside a mapping, recursively, except mappings that are files too.
+
+    Args:
+        mapping: Schema of the outer mapping.
+        root: Schema of the whole file.
+        path: Prefix of the paths.
+        files: Kinds of files.
+    """
     for key, value in _values(mapping).items():
         inner_path = f"{path}{key}"
         reference = mapping_in(value, root)
@@ -164,7 +175,7 @@ def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> 
 
 
 def _values(mapping: Schema) -> dict[str, Schema]:
-    """Returns the schemas of a mapping's keys, and under `NAME` that of all further ones."""
+    """Returns the schemas of a mapping's keys; `NAME` has the schema of keys that the user names, if allowed."""
     more = mapping.get("additionalProperties")
     return {**mapping["properties"], **({"NAME": more} if isinstance(more, dict) else {})}
 
@@ -223,7 +234,7 @@ def _old_keys(kind: str) -> str:
 
 
 def _constants(schema: Any) -> Iterator[Schema]:
-    """Yields the schemas of families of constants anywhere in a schema."""
+    """Yields the schemas of all families of constants inside a schema."""
     if isinstance(schema, dict):
         if isinstance(schema.get("kind"), str):
             yield schema

@@ -1,4 +1,4 @@
-"""Pieces of Markdown, as GitHub shows it."""
+"""Formats Markdown for GitHub."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -7,29 +7,34 @@ WRITTEN_BY = "<!-- Written by `./rpbi docs` from the code: change it there, not 
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Returns a table; cells may have line breaks and `|`."""
+    """Returns a table; cells may contain line breaks and `|`."""
     lines = [_row(head), "|" + "---|" * len(head)]
     return "\n".join([*lines, *map(_row, rows)])
 
 
 def link(title: str, page: str = "") -> str:
-    """Returns a link to a heading, of this page if none is named."""
+    """Returns a link to a heading.
+
+    Args:
+        title: The heading.
+        page: File of the page; empty for the same page.
+    """
     anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
     return f"[{title}]({page}#{anchor})"
 
 
 def code(text: str) -> str:
-    """Returns a piece of code in a line."""
+    """Returns a text as inline code."""
     return f"`{text}`"
 
 
 def block(language: str, text: str) -> str:
-    """Returns lines of code."""
+    """Returns a text as a code block."""
     return f"```{language}\n{text.strip()}\n```"
 
 
 def page(parts: Iterable[str]) -> str:
-    """Returns a page of its paragraphs, tables and headings; empty ones are left out."""
+    """Joins paragraphs, tables and headings to a page; leaves out empty parts."""
     return "\n\n".join(filter(None, parts)) + "\n"
 
 

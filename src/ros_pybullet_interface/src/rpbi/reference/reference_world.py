@@ -1,4 +1,4 @@
-"""A world with one body of each type and all of their interfaces, for the reference pages."""
+"""A world for the reference pages: one body of each type, with all interfaces that bodies can have."""
 
 import pybullet
 
@@ -10,11 +10,11 @@ from rpbi.world.loading import CameraConfig, LoadedWorld
 from rpbi.world.objects import ObjectConfig, load_object
 
 FOLLOWED = "FRAME"
-"""TF frame that its bodies follow."""
+"""TF frame that the world's bodies follow."""
 (JOINT,) = BODY_TYPES["robot"].example["enabled_joint_force_torque_sensors"]
-"""Joint of its robots that has a force-torque sensor."""
+"""Joint of the world's robots that has a force-torque sensor."""
 CONTROLLERS = tuple(BODY_TYPES["robot"].example["controllers"])
-"""Names of its robots' controllers."""
+"""Names of the controllers of the world's robots."""
 
 _FILE = "reference"
 _MAIN = {
@@ -28,7 +28,7 @@ _CAMERA = {"name": "camera", "pointcloud": True, "object_tf": {"tf_id": FOLLOWED
 
 
 def reference_world() -> World:
-    """Builds the world, without a window although its configuration asks for one."""
+    """Builds the world without a window, although its configuration has one."""
     objects = tuple(
         ObjectConfig(kind, load_object(kind, {"name": kind, **BODY_TYPES[kind].example}, _FILE), _FILE)
         for kind in BODY_TYPES
