@@ -47,8 +47,10 @@ class Body:
     """Key of the list in the main YAML file for objects of this type; the default is the list for types from other
     packages."""
     example: ClassVar[Mapping[str, Any]] = {}
-    """YAML keys, without the name, of an example that has all ROS interfaces of this type. If the type can follow a TF
-    frame, the example follows `FRAME`. The reference pages are generated from it."""
+    """YAML keys, without the name, of an example body that has all ROS interfaces of this type.
+
+    If the type can follow a TF frame, the example follows `FRAME`. The reference pages are generated from the example.
+    """
     not_in_keyframes: ClassVar[tuple[str, ...]] = ("_inertial", "_base")
     """Attributes that keyframes leave out, since they are caches that reading the body's pose fills."""
     object_tf: ObjectTf | None = None
@@ -172,8 +174,9 @@ class Body:
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
     def _track(self, object_tf: ObjectTf | None) -> None:
-        """Makes a base that physics moves follow a TF frame, if one is given, as long as new poses of the
-        frame come.
+        """Makes a base follow a TF frame while the frame is up to date; otherwise physics moves the base.
+
+        Does nothing without a frame.
         """
         self.object_tf = object_tf
         if object_tf is not None:
@@ -189,22 +192,24 @@ class Body:
         return False
 
     def halt(self, reason: str) -> None:
-        """Aborts actions that last for several ticks, since no further tick may follow; does nothing by default."""
+        """Aborts actions that last for several ticks, since the world may not run again; does nothing by default."""
 
     def restart(self) -> bool:
         """Restores the body's initial state, after PyBullet has restored its motion.
 
         Returns:
-            Whether that is possible; if not, which is the default, the caller creates the body anew.
+            Whether the state was restored. If not, which is the default, the caller creates the body anew.
         """
         return False
 
     def resume(self) -> None:
-        """Sends the body's settings to PyBullet again, except motion and dynamics, after the body has moved to another
-        client; does nothing by default."""
+        """Sends the body's settings to PyBullet again, after the body has moved to another client.
+
+        Motion and dynamics are not among these settings. The method does nothing by default.
+        """
 
     def pause(self, reason: str) -> None:
-        """Aborts actions that cannot be paused while the world is stopped; by default all actions, see `halt`."""
+        """Aborts actions that cannot wait while the world is stopped; by default, calls `halt`."""
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
@@ -226,8 +231,10 @@ class Body:
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether an object of `section` has this type, judged from its YAML, if several types share a
-        section.
+        """Returns whether an object of the section `section` has this type, for sections that several types share.
+
+        Args:
+            data: Content of the object's YAML.
         """
         return True
 

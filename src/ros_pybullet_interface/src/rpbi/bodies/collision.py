@@ -1,4 +1,4 @@
-"""Collision objects: they have contacts, and move only by TF."""
+"""Collision objects, which have contacts, and follow a TF frame or stay in place."""
 
 from pydantic import Field
 

@@ -1,4 +1,4 @@
-"""Dynamic objects: moved by physics, except while they follow an up-to-date TF frame."""
+"""Dynamic objects, which physics moves, except while they follow an up-to-date TF frame."""
 
 from pydantic import Field
 

@@ -23,7 +23,7 @@ class LinkDynamics(NamedTuple):
         local_inertia_diagonal: Principal moments of inertia [kg m^2].
         local_inertia_pos: Centre of mass in the link's frame [m].
         local_inertia_orn: Principal axes in the link's frame, x, y, z, w.
-        restitution: Bounciness.
+        restitution: Coefficient of restitution.
         rolling_friction: Friction against rolling.
         spinning_friction: Friction about the contact normal.
         contact_damping: Damping of contacts [N s/m], -1 if it is not set.

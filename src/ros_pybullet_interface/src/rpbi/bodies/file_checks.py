@@ -31,7 +31,7 @@ _PARTS: dict[str, type[PybulletModel]] = {
 
 
 def check_files(config: BodyConfig) -> None:
-    """Checks the meshes and the URDF of a body; files that were not checked before take longer.
+    """Checks the meshes and the URDF of a body; the first check of a file takes longer than later ones.
 
     Raises:
         ConfigError: If a file cannot be loaded; the error lists all problems.

@@ -78,5 +78,8 @@ class ShapeObject(Body):
         self.visual = visual
 
     def restart(self) -> bool:
-        """Returns whether the body needs no reset of its own state, which is so unless it is a tracked body."""
+        """Returns True, since PyBullet restores the body's whole state; False for a body that tracks a TF frame.
+
+        After False, the caller creates the body anew.
+        """
         return not isinstance(self.pose_follower, TrackedBase)

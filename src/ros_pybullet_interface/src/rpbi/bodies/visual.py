@@ -1,4 +1,4 @@
-"""Visual objects: visible, without contacts."""
+"""Visual objects, which are visible but have no contacts."""
 
 from pydantic import Field
 

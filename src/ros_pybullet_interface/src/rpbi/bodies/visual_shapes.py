@@ -146,7 +146,10 @@ def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
 
 
 def followed_frame(body: Body) -> str | None:
-    """Returns the TF frame that a body of one shape follows; None if it follows none, or physics moves it as well."""
+    """Returns the TF frame that a `ShapeObject` follows.
+
+    Returns None for other bodies, without a frame, or if physics moves the body when the frame is out of date.
+    """
     if body.object_tf is None or not isinstance(body, ShapeObject) or isinstance(body.pose_follower, TrackedBase):
         return None
     return body.object_tf.tf_id

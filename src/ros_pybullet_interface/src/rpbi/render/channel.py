@@ -60,7 +60,7 @@ class Ready(NamedTuple):
 
 
 class Alive(NamedTuple):
-    """To the simulator, twice a second: the renderer process is running; later if a frame takes longer to draw."""
+    """To the simulator: the renderer process is running; sent twice a second, or after a frame that takes longer."""
 
 
 class SceneAccepted(NamedTuple):

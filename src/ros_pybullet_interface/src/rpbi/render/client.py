@@ -139,13 +139,9 @@ class RenderClient:
         return name in self._demands
 
     def has_shown(self, name: str, stamp_ns: int) -> bool:
-        """Returns whether the newest frame of a synchronous camera that was passed to the sink has the given stamp.
+        """Returns whether the last finished scene of a synchronous camera has the given stamp [ns].
 
-        A frame without viewers counts as passed to the sink.
-
-        Args:
-            name: The camera.
-            stamp_ns: Stamp of the scene [ns].
+        A scene is finished when its frame was passed to the sink, or if it has no viewers.
         """
         return self._shown_ns.get(name) == stamp_ns
 
@@ -162,7 +158,7 @@ class RenderClient:
             self._channel.wait(timeout_s)
 
     def send(self, sample: SceneSample) -> None:
-        """Sends a scene to the renderer; if the renderer has not accepted the last one, keeps the scene until then.
+        """Sends a scene to the renderer, or keeps it until the renderer has accepted the camera's previous scene.
 
         A newer scene of the same camera replaces a kept one.
         """
@@ -225,11 +221,7 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Logs a warning when the process stops sending messages, and when it sends messages again.
-
-        Args:
-            is_heard: Whether a message has arrived, or the renderer is not ready yet.
-        """
+        """Logs a warning when the process stops sending messages, and when it sends messages again."""
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s

@@ -37,12 +37,7 @@ class Camera(NamedTuple):
 
     @classmethod
     def of(cls, config: RgbdSensorConfig, topic_name: str = "") -> Camera:
-        """Returns the camera for a camera configuration.
-
-        Args:
-            config: Configuration from YAML.
-            topic_name: Name of the camera in topics.
-        """
+        """Creates a camera from its YAML configuration and its name in topics."""
         size = config.intrinsics
         noise = None
         if config.depth_noise_m or config.depth_noise_growth_per_m:

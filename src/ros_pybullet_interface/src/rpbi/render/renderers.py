@@ -50,11 +50,7 @@ class Transparency:
         """All transparent shapes."""
 
     def update(self, body_ids: set[int]) -> None:
-        """Updates the list of transparent shapes for a new set of bodies.
-
-        Args:
-            body_ids: Ids of all bodies that exist now.
-        """
+        """Updates the list of transparent shapes; `body_ids` are the ids of all bodies that exist now."""
         for body_id in self._shapes_of.keys() - body_ids:
             del self._shapes_of[body_id]
             self._stale[body_id] = len(self._pb.getVisualShapeData(body_id))

@@ -38,21 +38,16 @@ class SurfaceMesh(NamedTuple):
 
 
 def box(half_extents: Sequence[float]) -> SurfaceMesh:
-    """Returns a box centred at the origin; the corners of each side have that side's normal.
+    """Returns a box centred at the origin, with half its size along x, y and z given in metres.
 
-    Args:
-        half_extents: Half the size along x, y and z [m].
+    The corners of each side have that side's normal.
     """
     unit = _concatenated([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
     return unit._replace(points=unit.points * np.asarray(half_extents))
 
 
 def plane(normal: Sequence[float]) -> SurfaceMesh:
-    """Returns a large square centred at the origin, visible from both sides.
-
-    Args:
-        normal: Normal of the square, of any length.
-    """
+    """Returns a large square centred at the origin, visible from both sides; the normal may have any length."""
     upwards = np.asarray(normal) / np.linalg.norm(normal)
     both = _concatenated([_square(upwards), _square(-upwards)])
     on_plane = both.points - (both.points @ upwards)[:, None] * upwards

@@ -1,4 +1,7 @@
-"""Descriptions of topics and services as data, from which the node opens them and the reference pages list them."""
+"""Types that describe topics and services, and functions that open them.
+
+The node and the reference pages use the same descriptions.
+"""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -20,10 +23,7 @@ An empty sequence means that the body does not have the topic or service."""
 
 
 class Answer(NamedTuple):
-    """Success and message, the answer of most services.
-
-    The service types have the two fields in different orders; `serve` matches them by name.
-    """
+    """Answer of most services: success and a message; `serve` converts it to the response type of the service."""
 
     success: bool
     message: str
@@ -68,7 +68,7 @@ class Service(NamedTuple):
         service_type: ROS type of the service.
         handler: Takes a context and a request, and returns an Answer, the response, or the response's fields. To refuse
             the request, it raises an InterfaceError or ValueError. The client then gets `success=False` and the error's
-            message; if the response has no field `success`, the call fails. None if other code serves it.
+            message; if the response has no field `success`, the call fails. None if other code opens the service.
         owners: Returns the owners within a body that have the service, see `Owners`.
     """
 
@@ -90,12 +90,9 @@ _warn = ThrottledWarning()
 
 
 def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
-    """Subscribes to a topic and calls its handler for each message; refused messages are logged at a limited rate.
+    """Subscribes to a topic and calls its handler with the context and each message.
 
-    Args:
-        topic: The topic.
-        context: First argument of the handler.
-        owner: Text that replaces `{name}` in the topic's name.
+    Refused messages are logged at a limited rate. The owner's name replaces `{name}` in the topic's name.
     """
     name, handler = rospy.resolve_name(topic.name.format(name=owner)), topic.handler
     assert handler is not None  # rows of topics to subscribe to have one
@@ -112,13 +109,7 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
 
 
 def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
-    """Opens a service.
-
-    Args:
-        service: The service.
-        context: First argument of the handler.
-        owner: Text that replaces `{name}` in the service's name.
-    """
+    """Opens a service whose handler gets the context; the owner's name replaces `{name}` in the service's name."""
     response_type, handler = service.service_type._response_class, service.handler
     assert handler is not None  # rows of services to open have one
 

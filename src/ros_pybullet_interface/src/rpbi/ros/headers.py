@@ -21,13 +21,13 @@ FRAMES = {
 
 
 def use_prefix(prefix: str | None) -> None:
-    """Sets a prefix for all frames of this node's world, so that two worlds can share one TF tree; None for none."""
+    """Sets the prefix of all frames of this node's world, so that two worlds can share a TF tree; None removes it."""
     global _prefix
     _prefix = f"{prefix}/" if prefix else ""
 
 
 def use_own_frames(frames: Container[str]) -> None:
-    """Sets the frames of this node's world, by their names without prefix; `named_frame` adds the prefix to them."""
+    """Sets which frames belong to this node's world, by names without prefix; `named_frame` adds the prefix."""
     global _own_frames
     _own_frames = frames
 
@@ -55,12 +55,7 @@ def to_ros_time(stamp_ns: int) -> genpy.Time:
 
 
 def stamped_header(stamp_ns: int, frame: str) -> Header:
-    """Returns a message header.
-
-    Args:
-        stamp_ns: Stamp [ns].
-        frame: Full name of the TF frame.
-    """
+    """Returns a message header with a stamp [ns] and the full name of a TF frame."""
     header: Header = _new(Header)
     header.seq, header.stamp, header.frame_id = 0, to_ros_time(stamp_ns), frame
     return header

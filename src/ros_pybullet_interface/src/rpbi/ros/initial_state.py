@@ -35,11 +35,7 @@ def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
     """Waits for a robot's `initial_joint_state_topic`, and returns its configuration with the received positions.
 
     Joints that the message does not name start as configured. Joints that the robot lacks are ignored. For other
-    bodies, and for robots without that key, the configuration is returned unchanged.
-
-    Args:
-        config: Configuration of a body.
-        file: Name of its YAML file, for error messages.
+    bodies, and for robots without that key, the configuration is returned unchanged. Errors name the YAML file `file`.
 
     Raises:
         ConfigError: If a message does not arrive in time, names no joint of the robot, or has invalid positions.

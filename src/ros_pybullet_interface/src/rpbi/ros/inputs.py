@@ -103,11 +103,7 @@ JOINT_TARGET = Topic(
 
 
 def topic_input(key: str, taken: Input) -> Topic:
-    """Returns the topic of an input.
-
-    Args:
-        key: Name of the input.
-        taken: The input.
+    """Returns the topic of an input; `key` is the input's name.
 
     Raises:
         ConfigError: If another package defines the input and its `ros_topic` is missing or cannot be found.

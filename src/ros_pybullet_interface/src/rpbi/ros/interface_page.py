@@ -1,4 +1,4 @@
-"""Writes the reference page of all topics, services, frames and parameters of the simulator."""
+"""Builds the reference page of all topics, services, frames and parameters of the simulator."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -57,11 +57,7 @@ PACKAGES = ("ros_pybullet_interface", "compatibility/cob_srvs", "compatibility/c
 
 
 def interface_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the reference page, indexed by the path of its file.
-
-    Args:
-        root: Folder of the workspace.
-    """
+    """Returns the text of the reference page, indexed by the path of its file; `root` is the workspace folder."""
     world = reference_world()
     try:
         return {root / "docs/topics_and_services.md": interface_page(world, _definitions(root))}
@@ -98,8 +94,7 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
 def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[str]]:
     """Returns the types of bodies that have each topic or service, with placeholders in place of example names.
 
-    Args:
-        of_bodies: Topics and services of the bodies of the reference world, indexed by the type of body.
+    The argument has the topics and services of the reference world's bodies, indexed by the type of body.
     """
     owners: dict[Endpoint, list[str]] = {}
     placeholders = {f"/{JOINT}/": "/JOINT/", **{f"/{name}/": "/CONTROLLER/" for name in CONTROLLERS}}

@@ -115,12 +115,7 @@ def endpoints(world: World) -> list[Endpoint]:
 
 
 def _refuse_clashes(file: str, listed: Iterable[Endpoint]) -> None:
-    """Raises a ConfigError if two topics or two services have the same name; all bodies may share `/tf`.
-
-    Args:
-        file: Name of the main YAML file, for the error message.
-        listed: All topics and services.
-    """
+    """Raises a ConfigError if two topics or two services have the same name; all bodies may share `/tf`."""
     by_name: dict[tuple[str, str], Endpoint] = {}
     problems = []
     for each in listed:

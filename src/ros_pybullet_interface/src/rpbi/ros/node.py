@@ -47,7 +47,8 @@ def configured_world(robot_description: str | None) -> LoadedWorld:
     With `~config_file`, the keys of `~config` override those of the file.
 
     Args:
-        robot_description: URDF file that a `fileName` of `robot_description` stands for; None if there is none.
+        robot_description: URDF file of robots whose `fileName` is the word `robot_description`; None without such a
+            file.
 
     Raises:
         ConfigError: If both parameters are missing, or the configuration is wrong; the error lists all problems.
@@ -86,7 +87,7 @@ def _wants_real_time_priority() -> bool:
 
 
 def parameter_above(name: str) -> Any:
-    """Returns a ROS parameter from this namespace or the nearest one above that has it; None if none has it."""
+    """Returns a ROS parameter from this namespace or the nearest namespace above; None if the parameter is not set."""
     found = rospy.search_param(name)
     if found is None:
         return None

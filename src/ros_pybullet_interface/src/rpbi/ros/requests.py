@@ -63,7 +63,7 @@ class Requests:
 
 
 class BodyContext(NamedTuple):
-    """The body that a service or topic acts on, for handlers that run in other threads than the simulation.
+    """The body that a service or topic acts on, for handlers that run outside of the simulation thread.
 
     Attributes:
         name: Name of the body.
@@ -87,8 +87,7 @@ class BodyContext(NamedTuple):
     def body(self) -> Any:
         """The body of this name; a reset may replace it by a new object.
 
-        Only the simulation thread may read its PyBullet state. The type is `Any`, since a service for robots only gets
-        a robot here.
+        Only the simulation thread may read the body's PyBullet state.
 
         Raises:
             UnknownNameError: If the body was removed.

@@ -225,9 +225,9 @@ class Simulation:
     def restore(self, to: WorldState) -> Future[None]:
         """Starts to restore a saved state of this world, and returns at once.
 
-        Each pass of the loop spends a few milliseconds on it. Until the state is reached, samples are not published,
-        inputs are dropped, and requests that would change or save the world are refused. `stop` aborts the restoration
-        and resets the world.
+        Each pass of the loop spends a few milliseconds on the restoration. Until the state is reached, samples are not
+        published, inputs are dropped, and requests that would change or save the world are refused. `stop` aborts the
+        restoration and resets the world.
 
         Returns:
             A future that is done when the state is reached; the world then runs if it ran before. The future fails with

@@ -38,7 +38,7 @@ class StateTopic(rospy.SubscribeListener):
         close_poller_with(self._publisher)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
-        """Stores a new subscriber for `serve_late`; rospy calls this method from a thread of rospy's."""
+        """Stores a new subscriber for `serve_late`; rospy calls this method in another thread."""
         self._late.append(peer_publish)
 
     @property
@@ -52,11 +52,7 @@ class StateTopic(rospy.SubscribeListener):
         self._publisher.publish(message)
 
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Sends the last message to subscribers that connected after it was published.
-
-        Args:
-            last_message: Returns the last message; called only if there are such subscribers.
-        """
+        """Sends the message that `last_message` returns to subscribers that connected after it was published."""
         while self._late:
             self._late.popleft()(last_message())
 

@@ -71,11 +71,6 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     An InterfaceError or ValueError is returned as it is. Other errors in code of another package are returned as a
     PluginError.
 
-    Args:
-        slot: Body and name of the input, as `NAME/INPUT`.
-        taken: The input.
-        error: The error that was raised for the value.
-
     Raises:
         Exception: `error` itself, if it is a bug of this package.
     """
@@ -123,12 +118,9 @@ class FollowedFrame:
         return self.looked_s + LOOK_UNTIL * self.period_s if is_early else came_s
 
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
-        """Stores the frame's stamp, and returns whether the stamp has changed.
+        """Stores the stamp of the frame's newest pose [ns], and returns whether the stamp has changed.
 
-        Args:
-            stamp_ns: Stamp of the frame's newest pose [ns].
-            now_s: Present time of the monotonic clock [s].
-            time_s: Present time of the world [s].
+        `now_s` is the present time of the monotonic clock, `time_s` that of the world [s].
         """
         self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
         if stamp_ns == self.last_stamp_ns:
@@ -161,10 +153,7 @@ class TfFollower:
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Starts to follow the TF frame of a pose input.
 
-        Args:
-            name: The body or sensor.
-            slot: Body or sensor and name of the input, as `NAME/INPUT`.
-            pose_input: The input.
+        `name` is the body or sensor, `slot` the address of its input as `NAME/INPUT`.
         """
         self._followed = (*self._followed, FollowedFrame(name, slot, pose_input))
         if self._tf is None:

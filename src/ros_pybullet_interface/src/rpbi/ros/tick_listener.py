@@ -28,14 +28,11 @@ class TickListener:
         }
 
     def wait_for_tick(self, stamp: genpy.Time, timeout_s: float = 5.0) -> dict[str, Any]:
-        """Waits until every topic has a message of a tick or later, and returns the newest message of each topic.
+        """Waits until every topic has a message of a tick or later, and returns the newest messages, indexed by topic.
 
         Args:
             stamp: Stamp of the tick, as returned by `rpbi/step_n`.
             timeout_s: Longest wait [s] of wall time.
-
-        Returns:
-            The newest messages, indexed by topic.
 
         Raises:
             TimeoutError: If a topic has no such message in time; the error names all such topics.

@@ -177,7 +177,7 @@ class DebugCamera:
     """Publishes and sets the window's camera.
 
     Args:
-        window: The window; None if there is no window, and then the camera is neither published nor set.
+        window: The window; without a window (None), the camera is neither published nor set.
         configured: Camera from the main YAML file, which `get` returns if there is no window.
     """
 

@@ -1,4 +1,4 @@
-"""Base class of robots, simulated or visual."""
+"""Base class of all robots, simulated or visual."""
 
 import logging
 import math
@@ -25,17 +25,18 @@ from .robot_config import RobotConfig
 log = logging.getLogger(__name__)
 
 START_TOLERANCE = 1e-3
-"""Largest error of measured start positions of coupled joints [rad or m]; beyond it, they are refused."""
+"""Largest difference between a mimic joint's configured and actual start position [rad or m]; beyond it, a warning is
+logged."""
 DEFAULT_BASE_STATE_HZ = 50.0
-"""Rate of the state of a base that physics moves [Hz]."""
+"""Default rate of the base state of a robot whose base is not fixed [Hz]."""
 
 
 class JointedBody(Body):
-    """A body from a URDF, created at its start position.
+    """A robot from a URDF, created at its start position.
 
     Raises:
         ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
+        PhysicsError: If PyBullet cannot load the robot.
     """
 
     Config = RobotConfig
@@ -45,7 +46,7 @@ class JointedBody(Body):
     base_joints: ClassVar[int] = 0
     """Number of joints that `prepare_urdf` adds between the world and the root link."""
     prepare_urdf = staticmethod(for_pybullet)
-    """Returns the parts of the configured URDF that PyBullet reads."""
+    """Function that converts the configured URDF to the URDF that PyBullet reads."""
     fixes_base: ClassVar[bool] = False
     """Whether PyBullet fixes the base regardless of the configuration."""
 
@@ -62,7 +63,7 @@ class JointedBody(Body):
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         arguments = self._load_arguments(config)
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
-        inertia_from_urdf = config.inertia_from_urdf and not config.is_visual_robot  # which has no mass
+        inertia_from_urdf = config.inertia_from_urdf and not config.is_visual_robot  # a visual robot has no mass
         body_id = load_urdf(pb, config.name, arguments, self.prepare_urdf, inertia_from_urdf)
         super().__init__(pb, config.name, body_id)
         self.config = config
@@ -82,7 +83,7 @@ class JointedBody(Body):
             self._set_alpha(config.color_alpha)
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Link poses, or that of the root link alone, if configured, and the state of the base."""
+        """Returns the configured sensors of the link poses (all links or only the root) and of the base state."""
         sensors: list[Sensor] = []
         if self.config.broadcast_link_states:
             sensors.append(LinkPoseSensor(self, self.config.broadcast_link_states_hz))
@@ -97,12 +98,12 @@ class JointedBody(Body):
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """Its kinematics in a client of their own, for any thread; made when first asked for."""
+        """Kinematics of the robot, created at the first use in a separate PyBullet client; any thread may use them."""
         load = self.config.loadURDF
         return Kinematics(load.fileName, load.globalScaling or 1.0, load.flags or 0)
 
     def start_positions(self) -> dict[int, float]:
-        """Returns the start position [rad or m] of each driven joint by index."""
+        """Returns the start position [rad or m] of each driven joint, indexed by PyBullet's joint index."""
         return {joint.index: self._start_of(joint) for joint in self.model.driven}
 
     def _start_of(self, joint: Joint) -> float:
@@ -111,17 +112,17 @@ class JointedBody(Body):
         return math.radians(start) if in_degrees else start
 
     def joint_positions(self) -> dict[int, float]:
-        """Returns the measured position [rad or m] of each joint of one axis by index."""
+        """Returns the measured positions [rad or m] of all joints with one axis, indexed by PyBullet's joint index."""
         indices = [joint.index for joint in self.model.moving]
         states = self.pb.getJointStates(self.body_id, indices) if indices else ()
         return {index: state[0] for index, state in zip(indices, states)}
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motors' efforts [N m or N] of all joints, of which PyBullet reported some."""
+        """Returns the motor efforts [N m or N] of all joints; here, the efforts that PyBullet reports."""
         return reported
 
     def set_joint_state(self, target: JointCommand) -> None:
-        """Sets positions [rad or m] and velocities [rad/s or m/s] of joints at once; velocities are 0 by default.
+        """Sets positions [rad or m] and velocities [rad/s or m/s] of joints at once; missing velocities are set to 0.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -141,24 +142,28 @@ class JointedBody(Body):
         )
 
     def close(self) -> None:
-        """Closes its kinematics."""
+        """Closes the robot's kinematics."""
         if "kinematics" in vars(self):
             self.kinematics.close()
 
     def _put_joints(self, positions: Mapping[int, float], velocities: Mapping[int, float] | None = None) -> None:
-        """Sets positions [rad or m] of joints by index, with velocities, 0 by default, in one call of PyBullet.
+        """Sets positions and velocities of joints in one call of PyBullet.
 
-        With a window and no graphics card, a call takes milliseconds.
+        One call saves time, since each takes milliseconds if there is a window but no graphics card.
+
+        Args:
+            positions: Positions [rad or m], indexed by PyBullet's joint index.
+            velocities: Velocities [rad/s or m/s] of the same joints; missing ones are set to 0.
         """
         rates = velocities or {}
         values, speeds = [[each] for each in positions.values()], [[rates.get(index, 0.0)] for index in positions]
         self.pb.resetJointStatesMultiDof(self.body_id, [*positions], values, speeds)
 
     def _joint_model(self, joints: list[Joint]) -> JointModel:
-        """Returns the joints with the couplings of the URDF and the configuration.
+        """Returns the joint model, with the mimic joints of the URDF and of the key `coupled_joints`.
 
         Raises:
-            ConfigError: If a joint cannot follow another.
+            ConfigError: If a joint cannot follow another joint.
         """
         coupled = self.config.coupled_joints
         names = {joint.name for joint in joints[self.base_joints :]}
@@ -178,7 +183,7 @@ class JointedBody(Body):
             raise ConfigError([Problem(self.name, key, str(error))]) from None
 
     def _problems(self) -> list[Problem]:
-        """Returns the problems of the configuration for this robot."""
+        """Returns all parts of the configuration that do not fit this robot."""
         configured = self.config.initial_joint_position
         if problems := self._unknown_joints({f"initial_joint_position.{name}": name for name in configured}):
             return problems
@@ -190,7 +195,12 @@ class JointedBody(Body):
         ]
 
     def _compare_start(self, follower: Joint, position: float) -> None:
-        """Warns if the configured start of a mimic joint contradicts that of the joint that it follows."""
+        """Logs a warning if the configured start position of a mimic joint differs from its actual position.
+
+        Args:
+            follower: The mimic joint.
+            position: The actual start position, computed from the mimicked joint [rad or m].
+        """
         configured = self._start_of(follower)
         if follower.name in self.config.initial_joint_position and abs(configured - position) > START_TOLERANCE:
             leader = self.model.joints[self.model.couplings[follower.index].leader].name
@@ -200,7 +210,11 @@ class JointedBody(Body):
             )
 
     def _unknown_joints(self, names: Mapping[str, str]) -> list[Problem]:
-        """Returns a problem for each unknown joint name, with the key that has it."""
+        """Returns a problem for each joint name that the robot lacks.
+
+        Args:
+            names: Joint names, indexed by the configuration key that names them.
+        """
         problems = []
         for key, name in names.items():
             try:
@@ -210,6 +224,6 @@ class JointedBody(Body):
         return problems
 
     def _set_alpha(self, alpha: float) -> None:
-        """Sets the opacity of every visual shape."""
+        """Sets the opacity of all visual shapes, from 0 to 1."""
         for shape in self.pb.getVisualShapeData(self.body_id):
             self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))

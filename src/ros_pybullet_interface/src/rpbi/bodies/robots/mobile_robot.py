@@ -1,4 +1,4 @@
-"""Mobile robots: robots whose base drives over the ground."""
+"""Mobile robots, whose base drives over the ground."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,8 @@ from .robot_config import RobotConfig
 class MobileRobot(Robot):
     """A robot whose base drives by velocity in the x-y plane of its start pose.
 
-    Joints between the world and the root link move it. They are not part of its joint states and targets.
+    Additional joints between the world and the root link move the base. They do not appear in the robot's joint states
+    and targets.
     """
 
     base_joints = len(PLANAR_JOINTS)
@@ -25,26 +26,26 @@ class MobileRobot(Robot):
     example = {key: value for key, value in Robot.example.items() if key != "object_tf"} | {"planar_base": {}}
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
-        if config.planar_base is None:  # its type is named
+        if config.planar_base is None:  # the YAML names the type mobile_robot
             raise ConfigError([Problem(config.name, "planar_base", "missing: a mobile_robot needs it")])
         super().__init__(pb, config)
         self.planar_base = PlanarBase(pb, self.body_id, config.planar_base, self.drive.dt_s)
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML of the section `robots` is that of a robot whose base drives."""
+        """Returns whether the YAML of an object in the section `robots` describes a robot whose base drives."""
         return data.get("planar_base") is not None
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `cmd_vel`, a Twist in the base frame, in addition to the inputs of every robot."""
+        """Returns the inputs of every robot, and `cmd_vel`, a twist in the base frame [m/s, rad/s]."""
         return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
 
     def restart(self) -> bool:
-        """Returns False: it is created anew, since its base follows velocities."""
+        """Returns False, so that a reset creates the robot anew, since its base follows velocities."""
         return False
 
     def before_step(self, tick: int) -> None:
-        """Drives the base, in addition to the actions of every robot."""
+        """Advances motion and controllers as for every robot, and drives the base."""
         super().before_step(tick)
         self.planar_base.before_step(tick)
 
@@ -59,7 +60,10 @@ class MobileRobot(Robot):
         return Twist(rotated(plane, (x, y, 0.0)), rotated(plane, (0.0, 0.0, yaw)))
 
     def set_base_pose(self, pose: Pose) -> None:
-        """Puts the root link's URDF frame at a pose in the world, at rest; from then on it stays in that x-y plane."""
+        """Puts the root link's URDF frame at a pose in the world, at rest.
+
+        From then on, the base drives in the x-y plane of that pose.
+        """
         super().set_base_pose(pose)
         for index in PLANAR_JOINTS:
             self.pb.resetJointState(self.body_id, index, 0.0)

@@ -1,4 +1,4 @@
-"""Robots: jointed bodies whose motors hold and follow targets."""
+"""Robots with motors, which follow and hold joint targets."""
 
 import logging
 import re
@@ -40,8 +40,8 @@ log = logging.getLogger(__name__)
 class Robot(JointedBody):
     """A robot with motors, within the effort and velocity limits of its URDF.
 
-    It holds its start position until the first target. Targets of joints that a motion drives are refused until it
-    ends.
+    The robot holds its start position until the first target. While a timed motion drives joints, targets of these
+    joints are refused.
     """
 
     example = {
@@ -99,11 +99,15 @@ class Robot(JointedBody):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML of the section `robots` is that of a robot with motors whose base does not drive."""
+        """Returns whether the YAML of an object in the section `robots` is neither a visual nor a mobile robot's."""
         return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Joint states, force-torque sensors, the follower's state and contacts, besides link poses."""
+        """Returns the configured sensors.
+
+        They measure joint states, controller states, forces and torques in joints, the trajectory follower's state,
+        contacts, link poses and the state of the base.
+        """
         hz = self.config.joint_state_publisher_hz
         joint_states = (JointStateSensor(self, hz),) if hz else ()
         trajectory = () if self.follower is None else (TrajectoryStateSensor(self.drive, self.follower),)
@@ -116,15 +120,16 @@ class Robot(JointedBody):
         return (*joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `target` besides the pose of its base.
+        """Returns the inputs of the robot, indexed by name.
 
-        It is a JointCommand, or a mapping of joints to numbers in the quantity of the control mode.
+        They are those of every body, `target` and the inputs of the controllers. A value of `target` is a JointCommand,
+        or a mapping from joint names to numbers in the quantity of the control mode.
         """
         target = Input(self._check_target, self.drive.follow, merge=coalesce)
         return {**super().inputs(), "target": target, **self._controller_inputs()}
 
     def before_step(self, tick: int) -> None:
-        """Advances the motion and the controllers, expires targets and applies efforts."""
+        """Advances the running motion and the controllers, drops expired targets, and applies efforts."""
         self.drive.advance(tick)
         mode, driven = self.motors.mode, self.controllers.driven
         holding: Mapping[int, float] = {}
@@ -145,24 +150,24 @@ class Robot(JointedBody):
 
     @property
     def is_idle(self) -> bool:
-        """Whether it holds its position, or moves at a velocity, with nothing to compute."""
+        """Whether the robot's motors hold their positions or velocities, so that ticks need no computation."""
         is_plain = type(self).before_step is Robot.before_step and not self.controllers.driven
         return is_plain and self.drive.is_idle and self.motors.is_idle
 
     @property
     def robot_model(self) -> RobotDynamics:
-        """Its dynamics and kinematics."""
+        """Dynamics and kinematics of the robot, created at the first use."""
         if self._robot_model is None:
             config = self.config
             self._robot_model = RobotDynamics(self.pb, self.model, config.loadURDF, config.inertia_from_urdf)
         return self._robot_model
 
     def switch_controllers(self, switch: ControllerSwitch) -> None:
-        """Stops and starts controllers; a motion of joints that they drive from then on is ended.
+        """Stops and starts controllers; a running motion ends if it moves joints of the started controllers.
 
         Raises:
-            UnknownNameError: If there is none of a name.
-            ValueError: If two would drive one joint; then nothing has changed.
+            UnknownNameError: If the robot lacks one of the controllers.
+            ValueError: If two controllers would drive the same joint; all controllers then stay as they were.
         """
         taken = self.controllers.switch(switch)
         if self.drive.motion is not None and taken & self.drive.motion.joints:
@@ -171,16 +176,21 @@ class Robot(JointedBody):
         self.drive.drop_targets(taken)
 
     def halt(self, reason: str) -> None:
-        """Ends the motion that runs, if any; its joints hold where they are."""
+        """Ends the running motion, if any; its joints hold their present positions."""
         self.drive.halt(reason)
 
     def pause(self, reason: str) -> None:
-        """Ends the motion that runs, unless it can wait until the world runs again."""
+        """Ends the running motion, unless the motion can continue when the world runs again."""
         if self.drive.motion is not None and not self.drive.motion.can_wait:
             self.halt(reason)
 
     def restart(self) -> bool:
-        """Holds its start position again; returns False if it has controllers, a follower or filtered sensors."""
+        """Makes the motors hold the start position again, after a reset.
+
+        Returns:
+            False, without a change, if the robot has controllers, a trajectory follower or force-torque sensors. The
+            caller then creates the robot anew.
+        """
         if self.controllers.names or self.follower is not None or self.force_torque_sensors:
             return False
         self.halt("the world was reset")
@@ -190,11 +200,11 @@ class Robot(JointedBody):
         return True
 
     def resume(self) -> None:
-        """Restores the state of its motors."""
+        """Sends the state of the motors to PyBullet again."""
         self.motors.resume()
 
     def switch_mode(self, mode: int) -> None:
-        """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
+        """Changes the control mode of the motors, and ends the running motion; does nothing if the mode is the same."""
         if mode != self.motors.mode:
             self.halt("the control mode was changed")
             self.drive.drop_targets()
@@ -203,7 +213,7 @@ class Robot(JointedBody):
             self.motors.disable(self.controllers.driven)
 
     def set_joint_state(self, target: JointCommand) -> None:
-        """Sets joint positions at once, which the motors then hold; a motion that runs is ended."""
+        """Sets joint positions at once, makes the motors hold them, and ends the running motion."""
         super().set_joint_state(target)
         self.halt("its joints were set to other positions")
         positions = self.model.resolve(target.names, target.position)
@@ -212,24 +222,28 @@ class Robot(JointedBody):
         self.motors.disable(self.controllers.driven & positions.keys())
 
     def teleport(self, pose: Pose) -> None:
-        """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
+        """Puts the base link's URDF frame at a pose in the world, at rest, and ends the running motion."""
         self.halt("the robot was moved to another pose")
         super().teleport(pose)
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those that were applied."""
+        """Returns the motor efforts [N m or N] of all joints.
+
+        Args:
+            reported: Efforts that PyBullet reports for all joints. They lack efforts that this class applied itself.
+        """
         applied = self.motors.applied_efforts
         if not applied:
             return reported
         return tuple(applied.get(joint.index, effort) for joint, effort in zip(self.joints, reported))
 
     def remove(self) -> None:
-        """Removes the robot from the world, and ends its motion."""
+        """Ends the running motion and removes the robot from the world."""
         self.halt("the robot was removed")
         super().remove()
 
     def close(self) -> None:
-        """Closes its kinematics, and its model."""
+        """Closes the robot's kinematics and dynamics."""
         super().close()
         if self._robot_model is not None:
             self._robot_model.close()
@@ -255,7 +269,11 @@ class Robot(JointedBody):
         return RobotState(self.base_pose(), positions, velocities, twist)
 
     def _spring(self, state: RobotState) -> None:
-        """Applies the efforts of the springs of IMPEDANCE_CONTROL, and those that balance gravity and motion."""
+        """Applies the joint efforts of IMPEDANCE_CONTROL.
+
+        They are the sum of spring and damper efforts and of efforts that compensate gravity, Coriolis and centrifugal
+        forces.
+        """
         motors, model = self.motors, self.robot_model
         wanted = [
             motors.impedance_setpoints.get(joint.index, (motors.targets[joint.index], 0.0)) for joint in model.joints
@@ -278,7 +296,7 @@ class Robot(JointedBody):
         return ControlledRobot(self.name, self.link_pose, self.robot_model, links, none, dt_s)
 
     def _controller_inputs(self) -> dict[str, Input]:
-        """Returns the inputs of controllers: `CONTROLLER/INPUT`."""
+        """Returns the inputs of the controllers, indexed by `CONTROLLER/INPUT`."""
         return {
             f"{name}/{key}": Input(
                 partial(self._check_controller_input, name, key),
@@ -294,7 +312,7 @@ class Robot(JointedBody):
         return self.controllers.of(name).check(key, value)
 
     def _warn_mimic(self, names: Sequence[str]) -> None:
-        """Warns once that mimic joints have no targets of their own."""
+        """Logs once that targets of mimic joints have no effect, if targets name such a joint."""
         for index, coupling in self.model.couplings.items():
             joint, leader = self.model.joints[index].name, self.model.joints[coupling.leader].name
             if joint in names:
@@ -302,7 +320,7 @@ class Robot(JointedBody):
                 self._warned_mimic = True
 
     def _gains(self) -> dict[int, dict[str, float]]:
-        """Returns PyBullet's gains by joint index; the configuration is already checked."""
+        """Returns PyBullet's gain arguments, indexed by joint; the configuration must have been checked before."""
         gains: dict[int, dict[str, float]] = {}
         for key, given in self._configured_gains().items():
             argument = key.removesuffix("s")
@@ -340,7 +358,10 @@ class Robot(JointedBody):
         return [*problems, *self._force_torque_problems(), *self._model_problems()]
 
     def _model_problems(self) -> list[Problem]:
-        """Returns a problem if joints have several axes, which PyBullet's inverse dynamics does not support."""
+        """Returns a problem for each key that needs inverse dynamics, if the robot has joints of several axes.
+
+        PyBullet's inverse dynamics does not support such joints.
+        """
         others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
         motors = self.config.setJointMotorControlArray
         needs = {

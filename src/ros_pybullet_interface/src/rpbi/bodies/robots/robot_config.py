@@ -37,7 +37,7 @@ _NOT_VISUAL = {
 
 
 def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
-    """Returns the configuration of a controller, by the model of its class."""
+    """Parses an entry of `controllers` with the `Config` of the controller class that the entry names."""
     expected = f"a mapping with 'type', one of {', '.join(CONTROLLERS)}, or module:Class"
     return CONTROLLERS.parse_entry(entry, info, ControllerConfig, expected)
 
@@ -73,7 +73,7 @@ class CoupledJoint(ConfigModel):
 
     @property
     def mimic(self) -> Mimic:
-        """The same as a URDF has it."""
+        """The same coupling as `<mimic>` of a URDF."""
         return Mimic(self.joint, self.multiplier, self.offset)
 
 

@@ -1,4 +1,4 @@
-"""Visual robots: shown at joint targets and TF poses, without collisions."""
+"""Visual robots, which are shown at their joint targets and TF poses, without contacts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -36,11 +36,15 @@ class VisualRobot(JointedBody):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML of the section `robots` is that of a visual robot."""
+        """Returns whether the YAML of an object in the section `robots` describes a visual robot."""
         return data.get("is_visual_robot") in (True, 1)
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns `target`, a JointCommand or mapping of joints to positions [rad or m], and the pose of its base."""
+        """Returns the inputs of the robot, indexed by name.
+
+        They are `target` and, if the base follows a TF frame, `pose`. A value of `target` is a JointCommand or a
+        mapping from joint names to positions [rad or m].
+        """
         return {**super().inputs(), "target": Input(self._check_target, self._show, merge=dict.__or__)}
 
     def _check_target(self, given: JointCommand | Mapping[str, float]) -> dict[int, float]:

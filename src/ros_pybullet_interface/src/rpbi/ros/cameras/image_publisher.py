@@ -33,7 +33,7 @@ LONGEST_WAIT_S = 5.0
 
 
 class ImagePublisher:
-    """Publishes the images of each camera on those of the camera's topics that have subscribers."""
+    """Publishes the images of all cameras; topics without subscribers are skipped."""
 
     def __init__(self) -> None:
         # Without ROS time, since the node must never wait for /clock; the frames contain their stamps.
@@ -77,7 +77,7 @@ def camera_node(simulator: str) -> str:
 def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
     """Returns the command-line arguments of the renderer process.
 
-    They are the simulator's remappings and namespace, and a node name with `_camera` appended to the simulator's.
+    They are the simulator's remappings, its namespace, and the simulator's node name with `_camera` appended.
 
     Args:
         node_name: The simulator's resolved node name.

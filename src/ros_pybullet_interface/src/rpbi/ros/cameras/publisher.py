@@ -46,7 +46,10 @@ class ScenePublisher:
         )
 
     def poll(self) -> None:
-        """Updates the cameras and exchanges messages with the renderer process; each pass of the loop calls it."""
+        """Updates the cameras and exchanges messages with the renderer process.
+
+        Call this method in every pass of the simulation loop.
+        """
         if self._sensors is not self._world.cameras:
             self._update_cameras(self._world.cameras)
         self._renderer.poll()
@@ -117,7 +120,7 @@ class ScenePublisher:
     def close(self) -> None:
         """Ends the renderer process.
 
-        It first gets normal priority, since it has to unregister from the ROS master before it ends.
+        The process first gets normal priority, since it has to unregister from the ROS master before it ends.
         """
         if self._renderer.process_id is not None:
             nice = os.getpriority(os.PRIO_PROCESS, 0)

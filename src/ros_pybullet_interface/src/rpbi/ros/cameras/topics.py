@@ -57,12 +57,7 @@ CLOUD_TOPIC = (
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
-    """Returns the stream and the topic for each topic name of a camera.
-
-    Args:
-        topic_name: Name of the camera in its topics.
-        pointcloud: Whether the camera publishes point clouds.
-    """
+    """Returns the streams and topics of a camera, indexed by topic name; `topic_name` is the camera's name in them."""
     rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
     return {topic.name.format(name=topic_name): (stream, topic) for stream, topic in rows}
 

@@ -41,7 +41,7 @@ class _CommandTopic(FastTopic):
         super().__init__(COMMANDS.name, COMMANDS.message_type)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
-        """Stores a new subscriber; rospy calls this method from a thread of rospy's."""
+        """Stores a new subscriber; rospy calls this method in another thread."""
         self.newcomers.append(_Recipient(peer_publish))
 
 

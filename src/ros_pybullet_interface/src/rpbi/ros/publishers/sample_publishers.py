@@ -31,12 +31,7 @@ class TopicPublisher:
         self._last: dict[SampleKey, tuple[Any, int]] = {}
 
     def open(self, key: SampleKey, row: Topic) -> None:
-        """Advertises the topic of a sensor; any thread may call this method.
-
-        Args:
-            key: Type and name of the sensor's samples.
-            row: The sensor's topic.
-        """
+        """Advertises the topic of a sensor; any thread may call this method."""
         assert row.handler is not None  # rows of samples have one
         topic = FastTopic(row.name.format(name=key[1]), row.message_type)
         self._routes = {**self._routes, key: (topic, row.handler)}

@@ -145,10 +145,7 @@ def state_message(state: TrajectoryStateSample, stamp_ns: int) -> JointTrajector
 def fill_state(message: Any, state: TrajectoryStateSample, stamp_ns: int) -> Any:
     """Fills the fields of a message with a trajectory follower's state, and returns the message.
 
-    Args:
-        message: A JointTrajectoryControllerState, or the feedback of the trajectory action.
-        state: State of the follower.
-        stamp_ns: Stamp [ns].
+    The message is a JointTrajectoryControllerState, or the feedback of the trajectory action.
     """
     desired = state.desired
     since_start = genpy.Duration.from_sec(state.time_from_start_s)

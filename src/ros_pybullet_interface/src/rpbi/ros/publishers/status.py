@@ -111,8 +111,7 @@ class ClockPublisher:
             self._send()
 
     def publish_now(self) -> None:
-        """Publishes the time of the present tick regardless of the rate, for instance after the last tick before a
-        stop."""
+        """Publishes the time of the present tick regardless of the rate, for instance before a stop."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 

@@ -41,10 +41,7 @@ class TransformCollector:
     def drain(self) -> PackedTransforms | None:
         """Returns a message with the collected transforms, and clears the collection.
 
-        The next `collect` overwrites the transforms.
-
-        Returns:
-            The message; None if there are no transforms.
+        Returns None if there are no transforms. The next `collect` overwrites the message's transforms.
         """
         collected, self._collected = self._collected, []
         return PackedTransforms(collected) if collected else None

@@ -209,13 +209,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
     """Reads YAML text: the keys of an object, or the key `file` and keys that override those of the file.
 
-    Args:
-        node: The node.
-        text: YAML text of the request.
-        key: Field of the request that has the text, for error messages.
-
-    Returns:
-        The same as `_read_object`.
+    It returns the same values as `_read_object`. `key` is the request's field with the text, for error messages.
     """
     data = load_configs(text, key, MAX_BYTES)
     if FILE not in data:
@@ -239,10 +233,7 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
 def _find(node: NodeContext, name: str, key: str) -> str:
     """Finds a YAML file and returns its path; other types of files are refused, so that services do not reveal them.
 
-    Args:
-        node: The node.
-        name: Name of the file.
-        key: Field of the request that has the name, for error messages.
+    `key` is the request's field with the file's name, for error messages.
     """
     if not name.lower().endswith(YAML_SUFFIXES):
         raise InterfaceError(f"{key}: expected the name of a YAML file ({', '.join(YAML_SUFFIXES)}), got {shown(name)}")

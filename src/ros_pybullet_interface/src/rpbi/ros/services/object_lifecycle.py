@@ -122,11 +122,7 @@ class ObjectLifecycle:
                 raise error
 
     def end(self, timeout_s: float) -> None:
-        """Waits for the operation that is running; later operations wait forever.
-
-        Args:
-            timeout_s: Longest wait [s].
-        """
+        """Waits for the operation that is running, for at most `timeout_s`; later operations wait forever."""
         self._lock.acquire(timeout=timeout_s)
 
     def _prepare(self, kind: str, config: Any, file: str) -> None:
@@ -152,7 +148,7 @@ class ObjectLifecycle:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Waits until other operations are done, and blocks them meanwhile.
+        """Waits until other operations are done, and makes later operations wait until the caller's one is done.
 
         Raises:
             InterfaceError: If a state is being restored.
@@ -170,9 +166,10 @@ class ObjectLifecycle:
         """Resets the world, or starts to restore a saved state; runs in the simulation thread.
 
         Returns:
-            Four values. First, the names of the bodies that were added or removed since the world was built or reset.
-            Second, the topics of these bodies, which the caller must close. Third, the error of the reset, or None.
-            Fourth, for a saved state, the future of the restoration, otherwise None.
+            Names of the bodies that were added or removed since the world was built or reset.
+            Topics of these bodies, which the caller must close.
+            Error of the reset, or None.
+            Future of the restoration if a saved state is restored, otherwise None.
         """
         if to is not None:
             self._world.require_own(to)
@@ -222,7 +219,6 @@ class ObjectLifecycle:
         self._close(name)
 
     def _remove_body(self, name: str) -> list[FastTopic]:
-        """Removes a body from the world, and returns the topics that the caller must close; runs in the simulation
-        thread."""
+        """Removes a body from the world in the simulation thread; returns the topics that the caller must close."""
         self._world.remove(name)
         return self._publishers.forget(name)

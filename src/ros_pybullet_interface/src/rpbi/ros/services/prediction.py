@@ -42,7 +42,7 @@ class Predictor:
 
     A second process, the shadow, repeats the simulation of the world up to the present tick and predicts from there.
     The first prediction simulates all ticks since the last start, reset or keyframe. Later predictions simulate only
-    the ticks since the prediction before.
+    the ticks since the previous prediction.
 
     Args:
         simulation: The loop that runs the world.
