@@ -1,6 +1,4 @@
-"""Scenes: tasks that robots carry out in a world, with a score. A new scene is a class in its own file and a line
-here.
-"""
+"""Scenes: tasks of robots in a world, with a score. A new scene is a class in its own file and an entry in `SCENES`."""
 
 from __future__ import annotations
 
@@ -23,4 +21,4 @@ SCENES: PluginTable[Scene] = PluginTable(
         "dual_arm": "rpbi_examples.scenes.dual_arm:DualArm",
     },
 )
-"""All scenes; each is imported when it is looked up, since some need an extra."""
+"""All scenes. A scene's module is imported on look-up, since some scenes need optional dependencies."""

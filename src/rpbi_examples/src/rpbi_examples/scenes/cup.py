@@ -14,23 +14,27 @@ from .parts.polar import PolarArm, PolarPoint
 from .scene import Scene, SceneFailedError, Watched
 
 TABLE_M = 0.5
-"""Height of the table, on which the arm is mounted."""
+"""Height of the table on which the arm is mounted [m]."""
 SHELF_M = (0.12, 0.70)
-"""Position of the shelf, as in configs/cup/shelf.yaml."""
+"""Position x, y of the shelf, as in configs/cup/shelf.yaml [m]."""
 INNER_RADIUS_M, CUP_HEIGHT_M, BALL_RADIUS_M = 0.0315, 0.08, 0.013
 BALLS = ("ball_1", "ball_2", "ball_3", "ball_4", "ball_5")
 FINGERS = ("1", "2")
 PALM = "j2s6s200_link_6"
 GRASP_M, NEAR_M = 0.05, 0.01
-"""Height of the grasp above the bottom of the cup, and distance from which the hand approaches slowly."""
+"""Height of the grasp above the bottom of the cup, and distance from the cup at which the slow approach starts [m]."""
 BACK_M, FRONT_M, ABOVE_M = 0.13, 0.2, 0.05
-"""Distances of the hand to and from the cup, and of the cup onto the shelf; height of the first lift."""
+"""Distance of the hand from the cup before and after a grasp, distance of the cup before the shelf, and height of the
+lift [m].
+"""
 SPEED, SLOW_SPEED, TURN_SPEED = 0.09, 0.03, 0.28
-"""Mean speeds of the hand [m/s] and of its turn about the base [rad/s]."""
+"""Mean speeds of the hand [m/s], and mean angular speed of the hand about the arm's base [rad/s]."""
 OPEN, CLOSED = (0.4, 0.2), (1.4, 1.4)
-"""Targets of a finger and its tip [rad]; those of a closed hand are inside the cup, to press it with full effort."""
+"""Targets of a finger's two joints [rad]. The closed targets are inside the cup, so that the fingers press with full
+effort.
+"""
 MAX_OFF_M, MAX_TILT_DEG, AT_REST_M = 0.02, 5.0, 0.0002
-"""Limits for a cup on the shelf: distance from its goal, tilt, and motion in a cycle while at rest."""
+"""Limits of success for the cup: distance from its goal [m], tilt [deg], and motion in a cycle [m]."""
 Bend = tuple[float, float]
 
 
@@ -48,7 +52,7 @@ class Cup(Scene):
         self._largest_tilt_deg, self._moved_m, self._last = 0.0, math.inf, ZERO
 
     def prepare(self) -> None:
-        """Puts a cup of random friction on the table, the balls into it, and the shelf at a random height."""
+        """Puts a cup with random friction on the table, the balls into the cup, and the shelf at a random height."""
         radius, azimuth, yaw = self.random.uniform((0.58, -0.6, -math.pi), (0.7, 0.2, math.pi)).tolist()
         cup = Pose(PolarPoint(radius, azimuth, TABLE_M).pose().position, about_z(yaw))
         self.place("cup", cup)
@@ -59,7 +63,7 @@ class Cup(Scene):
         self.place("shelf", Pose((*SHELF_M, TABLE_M + float(self.random.uniform(0.15, 0.3)))))
 
     def act(self) -> Iterator[None]:
-        """Approaches, grasps and lifts the cup, swings to the shelf, puts it down and retreats."""
+        """Approaches, grasps and lifts the cup, moves the cup to the shelf, puts the cup down and retreats."""
         urdf = "{rpbi_examples}/robots/kinova_hand.urdf"
         arm = PolarArm(self, "kinova", urdf, "base", "j2s6s200_end_effector", Pose((0.0, 0.0, TABLE_M)))
         start = PolarPoint.of(self.sensed.poses["cup"].position)
@@ -92,18 +96,18 @@ class Cup(Scene):
         self._moved_m, self._last = norm(minus(place, self._last)), place
 
     def has_succeeded(self) -> bool:
-        """Returns whether the cup is on the shelf, upright, at rest, with all balls and released."""
+        """Returns whether the released cup is upright and at rest at its goal on the shelf, with all balls inside."""
         is_there = self._off_m() < MAX_OFF_M and self._touching() - {*BALLS} == {"shelf"}
         stands = self._moved_m < AT_REST_M and self._tilt_deg() < MAX_TILT_DEG
         return is_there and stands and self._balls_inside() == len(BALLS)
 
     def fault(self) -> str:
-        """Returns the number of spilled balls in words, if any."""
+        """Returns the number of spilled balls in words. Empty if all balls are in the cup."""
         spilled = len(BALLS) - self._balls_inside()
         return f"{spilled} of {len(BALLS)} balls spilled" if spilled else ""
 
     def figures(self) -> dict[str, float]:
-        """Returns the number of balls in the cup, its distance from the goal, its final and its largest tilt."""
+        """Returns the number of balls in the cup, and the cup's distance from the goal, final tilt and largest tilt."""
         return {
             "balls inside": self._balls_inside(),
             "off [mm]": 1e3 * self._off_m(),
@@ -112,7 +116,11 @@ class Cup(Scene):
         }
 
     def _until(self, name: str, motion: Iterator[None]) -> Iterator[None]:
-        """Moves until a body, or a link of the robot, touches the cup."""
+        """Continues a motion until a body, or a link of the robot, touches the cup.
+
+        Raises:
+            SceneFailedError: If the motion ends without contact.
+        """
         for _ in motion:
             if name in self._touching():
                 return
@@ -129,7 +137,7 @@ class Cup(Scene):
             yield
 
     def _touching(self) -> set[str]:
-        """Returns the other bodies and the links of the robot that touch the cup."""
+        """Returns the names of the bodies and of the robot's links that touch the cup."""
         touches = self.seen.contacts["cup"]
         return {touch.other_link if touch.other == "kinova" else touch.other for touch in touches}
 

@@ -1,4 +1,4 @@
-"""Two arms press a box between their flanges, carry it to another place and set it down."""
+"""Two arms press a box between their flanges, carry the box to a goal and put the box down."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from .parts.arm import about_z, between, smooth, tilt_deg
 from .scene import Scene, Touch, Watched
 
 HALF_WIDTH_M, TABLE_M, HALF_HEIGHT_M = 0.15, 0.45, 0.1
-"""Half the distance between the pressed faces, height of the table, half the height of the box."""
+"""Half the distance between the pressed faces, height of the table, half the height of the box [m]."""
 STIFFNESS = 3000.0
 """Stiffness of the hands, as in configs/dual_arm/iiwa.yaml [N/m]."""
 FORCE_N, MAX_CHANGE = 80.0, 0.3
-"""Internal force with which both hands press the box; and its largest relative change over 95 % of the path."""
+"""Internal force with which the hands press the box [N], and its largest relative error in 95 % of the cycles."""
 MASSES_KG = (1.0, 3.0)
 LIFT_M = 0.2
 SPEED = 0.1
 """Mean speed of the box [m/s]."""
 SHORTEST_S, CYCLE_S = 1.5, 0.02
-"""Least time of a motion, and time of a cycle [s]."""
+"""Least duration of a motion, and duration of a cycle [s]."""
 NEAR_M, NEAR_RAD = 0.02, math.radians(5.0)
-"""Error within which the box is at its goal."""
+"""Distance [m] and angle [rad] from the goal within which the box counts as at its goal."""
 MAX_TILT_DEG = 3.0
 FLANGES = {
     "left": (1.0, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))),
     "right": (-1.0, (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))),
 }
-"""By arm: the side of the box, along its y axis, and the orientation of the flange in the box: z points at the box."""
+"""For each arm: sign of the box's y axis on the arm's side, and the flange's orientation in the box's frame. The z axis
+of a flange points at the box.
+"""
 
 
 class DualArm(Scene):
@@ -50,12 +52,12 @@ class DualArm(Scene):
         self._shares: list[float] = []
 
     def prepare(self) -> None:
-        """Puts a box of some mass somewhere on the table."""
+        """Puts a box with a random mass at a random pose on the table."""
         self.place("box", _on_table(self.random))
         self.change("box", mass=float(self.random.uniform(*MASSES_KG)))
 
     def act(self) -> Iterator[None]:
-        """Approaches, presses, lifts, carries, lowers and lets go."""
+        """Makes both arms approach the box, press, lift, carry, lower and release the box."""
         start = self.sensed.poses["box"]
         for share in np.linspace(0.0, 1.0, 75):
             self._hold(start, 0.12 - 0.10 * smooth(share))
@@ -73,13 +75,16 @@ class DualArm(Scene):
             yield
 
     def beside(self) -> Iterator[None]:
-        """Treats a box that does not touch the table as carried."""
+        """Determines in each cycle whether the box is carried. A box counts as carried if it does not touch the table.
+
+        `note` records forces only while the box is carried.
+        """
         while True:
             self._is_carrying = "table" not in self._touching()
             yield
 
     def note(self) -> None:
-        """Records the tilt of the box, and the forces on it while it is carried."""
+        """Records the tilt of the box. While the box is carried, also records the forces of both arms."""
         self._tilt_deg = max(self._tilt_deg, tilt_deg(self.seen.poses["box"]))
         if self._is_carrying:
             self._forces.append(min(self._pressure(robot) for robot in FLANGES))
@@ -87,19 +92,21 @@ class DualArm(Scene):
             self._shares.append(left / max(left + right, 1.0))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the box is released at its goal, never tilted, and was pressed with a constant force."""
+        """Returns whether the box was carried level and with the desired force, and is released at its goal."""
         off_m, off_rad = self._error()
         is_there = off_m < NEAR_M and off_rad < NEAR_RAD and self._touching() == {"table"}
         is_held = np.quantile(np.abs(np.array(self._forces or [0.0]) - FORCE_N), 0.95) < MAX_CHANGE * FORCE_N
         return bool(is_there and is_held) and self._tilt_deg < MAX_TILT_DEG
 
     def fault(self) -> str:
-        """Returns the distance of the box from its goal in words, if the hands lost it."""
+        """Returns the distance of the box from its goal in words. Empty if the box is near its goal."""
         off_m, _ = self._error()
         return "" if off_m < NEAR_M else f"the box slipped: it is {1e3 * off_m:.0f} mm from its goal"
 
     def figures(self) -> dict[str, float]:
-        """Returns the error, the largest tilt, the internal force, and the load of each arm."""
+        """Returns the final error, the largest tilt, the range of the internal force, and the left arm's share of the
+        load.
+        """
         off_m, off_rad = self._error()
         low, high = np.quantile(self._forces or [0.0], (0.025, 0.975))
         return {
@@ -112,20 +119,25 @@ class DualArm(Scene):
         }
 
     def _hold(self, box: Pose, gap_m: float) -> None:
-        """Sends both flanges to their sides of the box, with a gap; a negative one presses."""
+        """Sends both flanges to their sides of the box.
+
+        Args:
+            box: Desired pose of the box in the world.
+            gap_m: Distance between each flange and the box [m]. A negative distance presses the box.
+        """
         for robot, (side, turn) in FLANGES.items():
             place = (0.0, side * (HALF_WIDTH_M + gap_m), 0.0)
             self.put(f"{robot}/hold/target", box @ Pose(place, turn))
 
     def _carry(self, start: Pose, end: Pose) -> Iterator[None]:
-        """Moves the box along a line."""
+        """Moves the pressed box along a line from one pose to another, from rest to rest."""
         count = round(max(norm(minus(end.position, start.position)) / SPEED, SHORTEST_S) / CYCLE_S)
         for share in np.linspace(0.0, 1.0, count):
             self._hold(between(start, end, smooth(share)), -FORCE_N / STIFFNESS)
             yield
 
     def _pressure(self, robot: str) -> float:
-        """Returns the force of an arm on the box, along the line between both flanges [N]."""
+        """Returns the force of an arm on the box along the box's y axis [N]."""
         axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
         return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in self._touches(robot)))
 

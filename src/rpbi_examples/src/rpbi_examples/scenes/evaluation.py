@@ -1,4 +1,4 @@
-"""Runs a scene with many seeds in separate processes, and reports its rate of success."""
+"""Runs a scene with many seeds in separate processes, and reports the success rate."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ from .scene import SceneResult, broken_off
 from .task import SceneTask, make_env, run_episode
 
 COLUMNS, MAX_PICTURES = 4, 24
-"""Columns and largest number of pictures of failures."""
+"""Number of columns, and largest number of pictures, in the image of failed episodes."""
 PICTURE_PX = (320, 240)
 
 
 class SeedResult(NamedTuple):
-    """The episode of a seed.
+    """Result of the episode with one seed.
 
     Attributes:
-        seed: The seed.
-        result: How it ended.
-        state_hash: Hash of the world's state at its end; empty after an error of the world.
-        picture: Camera image at the end of a failed episode: uint8, shape (height, width, 3).
+        seed: Seed of the episode.
+        result: Result of the episode.
+        state_hash: Hash of the world's state at the end of the episode. Empty after an error of the world.
+        picture: Camera image at the end of a failed episode: uint8, shape (height, width, 3). None after a success, and
+            after an error of the world.
     """
 
     seed: int
@@ -44,7 +45,7 @@ class SeedResult(NamedTuple):
     picture: np.ndarray | None
 
     def row(self) -> dict[str, Any]:
-        """Returns it as plain data."""
+        """Returns the result as plain data, for JSON."""
         result = self.result
         figures = {name: round(float(value), 4) for name, value in result.figures.items()}
         return {
@@ -60,18 +61,19 @@ class SeedResult(NamedTuple):
 
 
 def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) -> Generator[SeedResult, None, None]:
-    """Runs a scene with some seeds, and yields the results as they arrive; closing the generator ends its processes.
+    """Runs an episode of a scene with each seed, and yields the results as they arrive.
 
-    An error of the world ends only its episode, as failed; the next one has a new world.
+    Closing the generator ends its processes. After an error of the world, the episode counts as failed, and the next
+    episode has a new world.
 
     Args:
         scene: A name of `SCENES`, or `module:Class`.
-        seeds: The seeds.
-        jobs: Number of processes.
+        seeds: Seeds of the episodes.
+        jobs: Number of processes. With 1, the episodes run in this process.
         noise: Whether poses are sensed with noise and delay.
 
     Raises:
-        InterfaceError: If the world cannot be made, or a process has ended.
+        InterfaceError: If the world cannot be made, or a process has ended unexpectedly.
     """
     if jobs == 1:
         try:
@@ -99,7 +101,9 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) 
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Blocks SIGINT in this block, and permanently in processes started in it: their parent handles Ctrl-C."""
+    """Blocks SIGINT for the duration of the `with` block. Processes that are started in the block keep SIGINT blocked,
+    since their parent handles Ctrl-C.
+    """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -108,7 +112,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """Makes this process end with its parent, however that ends."""
+    """Starts a thread that ends this process as soon as the parent process has ended, even after a crash."""
 
     def wait() -> None:
         parent = multiprocessing.parent_process()
@@ -120,7 +124,7 @@ def _end_with_parent() -> None:
 
 
 _env: WorldEnv | None = None
-"""The environment of this process."""
+"""The environment in which this process runs episodes. None before the first episode, and after an error."""
 
 
 def _close() -> None:
@@ -131,7 +135,10 @@ def _close() -> None:
 
 
 def _run(scene: str, seed: int, noise: bool) -> SeedResult:
-    """Runs an episode in the environment of this process, which is made for the first one and after an error."""
+    """Runs an episode in the environment of this process, and returns the result.
+
+    Makes the environment before the first episode, and again after an error.
+    """
     global _env
     _env = _env or make_env(scene, "rgb_array", noise)
     try:
@@ -145,7 +152,7 @@ def _run(scene: str, seed: int, noise: bool) -> SeedResult:
 
 
 def summary(scene: str, results: Sequence[SeedResult], noise: bool = False) -> dict[str, Any]:
-    """Returns the score of a scene as plain data: completed parts, all parts, and a row for each seed."""
+    """Sums up a scene's results as plain data: number of completed parts, number of all parts, and a row per seed."""
     rows = [each.row() for each in sorted(results, key=lambda each: each.seed)]
     return {
         "scene": scene,
@@ -158,17 +165,18 @@ def summary(scene: str, results: Sequence[SeedResult], noise: bool = False) -> d
 
 
 def write_json(path: Path, found: dict[str, Any]) -> None:
-    """Writes a summary."""
+    """Writes a summary to a JSON file, and creates the file's folder if necessary."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(found, indent=1) + "\n")
 
 
 def write_failures(path: Path, results: Sequence[SeedResult]) -> str:
-    """Writes a picture of the ends of failed episodes, of `MAX_PICTURES` at most.
+    """Writes one image with the final pictures of at most `MAX_PICTURES` failed episodes.
+
+    Deletes the file instead if there is no picture of a failed episode.
 
     Returns:
-
-        A line with the file, and the numbers of shown and of failed episodes; empty if none failed.
+        A line of text with the file and the number of shown episodes. Empty without a picture.
     """
     all_failed = [each for each in sorted(results, key=lambda each: each.seed) if each.picture is not None]
     failed = all_failed[:MAX_PICTURES]

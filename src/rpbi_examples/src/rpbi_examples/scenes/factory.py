@@ -16,17 +16,23 @@ from .scene import Scene, Watched
 
 URDF, CHEST = "{rpbi_examples}/robots/nextage_gripper.urdf", Pose((0.0, 0.0, 0.85))
 STATION_M, REACH_M = 0.18, 0.32
-"""Distance of a part past the middle at which the belt stops, and distance within which parts are taken."""
+"""Distances along the belt from its middle [m]: of a part that stops the belt, and of the farthest part in reach."""
 MIDDLE_M, LEAST_M = 0.16, 0.05
-"""Half the width of the middle zone that one arm at a time may enter; least distance between the arms."""
+"""Half the width of the middle zone that one arm at a time may enter, and least distance between the arms [m]."""
 HOME_X_M, HOME_Y_M, CARRY_Z_M, HOVER_M = 0.30, 0.25, 1.04, 0.07
-"""Where hands wait, out of the camera's view of the belt; height of hands that carry a part; height before a grasp."""
+"""Waiting position of the hands, outside the camera's view of the belt; height of a hand that carries a part; height of
+a hand above its grasp [m].
+"""
 OPEN_M, SPARE_M, HELD_M = 0.04, 0.012, 0.012
-"""Largest opening of a finger, gap to a part before a grasp, least opening of a finger that holds a part."""
+"""Largest opening of a finger, gap between finger and part before a grasp, least opening of a finger that holds a part
+[m].
+"""
 GRASP_RAD, PLACE_RAD, SLOTS_M = -1.0, -math.pi / 2.0, (0.092, 0.03)
-"""Preferred yaws of the left hand on the belt and over the box; distances at which it puts parts of a kind in turn."""
+"""Preferred yaw of the left hand on the belt, and over the box [rad]; y of the places for parts of the same kind [m].
+The right hand has the opposite values.
+"""
 TRIES, PAUSE_S = 3, 0.3
-"""Largest number of tries to take a part; time without work after which the belt continues [s]."""
+"""Largest number of tries to take a part, and time without work after which the belt continues [s]."""
 SIDES = {"left": 1.0, "right": -1.0}
 
 
@@ -47,14 +53,14 @@ class Factory(Scene):
         self._placed: list[tuple[str, Kind]] = []
 
     def prepare(self) -> None:
-        """Puts the parts on the belt in a random order, hidden by the housing."""
+        """Puts the parts on the belt in a random order. The housing hides the parts from the camera."""
         for slot, part in enumerate(self.random.permutation(list(PARTS)).tolist()):
             x, y, yaw = self.random.uniform((-0.03, -0.015, -math.pi), (0.03, 0.015, math.pi)).tolist()
             place = (BELT_X_M + x, 0.53 + 0.12 * slot + y, BELT_Z_M + PARTS[part].height_m / 2.0)
             self.place(part, Pose(place, (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))))
 
     def act(self) -> Iterator[None]:
-        """Runs the belt and both arms; an arm that would come too near to the other one waits."""
+        """Moves the belt and both arms. An arm waits if its next target is too near to the other arm."""
         links = {"left": "LHAND_tip", "right": "RHAND_tip"}
         opened = {"LHAND_JOINT0": OPEN_M, "RHAND_JOINT0": OPEN_M}
         arms = self._arms = TwoArms(self, "nextage", URDF, "CHEST_JOINT0_Link", links, CHEST, opened, LEAST_M)
@@ -78,7 +84,7 @@ class Factory(Scene):
             self._nearest_m = min(self._nearest_m, self._arms.measured_m())
 
     def has_succeeded(self) -> bool:
-        """Returns whether all parts are in the box."""
+        """Returns whether each part is in the compartment of its kind."""
         return not missing(self.seen.poses)
 
     def score(self) -> tuple[int, int]:
@@ -95,19 +101,21 @@ class Factory(Scene):
         return {"parts placed": done, "time a part [s]": time_s, "smallest distance of the arms [mm]": nearest_mm}
 
     def _reachable(self, side: str) -> list[str]:
-        """Returns the parts that an arm may take, the outermost first."""
+        """Returns the names of the parts that an arm may take, sorted from the outermost part to the middle."""
         out_m = {part: SIDES[side] * tag.position[1] for part, tag in on_belt(self.sensed.tags).items()}
         mine = [part for part in out_m if 0.0 <= out_m[part] < REACH_M and self._tries[part] < TRIES]
         return sorted((part for part in mine if part not in self._busy.values()), key=lambda part: -out_m[part])
 
     def _has_brought(self) -> bool:
-        """Returns whether the belt has brought the next parts, or all that are left."""
+        """Returns whether the belt has brought enough parts: one is far enough past the middle, or all parts that are
+        left are on the belt, on average past the middle.
+        """
         places = [tag.position[1] for tag in on_belt(self.sensed.tags).values()]
         are_last = len(places) + len(self._placed) >= self.of
         return min(places, default=1.0) < -STATION_M or (are_last and sum(places) <= 0.0)
 
     def _work(self, side: str, hand: Gripper, belt: Belt) -> Iterator[Pose]:
-        """Yields the targets of a hand: it takes one part after the other."""
+        """Yields the target poses with which a hand takes and sorts one part after the other."""
         while True:
             yield from hand.go((HOME_X_M, SIDES[side] * HOME_Y_M, CARRY_Z_M), 0.0)
             self._middle.leave(side)
@@ -121,7 +129,7 @@ class Factory(Scene):
                 self._busy[side] = ""
 
     def _take(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
-        """Moves above a part, measures its pose again, grasps it and lifts it."""
+        """Moves a hand above a part, measures the part's pose again, grasps and lifts the part."""
         kind, tag = PARTS[part], on_belt(self.sensed.tags)[part]
         yield from hand.open(kind.half_m + SPARE_M, 0.02)
         is_in_middle = abs(tag.position[1]) < MIDDLE_M
@@ -138,7 +146,7 @@ class Factory(Scene):
         yield from hand.go((x, y, CARRY_Z_M), yaw)
 
     def _put_down(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
-        """Moves above the compartment of a part, releases it, and stays above the middle."""
+        """Moves a part into its compartment, releases the part, and raises the hand above the middle zone."""
         kind, yaw = PARTS[part], SIDES[side] * PLACE_RAD
         while not self._middle.take(side):
             yield hand.target

@@ -1,4 +1,4 @@
-"""A person waves, hands a thing to a Panda and takes it back; each reacts to the thing and to the other."""
+"""A person waves, hands a thing to a Panda, and takes the thing back. Person and robot react to each other."""
 
 from __future__ import annotations
 
@@ -16,22 +16,26 @@ from .parts.person import SwayingPerson, together
 from .scene import Scene, SceneFailedError, Watched
 
 HALF_HEIGHTS_M = {"bottle": 0.063, "can": 0.06, "carton": 0.065}
-"""Height of the origin of each thing above its base."""
+"""Height of each thing's origin above the thing's base [m]."""
 DYNAMICS = (0.25, 0.5), (0.45, 0.9)
-"""Least mass [kg] and friction of a thing, and the largest ones."""
+"""Lower bounds of mass [kg] and friction of a thing, and the upper bounds."""
 REST, PLACES_M = Pose((0.31, -0.24, 1.08)), ((0.37, -0.34, 1.05), (0.45, -0.16, 1.18))
-"""The palm near the body, and corners of the region in which it is held out."""
+"""Pose of the palm near the body, and two corners of the region in which the palm is held out [m]."""
 OFF_M, OFF_RAD, PAUSES_S = 0.008, 0.1, (0.2, 1.5)
-"""Largest errors of the person: of a thing on the palm, of the palm's direction to the robot; and pauses."""
+"""Largest random offset of the thing on the palm [m]; largest random angle of the thing and of the palm [rad]; range of
+the person's pauses [s].
+"""
 BASE = Pose((1.18, -0.2, 0.6), (0.0, 0.0, 1.0, 0.0))
 GRASP_M, LIFT_M, OPEN_M = 0.09, 0.1, 0.04
-"""Height of a grasp above the base of a thing, height above the palm, way of each finger."""
+"""Height of the grasp above the thing's base, height of the lift above the palm, opening of each finger [m]."""
 SHOWN_M, ALONE_S = (0.66, -0.2, 1.24), 1.0
-"""Where the robot shows the thing, and the least time for it."""
+"""Position at which the robot shows the thing [m], and least time for which only the robot holds the thing [s]."""
 LOWEST_M, CARRIED_N = -0.05, 2.0
-"""Least height above the palm to which a thing is lowered, and force of the palm at which the robot releases it."""
+"""Lowest height above the palm to which the robot lowers the thing [m], and force of the palm at which the robot
+releases the thing [N].
+"""
 WAVES, MAX_TILT_DEG, STILL_M = 3, 10.0, 0.002
-"""Number of waves, largest tilt at the end, and distance within which a thing counts as at rest on the palm."""
+"""Number of waves, largest final tilt of the thing [deg], and largest motion of a thing at rest on the palm [m]."""
 HANDS = {"human", "panda"}
 
 
@@ -55,26 +59,28 @@ class Handover(Scene):
 
     @cached_property
     def person(self) -> SwayingPerson:
-        """The person, made by `note` in the first cycle, so that it starts equally in every process."""
+        """The person, whom `note` creates in the first cycle, so that equal seeds lead to equal episodes."""
         return SwayingPerson(self, self.random)
 
     def prepare(self) -> None:
-        """Puts a thing of random mass and friction on the palm."""
+        """Puts a thing with random mass and friction on the palm."""
         x, y, yaw = self.random.uniform(-1.0, 1.0, 3).tolist()
         self.place(self.thing, REST @ Pose((OFF_M * x, OFF_M * y, self._half_m + 1e-4), about_z(OFF_RAD * yaw)))
         mass, friction = self.random.uniform(*DYNAMICS).tolist()
         self.change(self.thing, mass=mass, lateralFriction=friction)
 
     def act(self) -> Iterator[None]:
-        """Makes the person and the robot act at the same time."""
+        """Makes the person and the robot act at the same time. Fails if the thing touches anything but these two."""
         yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
 
     def beside(self) -> Iterator[None]:
-        """Makes the person act."""
+        """Makes the person act. Fails if the thing touches anything but person and robot."""
         yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:
-        """Waves, holds out the thing until the robot has it, and the palm until the thing is back."""
+        """Makes the person wave, and hold out the thing until only the robot holds it. Then makes the person hold out
+        the empty palm until the thing is back.
+        """
         person, holders = self.person, self._holders
         yield from together(person.wave(WAVES), person.go(REST, 4.5))
         yield from person.go(self._palms[0], 1.5)
@@ -87,7 +93,9 @@ class Handover(Scene):
         yield from person.go(REST, 1.0)
 
     def _robot_acts(self) -> Iterator[None]:
-        """Takes the thing from the palm, shows it, puts it back and releases it when the palm carries it."""
+        """Makes the robot take the thing from the palm, show the thing, and put it back. The robot releases the thing
+        as soon as the palm carries it.
+        """
         arm, holders = PandaArm(self, "panda", BASE), self._holders
         home = arm.target
         yield from until(self.person.holds_out)
@@ -100,7 +108,7 @@ class Handover(Scene):
         in_gripper, yaw = arm.pose().inverse() @ thing, yaw_of(thing.quat_xyzw) - yaw_to(thing.position, BASE)
 
         def standing(place: Vector) -> Pose:
-            """Returns the pose of a gripper that holds the thing upright with its base at a place [m]."""
+            """Returns the gripper's pose with which the held thing is upright and its base is at a position [m]."""
             return Pose(above(place, self._half_m), about_z(yaw_to(place, BASE) + yaw)) @ in_gripper.inverse()
 
         yield from arm.go(standing(SHOWN_M), 1.8)
@@ -118,11 +126,11 @@ class Handover(Scene):
         yield from arm.go(home, 1.5)
 
     def _grasp(self) -> Pose:
-        """Returns the pose of a gripper at the present pose of the thing."""
+        """Returns the gripper's pose for a grasp of the thing at its present pose."""
         return upright_grasp(self.sensed.poses[self.thing], GRASP_M - self._half_m)
 
     def note(self) -> None:
-        """Records waves, the holders of the thing, its motion, that of the palm, and forces on the person."""
+        """Records the person's waves, the thing's holders, the motion of thing and palm, and forces on the person."""
         self.person.note()
         self.landmarks = {"palm": self.person.palm()}
         self._holders.note()
@@ -131,14 +139,18 @@ class Handover(Scene):
         self._force_n = max(self._force_n, sum(touch.normal_force for touch in self.seen.contacts["human"]))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the person waved, the robot alone held the thing, and it is now at rest on the palm."""
+        """Returns whether the person waved, the robot alone held the thing for `ALONE_S`, and the thing is back at rest
+        on the palm.
+        """
         was_handed_over = self._holders.alone_s.get("panda", 0.0) >= ALONE_S and self.person.swings >= 2 * WAVES - 1
         is_back = self._holders.is_alone("human", 0.5) and self._holders.links() == {"RightHand"}
         is_standing = self._on_palm.is_within(STILL_M) and tilt_deg(self._where()) < MAX_TILT_DEG
         return was_handed_over and is_back and is_standing and self._holders.all_names <= HANDS
 
     def figures(self) -> dict[str, float]:
-        """Returns the largest force on the person, the time for which the robot held the thing, and its tilts."""
+        """Returns the largest force on the person, the time for which only the robot held the thing, and the thing's
+        tilts.
+        """
         return {
             "largest force on the person [N]": self._force_n,
             "held by the robot alone [s]": self._holders.alone_s.get("panda", 0.0),

@@ -1,4 +1,4 @@
-"""The base class of scenes, which see a world and act in it without knowing whether it is in this process."""
+"""The base class of scenes. A scene observes and changes a world, in this process or in a running simulator."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ from robot_model.geometry import ZERO, Pose, Vector, normalized
 from .sensing import SensedPoses
 
 MEASURE_S = 0.5
-"""Time in which things at rest are measured with noise [s]."""
+"""Time in which the noisy poses of resting objects are averaged at the start of an episode [s]."""
 TAG_DIGITS = 6
-"""Decimal digits of poses of tags [m]; the noise of detectors is far larger."""
+"""Decimal digits to which poses of tags are rounded [m]. The noise of detectors is far larger."""
 
 
 class Watched(NamedTuple):
-    """Parts of its world that a scene observes.
+    """Names of the robots, bodies and sensors that a scene observes.
+
+    The rates in the YAML files of bodies and sensors must equal the rate of the scene's cycles.
 
     Attributes:
-        robots: Robots whose joints it sees.
-        bodies: Bodies whose poses it sees; in their YAML, `base_state_hz` is that of the cycles.
+        robots: Robots whose joint positions are observed.
+        bodies: Bodies whose poses are observed, at the rate `base_state_hz` in YAML.
         wrenches: Force-torque sensors, as `ROBOT/JOINT`.
-        contacts: Bodies whose contact forces it sees; in their YAML, `contacts: {hz: ...}` is that of the cycles.
-        tags: Detectors of AprilTags, as their `topic`; in their YAML, `hz` is that of the cycles, without latency.
+        contacts: Bodies whose contact forces are observed, at the rate `contacts: {hz: ...}` in YAML.
+        tags: Values of `topic` of AprilTag detectors, with the rate `hz` and without latency in YAML.
     """
 
     robots: tuple[str, ...]
@@ -39,7 +41,7 @@ class Watched(NamedTuple):
 
 
 class SeenWrench(NamedTuple):
-    """Force [N] and torque [N m]."""
+    """Force [N] and torque [N m] of a force-torque sensor."""
 
     force: Vector = ZERO
     torque: Vector = ZERO
@@ -49,12 +51,12 @@ class Touch(NamedTuple):
     """A contact point of a body.
 
     Attributes:
-        other: The body that it touches.
+        other: Name of the other body in the contact.
         other_link: Link of the other body.
-        position: Where [m].
-        normal: Unit vector towards the body.
-        normal_force: Force along it [N].
-        force: The whole force on the body, with friction [N].
+        position: Position of the contact in the world [m].
+        normal: Unit vector of the contact's normal, towards the body.
+        normal_force: Force along the normal [N].
+        force: Total force on the body, including friction [N].
     """
 
     other: str
@@ -66,15 +68,15 @@ class Touch(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Observation of a scene at the end of a cycle.
+    """Observation of the world at the end of a cycle.
 
     Attributes:
-        time_s: Time since the start of the scene [s].
-        joints: Positions of joints [rad or m] by name, by robot.
-        poses: Poses of the bodies' URDF frames in the world.
-        wrenches: By force-torque sensor, in the axes of the joint's child link.
-        contacts: By body.
-        tags: Poses in the world of the AprilTags that detectors see, by number; z points out of the tag.
+        time_s: Time since the start of the episode [s].
+        joints: Joint positions [rad or m], indexed by robot and then by joint name.
+        poses: Poses of the bodies' URDF frames in the world, indexed by body.
+        wrenches: Wrenches in the axes of the joint's child link, indexed by `ROBOT/JOINT`.
+        contacts: Contact points, indexed by body.
+        tags: Poses of the detected AprilTags in the world, indexed by tag number. z points out of the tag.
     """
 
     time_s: float = 0.0
@@ -86,21 +88,27 @@ class Seen(NamedTuple):
 
 
 class InputValue(NamedTuple):
-    """Passes a value to an input before the next tick, see `World.put`: joints and numbers, or a pose."""
+    """Value for an input at the next tick: a pose, or numbers indexed by name, as joint targets. See `World.put`."""
 
     slot: str
     value: Mapping[str, float] | Pose
 
 
 class Teleport(NamedTuple):
-    """Puts a body somewhere at once, at rest."""
+    """Moves a body to a pose at once, without velocity."""
 
     name: str
     pose: Pose
 
 
 class Shove(NamedTuple):
-    """A force [N] in the axes of the world on the origin of a link, `NAME` or `NAME/LINK`, for a time [s]."""
+    """Applies a force to the origin of a link for some time.
+
+    Attributes:
+        target: The link, as `NAME` (base link) or `NAME/LINK`.
+        force: Force in the axes of the world [N].
+        duration_s: Duration [s].
+    """
 
     target: str
     force: Vector
@@ -108,14 +116,19 @@ class Shove(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Changes dynamics of a body or a link, `NAME` or `NAME/LINK`, by keys of `changeDynamics` such as `mass`."""
+    """Changes dynamics of a body or a link.
+
+    Attributes:
+        target: `NAME` or `NAME/LINK`.
+        values: New values, indexed by the keys of `changeDynamics`, such as `mass`.
+    """
 
     target: str
     values: Mapping[str, float]
 
 
 class Switch(NamedTuple):
-    """Stops and starts controllers of a robot, all at one tick."""
+    """Stops and starts controllers of a robot, all at the same tick."""
 
     robot: str
     start: tuple[str, ...]
@@ -123,49 +136,49 @@ class Switch(NamedTuple):
 
 
 class GainChange(NamedTuple):
-    """Changes keys of a controller, `ROBOT/CONTROLLER`, as its service `set_gains` does."""
+    """Changes configuration keys of a controller `ROBOT/CONTROLLER`, like its service `set_gains`."""
 
     target: str
     values: Mapping[str, float | Vector]
 
 
 class Removal(NamedTuple):
-    """Removes a body."""
+    """Removes a body from the world."""
 
     name: str
 
 
 WorldChange = InputValue | Teleport | Shove | Change | Switch | GainChange | Removal
-"""A change that a scene makes to its world."""
+"""A change that a scene requests for its world."""
 
 
 class SceneFailedError(InterfaceError):
-    """The robots cannot continue, for instance because a target is out of reach; the episode ends as failed."""
+    """Ends the episode as failed: the robots cannot continue, for instance because a target is out of reach."""
 
 
 class Scene(ABC):
-    """A task of robots in a world: its start, the robots' actions, and the test of success.
+    """A task of robots in a world. A scene prepares the episode, moves the robots, and decides on success.
 
-    Time passes in cycles: the scene observes, acts, and a cycle of ticks follows. All random numbers come from
-    `random`, so that a seed leads to the same episode anywhere.
+    In each cycle, the scene observes the world and requests changes; then the world advances by `cycle_ticks` ticks.
+    All random numbers come from `random`, so that a seed leads to the same episode in every process.
 
     Args:
-        random: Random numbers of the episode.
+        random: Random generator of the episode.
 
     Attributes:
         world: Main YAML file of the world.
-        watch: The parts that it observes.
-        hands: Links that controllers move to poses, by `ROBOT/CONTROLLER`; joints of other robots have targets.
-        others: Robots that no policy moves, such as a person, see `beside`.
+        watch: Robots, bodies and sensors that the scene observes.
+        hands: Links that a controller moves to poses, indexed by `ROBOT/CONTROLLER`. Robots without such a controller
+            are moved by joint targets.
+        others: Robots that policies do not control, such as a person; `beside` moves these robots.
         of: Number of parts of the task.
-        cycle_ticks: Ticks of a cycle.
-        longest_s: Time after which an episode ends [s].
-        seen: The newest view of the world, before the first cycle an empty one. It has no noise, and decides on
-            success.
-        sensed: The view that policies act by: `seen`, and with noise the poses and tags that sensors report.
-        landmarks: Further poses that a policy senses, in the world, such as that of a palm; `sensed.poses` has them.
-        is_noisy: Whether sensors have noise and delay, see `sensing`; set before `prepare`.
-        goal_numbers: Numbers of the episode that a policy needs in addition to observations, such as a place [m].
+        cycle_ticks: Number of ticks in a cycle.
+        longest_s: Duration after which an episode ends [s].
+        seen: Latest observation, without noise; empty before the first cycle. Success is determined from `seen`.
+        sensed: Latest observation for policies. If `is_noisy`, poses and tags have noise and delay.
+        landmarks: Additional poses in the world for `sensed.poses`, such as the pose of a palm, indexed by name.
+        is_noisy: Whether sensors have noise and delay, see the module `sensing`. Must be set before `prepare`.
+        goal_numbers: Numbers that a policy needs in addition to observations, such as a goal position [m].
     """
 
     world: ClassVar[str]
@@ -189,77 +202,82 @@ class Scene(ABC):
     # --- For subclasses
 
     def prepare(self) -> None:  # noqa: B027 (some scenes start as their files say)
-        """Prepares an episode before the first tick, for instance by `place`."""
+        """Prepares an episode before the first tick, for instance with `place`."""
 
     @abstractmethod
     def act(self) -> Iterator[None]:
-        """Acts; each `yield` waits for the next cycle. The scene has observed the world once before.
+        """Moves the robots through the whole task. Each `yield` waits for the next cycle.
+
+        Before the first call, the scene has observed the world once.
 
         Raises:
             SceneFailedError: If the robots cannot continue.
         """
 
     def beside(self) -> Iterator[None]:
-        """Acts for robots that no policy moves, such as a person, in place of `act`; does nothing by default.
+        """Moves the robots in `others` while a policy moves the other robots. Replaces `act`; does nothing by default.
 
         Raises:
-            SceneFailedError: If the task can no longer be done.
+            SceneFailedError: If the task can no longer succeed.
         """
         yield from ()
 
     def note(self) -> None:  # noqa: B027 (some scenes look at the end alone)
-        """Records events of a cycle, for figures and success."""
+        """Records events of the present cycle, for `figures` and `has_succeeded`."""
 
     @abstractmethod
     def has_succeeded(self) -> bool:
-        """Returns whether the task succeeded, from the present observation and the records."""
+        """Returns whether the task has succeeded, from the present observation and the records of `note`."""
 
     def figures(self) -> dict[str, float]:
-        """Returns measures of quality, by name with unit, such as `error [mm]`."""
+        """Returns measures of quality, indexed by name with unit, such as `error [mm]`."""
         return {}
 
     def score(self) -> tuple[int, int]:
-        """Returns the number of completed parts of the task and the number of all parts; by default all or none."""
+        """Returns the number of completed parts of the task, and the number of all parts.
+
+        By default, all parts are completed if the task has succeeded; otherwise the number is 0.
+        """
         return self.of * self.has_succeeded(), self.of
 
     def fault(self) -> str:
-        """Returns the reason of a failure in a few words, if the end of the episode shows it; otherwise nothing."""
+        """Returns the reason for a failure in a few words, from the end of the episode. Empty if unknown."""
         return ""
 
     # --- Changes of the world
 
     def put(self, slot: str, value: Mapping[str, float] | Pose) -> None:
-        """Passes a value to an input, such as `kuka_lwr/target`, see `InputValue`."""
+        """Sets an input, such as `kuka_lwr/target`, at the next tick; see `InputValue`."""
         self._changes.append(InputValue(slot, value))
 
     def place(self, name: str, pose: Pose) -> None:
-        """Puts a body somewhere at once, at rest."""
+        """Moves a body to a pose in the world at once, without velocity."""
         self._changes.append(Teleport(name, pose))
 
     def shove(self, target: str, force: Vector, duration_s: float) -> None:
-        """Applies a force [N] to a link for a time, see `Shove`."""
+        """Applies a force [N] to a link for a duration [s]; see `Shove`."""
         self._changes.append(Shove(target, force, duration_s))
 
     def change(self, target: str, **values: float) -> None:
-        """Changes dynamics of a body or a link, such as `mass` [kg] or `lateralFriction`, see `Change`."""
+        """Changes dynamics of a body or a link, such as `mass` [kg] or `lateralFriction`; see `Change`."""
         self._changes.append(Change(target, values))
 
     def switch(self, robot: str, start: tuple[str, ...] = (), stop: tuple[str, ...] = ()) -> None:
-        """Stops and starts controllers of a robot, all at one tick."""
+        """Stops and starts controllers of a robot, all at the same tick."""
         self._changes.append(Switch(robot, start, stop))
 
     def tune(self, target: str, **values: float | Vector) -> None:
-        """Changes keys of a controller, such as `force` [N]; an active one starts again from the robot's present
-        pose.
+        """Changes configuration keys of a controller, such as `force` [N]. An active controller restarts from the
+        robot's present pose.
         """
         self._changes.append(GainChange(target, values))
 
     def vanish(self, name: str) -> None:
-        """Removes a body."""
+        """Removes a body from the world."""
         self._changes.append(Removal(name))
 
     def look(self, seen: Seen) -> None:
-        """Observes the world at the end of a cycle."""
+        """Stores the observation at the end of a cycle in `seen`, calls `note`, and computes `sensed`."""
         self.seen = seen
         self.note()
         poses, tags = {**seen.poses, **self.landmarks}, seen.tags
@@ -268,51 +286,51 @@ class Scene(ABC):
         self.sensed = seen._replace(poses=poses, tags=tags)
 
     def take_changes(self) -> list[WorldChange]:
-        """Returns the changes since the last call, in order."""
+        """Returns the changes that were requested since the last call, in order, and clears them."""
         changes, self._changes = self._changes, []
         return changes
 
     def measure(self) -> Iterator[None]:
-        """Waits until things at rest are measured well, if sensors have noise; used as `yield from self.measure()`.
+        """With noisy sensors, waits until the poses of resting objects are averaged. Use: `yield from self.measure()`.
 
-        Every episode begins with it.
+        `run_scene` calls this method at the start of every episode.
         """
         if self.is_noisy:
             yield from self.wait(MEASURE_S)
 
     def wait(self, duration_s: float) -> Iterator[None]:
-        """Waits; used as `yield from self.wait(0.5)`."""
+        """Waits for a duration of simulated time [s]. Use: `yield from self.wait(0.5)`."""
         end_s = self.seen.time_s + duration_s
         while self.seen.time_s < end_s - 1e-9:
             yield
 
 
 class Stage(ABC):
-    """Place of a scene: a world in this process, or the simulator of a ROS master."""
+    """Connection of a scene to its world: a world in this process, or a simulator on a ROS master."""
 
     @abstractmethod
     def do(self, change: WorldChange) -> None:
-        """Makes a change to the world, before its next tick.
+        """Applies a change to the world, before the world's next tick.
 
         Raises:
-            InterfaceError: If the world refuses it.
+            InterfaceError: If the world rejects the change.
         """
 
     @abstractmethod
     def cycle(self) -> None:
-        """Advances by a cycle of ticks, and lets the scene observe the world."""
+        """Advances the world by one cycle of ticks, and passes the observation to the scene."""
 
 
 class SceneResult(NamedTuple):
-    """How an episode ended.
+    """Result of an episode.
 
     Attributes:
         success: Whether the task succeeded.
-        done: Number of parts of the task that are done.
+        done: Number of completed parts of the task.
         of: Number of all parts.
-        time_s: Duration [s].
-        figures: Measures of quality.
-        reason: Reason of a failure; empty if unknown.
+        time_s: Duration of the episode [s].
+        figures: Measures of quality, indexed by name with unit.
+        reason: Reason for a failure. Empty after a success, or if the reason is unknown.
     """
 
     success: bool
@@ -324,12 +342,13 @@ class SceneResult(NamedTuple):
 
 
 def tag_in_world(camera: Pose, tag: Pose) -> Pose:
-    """Returns the pose of a tag, rounded to a micrometre, so that it does not depend on how both poses were
-    transmitted.
+    """Returns the pose of a tag in the world, rounded to `TAG_DIGITS` decimal digits.
+
+    Due to the rounding, the result is the same with poses from ROS messages and with poses from this process.
 
     Args:
         camera: Pose of the camera's optical frame in the world.
-        tag: Pose of the tag in that frame.
+        tag: Pose of the tag in the camera's optical frame.
     """
     position, (x, y, z, w) = camera @ tag
     along_x, along_y, along_z = (round(each, TAG_DIGITS) for each in position)
@@ -337,10 +356,10 @@ def tag_in_world(camera: Pose, tag: Pose) -> Pose:
 
 
 def run_scene(scene: Scene, stage: Stage) -> SceneResult:
-    """Runs an episode of a prepared scene, until its actions end or its time is over.
+    """Runs an episode of a prepared scene until the scene's actions end, or until `longest_s`. Returns the result.
 
     Raises:
-        InterfaceError: If the world fails, or refuses something.
+        InterfaceError: If the world fails, or rejects a change.
     """
     reason = ""
 
@@ -364,5 +383,5 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
 
 
 def broken_off(scene: Scene, error: InterfaceError) -> SceneResult:
-    """Returns the result of an episode that an error of its world has ended: no part is done."""
+    """Returns the result of an episode that an error of its world has ended: 0 completed parts, the error as reason."""
     return SceneResult(False, 0, scene.of, scene.seen.time_s, {}, " ".join(str(error).split()))

@@ -1,4 +1,4 @@
-"""`scene_node.py`: runs a scene in the simulator, with one seed after the other, by topics and services."""
+"""`scene_node.py`: runs a scene in the simulator through topics and services, one episode for each seed."""
 
 from __future__ import annotations
 
@@ -55,23 +55,23 @@ from .scene import (
 )
 
 PATIENCE_S = 20.0
-"""Longest wait for the messages of a tick, of wall time [s]."""
+"""Timeout for the messages of a tick, in wall time [s]."""
 WORLD = "rpbi/world"
 LATE_S = 0.1
-"""Longest delay that is caught up with [s]."""
+"""Largest delay behind the desired real-time factor that later cycles make up for [s]."""
 NODE = "scene"
 
 
 class SimulatorStage(Stage):
-    """Steps the simulator, and waits for the messages that the scene needs.
+    """Steps the simulator, and waits for the messages that the scene observes.
 
-    Since the world waits for the scene, an episode is equal to that of the same seed in another process, on any
-    computer. When ROS shuts down, all methods raise a ROSInterruptException.
+    Since the simulator waits for the scene, the same seed leads to the same episode on any computer. When ROS shuts
+    down, all methods raise a ROSInterruptException.
 
     Args:
-        watch: What scenes see.
-        ticks: Ticks of a cycle.
-        real_time_factor: Largest number of simulated seconds a second; 0 is as fast as possible.
+        watch: Robots, bodies and sensors that the scene observes.
+        ticks: Number of ticks in a cycle.
+        real_time_factor: Largest ratio of simulated time to wall time. 0: as fast as possible.
     """
 
     def __init__(self, watch: Watched, ticks: int, real_time_factor: float) -> None:
@@ -92,7 +92,7 @@ class SimulatorStage(Stage):
         self._dt_s = round(after - before, 9)
 
     def begin(self, scene: Scene) -> None:
-        """Brings the world to the start of an episode."""
+        """Resets the world, and prepares an episode of a scene."""
         self._ask("rpbi/reset", Trigger)
         self._scene, self._begin_s = scene, time.monotonic()
         self._due_s = self._begin_s
@@ -132,12 +132,12 @@ class SimulatorStage(Stage):
         _raise_if_shut_down()
 
     def reached_factor(self) -> float:
-        """Returns the simulated seconds a second of this episode."""
+        """Returns the ratio of simulated time to wall time in this episode."""
         assert self._scene is not None
         return self._scene.seen.time_s / (time.monotonic() - self._begin_s)
 
     def state_hash(self) -> str:
-        """Returns the hash of the world's state."""
+        """Asks the simulator for the hash of the world's state."""
         return str(self._ask("rpbi/get_state_hash", GetStateHash).state_hash)
 
     def _step(self, ticks: int) -> Any:
@@ -173,7 +173,7 @@ class SimulatorStage(Stage):
         )
 
     def _camera(self, frame: str) -> Pose:
-        """Returns the pose of a static camera in the world."""
+        """Looks up the pose of a static camera frame in the world on TF. Each frame is looked up only once."""
         if frame not in self._cameras:
             assert self._tf is not None
             message = self._tf.wait_for_tf_msg(WORLD, frame, PATIENCE_S)
@@ -245,7 +245,7 @@ def _run() -> None:
 
 
 def _report(seed: int, result: SceneResult, stage: SimulatorStage) -> None:
-    """Logs in one line how an episode ended."""
+    """Logs the result of an episode in one line."""
     verdict = "succeeded" if result.success else f"failed: {result.reason}" if result.reason else "failed"
     parts = [f"{name}: {value:.4g}" for name, value in result.figures.items()]
     parts += [f"real-time factor: {stage.reached_factor():.3f}", f"state: {stage.state_hash()}"]

@@ -1,4 +1,4 @@
-"""Poses as a tracking system measures them, noisy and late; their filters, and an estimate of a moving base."""
+"""Simulates a tracking system with noise and delay, filters measured poses, and estimates the pose of a moving base."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from robot_model.geometry import (
 )
 
 NOISE_M, NOISE_RAD, DELAY_S = 0.002, math.radians(1.0), 0.02
-"""Standard deviations of each axis of a position [m] and of a rotation vector [rad]; age of a measurement [s]."""
+"""Standard deviation of the noise in each axis of position [m] and rotation vector [rad]; delay of measurements [s]."""
 MEAN_OF = 25
-"""Number of measurements that the filter averages in effect; the first ones have equal weights."""
+"""Number of measurements after which the filter's gain stays at 1 / `MEAN_OF`; before, the filter is a plain mean."""
 JUMP_M, JUMP_RAD = 4.0 * NOISE_M, 4.0 * NOISE_RAD
-"""Distances from the filtered pose beyond which the filter restarts at the measurement: the body moves."""
+"""Distance [m] and angle [rad] of a measurement from the filtered pose at which the filter restarts: the body moves."""
 BASE_SMOOTHED_S = 0.2
-"""Time constant of the correction by measurements for a moving base [s]."""
+"""Time constant with which measurements correct the estimate of a moving base [s]."""
 ROUNDING_S = 1e-9
 
 Key = TypeVar("Key", str, int)
 
 
 def noisy(pose: Pose, random: np.random.Generator) -> Pose:
-    """Returns a measurement of a pose."""
+    """Adds random noise to a pose, and returns the noisy pose."""
     shift, turn = NOISE_M * random.standard_normal(3), NOISE_RAD * random.standard_normal(3)
     return _moved(pose, tuple(shift.tolist()), tuple(turn.tolist()))
 
 
 class SensedPoses(Generic[Key]):
-    """Measures poses with noise and delay, and smooths those of bodies that rest.
+    """Measures poses with noise and delay, and averages the measurements of resting bodies.
 
     Args:
-        random: Random numbers of the noise.
+        random: Random generator for the noise.
     """
 
     def __init__(self, random: np.random.Generator) -> None:
@@ -53,7 +53,12 @@ class SensedPoses(Generic[Key]):
         self._smoothed: dict[Key, tuple[int, Pose]] = {}
 
     def track(self, time_s: float, poses: Mapping[Key, Pose]) -> dict[Key, Pose]:
-        """Adds measurements, and returns the filtered poses that are known at a time [s]."""
+        """Measures the present poses, and returns the filtered poses of the measurements that have arrived.
+
+        Args:
+            time_s: Present time [s].
+            poses: True poses in the world.
+        """
         self._on_the_way.append((time_s, {key: noisy(poses[key], self._random) for key in sorted(poses)}))
         while len(self._on_the_way) > 1 and self._on_the_way[1][0] <= time_s - DELAY_S + ROUNDING_S:
             self._on_the_way.popleft()
@@ -62,7 +67,7 @@ class SensedPoses(Generic[Key]):
         return {key: pose for key, (_, pose) in self._smoothed.items()}
 
     def _corrected(self, key: Key, measured: Pose) -> tuple[int, Pose]:
-        """Returns a smoothed pose, and the number of measurements in it."""
+        """Returns the number of averaged measurements, and their mean pose, after a new measurement of one body."""
         if key not in self._smoothed:
             return 1, measured
         count, pose = self._smoothed[key]
@@ -74,12 +79,13 @@ class SensedPoses(Generic[Key]):
 
 
 class BaseEstimate:
-    """Estimate of a robot's base: it integrates the velocity, and is corrected by late measurements of the pose.
+    """Estimates the pose of a robot's base: integrates the base's velocity, and corrects the pose with delayed noisy
+    measurements.
 
     Args:
-        base: The pose at the start.
+        base: True initial pose.
         period_s: Time between two updates [s].
-        seed: Seed of the noise.
+        seed: Seed of the measurements' noise.
     """
 
     def __init__(self, base: Pose, period_s: float, seed: int) -> None:
@@ -89,12 +95,12 @@ class BaseEstimate:
         """Measured poses, each with the estimate of the same time."""
 
     def update(self, base: Pose, linear: Vector, angular: Vector) -> Pose:
-        """Returns the estimated pose after another period.
+        """Advances the estimate by one period, and returns the estimated pose.
 
         Args:
-            base: The true pose, which is measured.
-            linear: Its velocity [m/s].
-            angular: Its angular velocity [rad/s].
+            base: True pose of the base, for the measurement.
+            linear: Linear velocity of the base in the world [m/s].
+            angular: Angular velocity of the base in the world [rad/s].
         """
         self._pose = _moved(self._pose, scaled(self._period_s, linear), scaled(self._period_s, angular))
         self._past.append((noisy(base, self._random), self._pose))

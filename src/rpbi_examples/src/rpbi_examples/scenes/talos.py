@@ -1,4 +1,4 @@
-"""A Talos stands on its feet, reaches for a ball, is pushed, and brings its hand back."""
+"""A Talos stands on its feet, reaches for a ball, is pushed, and moves its hand back to the ball."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from .scene import Scene, SceneFailedError, Watched
 
 URDF = "{example-robot-data}/robots/talos_data/robots/talos_reduced_box.urdf"
 HAND, POINT = "gripper_left_base_link", Pose((0.0, 0.0, -0.13))
-"""The hand, and the point between its fingers, as in configs/talos/talos.yaml [m]."""
+"""Link of the hand, and the point between the fingers in the link's frame [m], as in configs/talos/talos.yaml."""
 TORSO, SOLES, FEET = "torso_2_link", ("left_sole_link", "right_sole_link"), {"leg_left_6_link", "leg_right_6_link"}
 HEIGHT_M, LOWEST_M = 1.0223, 0.8
-"""Height of the pelvis at the start, and the least while the robot stands."""
+"""Nominal height of the pelvis at the start, and least height of the pelvis of a standing robot [m]."""
 MOST_SHIFT, MOST_RISE_M, MOST_TURN = 0.05, 2e-3, (0.01, 0.01, 0.2)
-"""Largest deviations of the start pose: x and y [m], height [m], orientation as a rotation vector [rad]."""
+"""Largest random deviations of the start pose: in x and y [m], height [m], and rotation about x, y and z [rad]."""
 NEAREST, FARTHEST = (0.35, 0.05, 0.9), (0.55, 0.4, 1.3)
-"""Corners of the region of targets: forwards and left of the pelvis, and above the floor [m]."""
+"""Corners of the region of targets: x forwards and y to the left from the pelvis, z above the floor [m]."""
 FORWARD = quaternion_of((0.0, -math.pi / 2.0, 0.0))
 """Orientation of a hand that points forward."""
 IMPULSE, PUSH_S = 10.0, 0.1
 """Impulse of a push [N s], and its duration [s]."""
 REACHED_S, BACK_S, STAYS_S = 3.0, 4.0, 2.0
-"""Time by which the hand is at its target, time by which it is back after a push, and time for which it stays there."""
+"""Time for reaching the target, time for moving back to the target after a push, and time for staying there [s]."""
 NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG, MOST_LEAN_DEG = 0.02, 0.01, 5.0, 15.0
-"""Limits of success: error of the hand, motion of the feet, lean of the torso at the end and at any time."""
+"""Limits of success: error of the hand [m], motion of the feet [m], tilt of the torso at the end and at any time [deg].
+"""
 
 
 class Talos(Scene):
@@ -64,20 +65,24 @@ class Talos(Scene):
         self._is_late = self._has_stayed = self._has_touched = False
 
     def prepare(self) -> None:
-        """Puts the robot on the floor, slightly tilted."""
+        """Puts the robot on the floor at a random, slightly tilted pose."""
         self.place("talos", self._start)
         if self.is_noisy:
             self.tune("talos/balance", noise_seed=int(self._noise[2].integers(2**31)))
 
     def act(self) -> Iterator[None]:
-        """Stands, reaches, is pushed and brings its hand back."""
+        """Makes the robot stand and reach for the ball; then continues with `beside`, which pushes the robot."""
         self.landmarks = {"ball": self.target}
         yield from self._stand(0.5)
         self.put("talos/balance/target", self.sensed.poses["ball"])
         yield from self.beside()
 
     def beside(self) -> Iterator[None]:
-        """Shows the ball, and pushes the robot once its hand is there."""
+        """Shows the ball, waits until the hand is at the ball, pushes the robot, and waits until the hand is back.
+
+        Raises:
+            SceneFailedError: If the hand does not reach the ball, or the robot falls.
+        """
         self._feet = [self.pose(sole).position for sole in SOLES]
         self.place("ball", self.target)
         yield from self._stand(REACHED_S)
@@ -91,7 +96,7 @@ class Talos(Scene):
         self._has_stayed = True
 
     def note(self) -> None:
-        """Records lean, contacts, motion of the feet and error of the hand."""
+        """Records the torso's tilt, contacts with the floor, motion of the feet, and error of the hand."""
         if self._feet:
             self._has_touched |= any(touch.other_link not in FEET for touch in self.seen.contacts["floor"])
             self._most_lean_deg = max(self._most_lean_deg, tilt_deg(self.pose(TORSO)))
@@ -101,14 +106,14 @@ class Talos(Scene):
             self._late_error_m = max(self._late_error_m, self._error_m())
 
     def has_succeeded(self) -> bool:
-        """Returns whether it stood only on its feet, is upright at the end, and the hand came back and stayed."""
+        """Returns whether the robot stood only on its feet, is upright at the end, and the hand returned and stayed."""
         stood = not self._has_touched and self._slip_m < MAX_SLIP_M and self._most_lean_deg < MOST_LEAN_DEG
         on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
         stands = on_floor == FEET and tilt_deg(self.pose(TORSO)) < MAX_LEAN_DEG
         return stood and stands and self._has_stayed and self._late_error_m < NEAR_M
 
     def figures(self) -> dict[str, float]:
-        """Returns the error of the hand after it is back, the largest lean and the motion of the feet."""
+        """Returns the hand's largest error after its return, the torso's largest tilt, and a foot's largest motion."""
         return {
             "hand error [mm]": 1e3 * (self._late_error_m if self._is_late else self._error_m()),
             "largest lean [deg]": self._most_lean_deg,
@@ -116,12 +121,12 @@ class Talos(Scene):
         }
 
     def pose(self, link: str) -> Pose:
-        """Returns the pose of a link in the world."""
+        """Returns the present pose of a link in the world."""
         joints = self.seen.joints["talos"]
         return self.seen.poses["talos"] @ self._robot.pose([joints[name] for name in self._robot.joint_names], link)
 
     def _push(self) -> Iterator[None]:
-        """Pushes the torso; a stick shows the direction."""
+        """Pushes the torso for `PUSH_S`. Meanwhile, a stick shows the direction of the push."""
         angle = self._yaw + self.push_angle
         cos, sin = math.cos(angle), math.sin(angle)
         behind = minus(self.pose(TORSO).position, scaled(0.6, (cos, sin, 0.0)))
@@ -131,7 +136,7 @@ class Talos(Scene):
         self.place("stick", Pose((0.0, 0.0, -1.0)))  # out of sight
 
     def _stand(self, duration_s: float) -> Iterator[None]:
-        """Waits.
+        """Waits for a duration [s] while the robot stands.
 
         Raises:
             SceneFailedError: If the robot falls.

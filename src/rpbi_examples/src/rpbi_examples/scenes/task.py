@@ -1,4 +1,4 @@
-"""Scenes as tasks of environments, and as episodes in this process."""
+"""Runs scenes in this process: as tasks of Gymnasium environments, and as single episodes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,9 @@ class SceneTaskConfig(WorldTaskConfig):
 
 
 class SceneTask(WorldTask):
-    """The task of a scene: actions move its robots; with None as action, the scene acts itself."""
+    """Makes a scene the task of an environment. Actions move the scene's robots. With the action None, the scene itself
+    moves all robots.
+    """
 
     Config = SceneTaskConfig
     needs_action = False
@@ -72,7 +74,9 @@ class SceneTask(WorldTask):
         self._has_failed = False
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns motions of all joints of its robots, or of hands where controllers drive them."""
+        """Returns the parts of the action: a hand motion for each entry of `Scene.hands`, and joint motions for each
+        robot without such a hand. Robots in `Scene.others` have no part.
+        """
         config, period_s, hands = self.config, self.period_s, self._kind.hands
         led = {*self._kind.others, *(controller.partition("/")[0] for controller in hands)}
         step, turn = config.hand_speed * period_s, config.turn_speed * period_s
@@ -83,7 +87,7 @@ class SceneTask(WorldTask):
         ]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the poses of its bodies, and the goal of the episode."""
+        """Yields the parts of the observation. Adds the poses of the scene's bodies, and `goal_numbers` as `goal`."""
         yield from super().parts()
         for name in self._kind.watch.bodies:
             yield pose_part(self.world, name, self.config.low, self.config.high)
@@ -91,7 +95,7 @@ class SceneTask(WorldTask):
             yield ObservationPart("goal", (-FARTHEST,) * count, (FARTHEST,) * count, lambda: self.scene.goal_numbers)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Prepares an episode of the scene."""
+        """Creates a new scene, and prepares its episode. The scene's random numbers come from `seed` if it is set."""
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
         self._beside, self._has_failed = None, False
@@ -102,13 +106,13 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves robots, and lets the scene act for all others; with None, the scene moves all."""
+        """Moves the robots that the action controls. `Scene.beside` moves all others. With None, does nothing."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)
 
     def reward(self) -> float:
-        """Returns the share of the task that the last action completed."""
+        """Lets the scene observe the world after an action, and returns the share of the task that was completed."""
         before, _ = self.scene.score()
         self.scene.look(self._see())
         try:
@@ -137,10 +141,10 @@ class SceneTask(WorldTask):
 
 
 class EnvStage(Stage):
-    """An environment in which a scene acts.
+    """Connects a scene to the world of an environment in this process.
 
     Args:
-        env: The environment of a `SceneTask`.
+        env: Environment with a `SceneTask`.
     """
 
     def __init__(self, env: WorldEnv) -> None:
@@ -154,11 +158,16 @@ class EnvStage(Stage):
 
 
 def make_env(scene: str, render_mode: str | None = None, noise: bool = False) -> WorldEnv:
-    """Makes the environment of a scene: a name of `SCENES`, or `module:Class`, with noise of the sensed poses or not.
+    """Creates an environment for a scene.
+
+    Args:
+        scene: A name of `SCENES`, or `module:Class`.
+        render_mode: Render mode of the environment, as in Gymnasium.
+        noise: Whether poses are sensed with noise and delay.
 
     Raises:
-        UnknownNameError: If there is no such scene.
-        MissingDependency: If it needs an extra.
+        UnknownNameError: If the scene does not exist.
+        MissingDependency: If an optional dependency of the scene is not installed.
     """
     kind = SCENES.find(scene)
     task = {"type": TASK, "scene": scene, "action_ticks": kind.cycle_ticks, "noise": noise}
@@ -166,10 +175,12 @@ def make_env(scene: str, render_mode: str | None = None, noise: bool = False) ->
 
 
 def run_episode(env: WorldEnv, seed: int) -> SceneResult:
-    """Runs an episode of a scene in its environment; it is that of the same seed in the scene's launch file.
+    """Runs an episode of a scene in the scene's environment, and returns the result.
+
+    The same seed leads to the same episode in the scene's launch file.
 
     Raises:
-        InterfaceError: If the world fails, or refuses something.
+        InterfaceError: If the world fails, or rejects a change.
     """
     assert isinstance(env.task, SceneTask)
     env.task.seed = seed
@@ -178,7 +189,13 @@ def run_episode(env: WorldEnv, seed: int) -> SceneResult:
 
 
 def see(world: World, watch: Watched, time_s: float) -> Seen:
-    """Returns the observation of a world by a scene."""
+    """Observes a world in this process.
+
+    Args:
+        world: The world.
+        watch: Robots, bodies and sensors to observe.
+        time_s: Time since the start of the episode [s].
+    """
     tick = world.clock.tick
     joints = {}
     for name in watch.robots:
@@ -203,7 +220,7 @@ def see(world: World, watch: Watched, time_s: float) -> Seen:
 
 
 def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
-    """Yields the numbers and the poses in the world of the tags that detectors see, by cameras under `poses`."""
+    """Yields number and world pose of each detected tag. Only cameras with a fixed pose under `poses` are used."""
     frames = {each.tf_id: Pose(*each.pose) for each in world.config.poses}
     for sensor in (sensor for name in world.bodies for sensor in world.sensors_of(name)):
         if isinstance(sensor, AprilTagsSensor) and sensor.topic in watch.tags:
@@ -214,10 +231,10 @@ def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
 
 
 def do(world: World, change: WorldChange) -> None:
-    """Makes a change to a world, before its next tick.
+    """Applies a change to a world in this process, before the world's next tick.
 
     Raises:
-        InterfaceError: If the world refuses it.
+        InterfaceError: If the world rejects the change.
     """
     try:
         _do(world, change)

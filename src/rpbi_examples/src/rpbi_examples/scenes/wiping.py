@@ -1,4 +1,4 @@
-"""An arm wipes the stains off a tilted board with a sponge, and presses with a constant force."""
+"""An arm wipes the stains off a tilted board with a sponge, and presses the sponge with a constant force."""
 
 from __future__ import annotations
 
@@ -14,21 +14,27 @@ from .scene import Scene, SceneFailedError, Watched
 
 URDF, SPONGE = "{rpbi_examples}/robots/kuka_lwr_sponge.urdf", "end_effector_sponge"
 ARM = "kuka_lwr", URDF, "lwr_arm_0_link", SPONGE, Pose((0.5, 0.0, 0.0))
-"""The arm, its chain and its base in the world, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
+"""Robot, URDF, base link, sponge link, and pose of the base, as in configs/basic_example_kuka_lwr/kuka_lwr.yaml."""
 FACING = (1.0, 0.0, 0.0, 0.0)
 """Orientation of the sponge on the board: its z axis points into the board."""
 PIVOT, FACE_M = (-0.16, 0.0, 0.15), 0.06
-"""Ball joint of the board's support in the world [m], and height of the board's face over it."""
+"""Position of the ball joint under the board in the world, and height of the board's face above the joint [m]."""
 RANGES = ((-0.02, -0.02, -0.1, 0.3, -0.15, 2000.0, 0.4), (0.02, 0.02, 0.1, 0.5, 0.15, 5000.0, 1.0))
-"""Shift of the board along x and y [m], rotations about x, y and z [rad], stiffness of the sponge [N/m], friction."""
+"""Lower and upper bounds of the random values: shift of the board along x and y [m], rotation of the board about x, y
+and z [rad], stiffness of the sponge [N/m], friction.
+"""
 SIZE_M, STAINS, CELLS, STAIN_M = (0.25, 0.36), (8, 10), (50, 72), 0.009
-"""Extents of the dirty area of the board; its grid of stains, and grid of cells for coverage; radius of a stain."""
+"""Extents of the dirty area along x and y [m], grid of stains, grid of cells for coverage, radius of a stain [m]."""
 LANES, LENGTH_M, PITCH_M, SPEED = 3, 0.36, 0.084, 0.15
-"""The path, and the speed along it [m/s]; each stain is wholly under the sponge in one of the lanes."""
+"""Path of the sponge: number of lanes, length of a lane [m], distance between lanes [m], speed [m/s]. The lanes are so
+near that each stain is completely under the sponge in one of the lanes.
+"""
 OVER_M, PATIENCE_S = 0.05, 4.0
-"""Height of the sponge over the board before and afterwards; longest time until it presses [s]."""
+"""Height of the sponge above the board before and after wiping [m], and timeout for reaching the force [s]."""
 FORCES_N, TOLERANCE, LEAST_WAY, LEAST_STAINS = (15.0, 25.0), 0.1, 0.95, 0.99
-"""Range of the force and its largest error; shares of the path with that force and of removed stains for success."""
+"""Range of the desired force [N], its largest relative error, least share of the path within this error, and least
+share of removed stains.
+"""
 
 
 class Wiping(Scene):
@@ -36,11 +42,11 @@ class Wiping(Scene):
 
     Attributes:
         force: Desired normal force [N].
-        stains: Places of all stains on the board by name, shape (2,) [m].
-        left: Stains that remain.
-        stamps: Where the sponge was on the board, by cycle of the path.
-        forces: Normal force of the sponge in these cycles [N].
-        covered: Which cells of the board were wiped.
+        stains: Position x, y of each stain on the board, shape (2,) [m], indexed by name.
+        left: Names of the stains that are not removed yet.
+        stamps: Pose of the sponge on the board in each cycle of wiping.
+        forces: Normal force of the sponge in each cycle of wiping [N].
+        covered: Which cells of the board were wiped, booleans of shape `CELLS`.
     """
 
     world = "{rpbi_examples}/configs/wiping/config.yaml"
@@ -61,7 +67,7 @@ class Wiping(Scene):
         self.covered = np.zeros(CELLS, bool)
 
     def prepare(self) -> None:
-        """Tilts the board and its stains, and chooses stiffness and friction of the sponge."""
+        """Puts the board with its stains at a random pose, and sets random stiffness and friction of the sponge."""
         x, y, about_x, about_y, yaw, stiffness, friction = self.random.uniform(*RANGES).tolist()
         turn = quaternion_product(quaternion_of((0.0, 0.0, yaw)), quaternion_of((about_x, about_y, 0.0)))
         board = Pose(plus(PIVOT, rotated(turn, (x, y, FACE_M))), turn)
@@ -72,7 +78,7 @@ class Wiping(Scene):
         self.change(f"kuka_lwr/{SPONGE}", contactStiffness=stiffness, contactDamping=100.0)
 
     def act(self) -> Iterator[None]:
-        """Moves above the board, presses, wipes lane by lane, and retreats."""
+        """Moves the sponge above the board, presses, wipes lane by lane, and retreats."""
         path = lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02).tolist()
         arm = yield from self._press(*path[0])
         board = self.sensed.poses["board"]
@@ -86,18 +92,20 @@ class Wiping(Scene):
         yield from arm.go(arm.target @ Pose((0.0, 0.0, -OVER_M)), 1.0)
 
     def beside(self) -> Iterator[None]:
-        """Presses the sponge onto the corner where lanes begin, and then records its motion by a policy."""
+        """Presses the sponge onto the board at the start of the lanes. Then records the wiping while a policy moves the
+        sponge.
+        """
         arm = yield from self._press(*lanes(LANES, LENGTH_M, PITCH_M, SPEED * 0.02)[0].tolist())
         while True:
             yield
             self._wipe(arm.pose())
 
     def has_succeeded(self) -> bool:
-        """Returns whether the force was held along the path, and the stains are removed."""
+        """Returns whether enough of the path was wiped with the desired force, and enough stains are removed."""
         return self._held() >= LEAST_WAY and self._gone() >= LEAST_STAINS
 
     def figures(self) -> dict[str, float]:
-        """Returns figures of the sponge's force and coverage."""
+        """Returns desired and mean force, share of the path with the desired force, removed stains, and coverage."""
         return {
             "force [N]": self.force,
             "mean force [N]": float(np.mean(self.forces or [0.0])),
@@ -107,7 +115,15 @@ class Wiping(Scene):
         }
 
     def _press(self, x: float, y: float) -> Generator[None, None, LedArm]:
-        """Moves above a place of the board [m], and presses there; returns the arm."""
+        """Moves the sponge above a position on the board, presses, and returns the arm.
+
+        Args:
+            x: x of the position in the board's frame [m].
+            y: y of the position in the board's frame [m].
+
+        Raises:
+            SceneFailedError: If the force is not reached within `PATIENCE_S`.
+        """
         board, arm = self.sensed.poses["board"], LedArm(self, *ARM)
         yield from arm.go(board @ Pose((x, y, OVER_M), FACING), 2.0)
         self.tune("kuka_lwr/wipe", axis=rotated(board.quat_xyzw, (0.0, 0.0, -1.0)), force=self.force)
@@ -121,7 +137,7 @@ class Wiping(Scene):
         return arm
 
     def _wipe(self, sponge: Pose) -> None:
-        """Records place and force of the sponge, and removes stains that it touches completely."""
+        """Records pose and force of the sponge. If the force is held, removes stains completely under the sponge."""
         board, force = self.seen.poses["board"], self._normal_force()
         self.stamps.append(Stamp.of(board.inverse() @ sponge))
         self.forces.append(force)
@@ -134,7 +150,7 @@ class Wiping(Scene):
                 self.vanish(name)
 
     def _normal_force(self) -> float:
-        """Returns the force on the board, into its face [N]."""
+        """Returns the total contact force on the board, perpendicular to the board's face [N]."""
         down = rotated(self.seen.poses["board"].quat_xyzw, (0.0, 0.0, -1.0))
         return sum(touch.normal_force * dot(touch.normal, down) for touch in self.seen.contacts["board"])
 
@@ -146,5 +162,5 @@ class Wiping(Scene):
         return share_of_way(self.stamps, [self._is_held(force) for force in self.forces])
 
     def _gone(self) -> float:
-        """Returns the share of removed stains."""
+        """Returns the number of removed stains divided by the number of all stains."""
         return 1.0 - len(self.left) / len(self.stains)

@@ -1,4 +1,4 @@
-"""Draws the force of the sponge along its path over the board, and the wiped area, in an episode of `wiping`.
+"""Runs an episode of the scene `wiping`, and draws the sponge's force along the path and the wiped area.
 
 .venv/bin/python -m rpbi_examples.scenes.wiping_plot --seed 3 --out wiping.png
 """
@@ -24,7 +24,7 @@ BLUE, INK, WIPED = "#1f5fb4", "#29479e", "#cfe8cf"
 
 
 def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
-    """Draws an episode that has ended: above the force, below the board as the arm sees it."""
+    """Writes a picture of an episode that has ended: the force in the upper plot, the board in the lower plot."""
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     force, board = figure.subplots(2, 1, height_ratios=(2, 3))
     figure.suptitle(f"{title}: {'succeeded' if result.success else f'failed {result.reason}'}")
@@ -34,7 +34,13 @@ def draw(scene: Wiping, result: SceneResult, title: str, file: Path) -> None:
 
 
 def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
-    """Draws the normal force over the path, and the band in which it counts as held."""
+    """Draws the normal force along the path, and the range in which the force counts as held.
+
+    Args:
+        scene: Scene after the episode.
+        axes: Axes to draw in.
+        share: Share of the path with the held force [%].
+    """
     low, high = ((1.0 + side * TOLERANCE) * scene.force for side in (-1.0, 1.0))
     axes.axhspan(low, high, color="0.92", label=f"within 10 %: {share:.1f} % of the way")
     axes.axhline(scene.force, color="0.5", lw=1, ls="--", label=f"asked for: {scene.force:.1f} N")
@@ -46,7 +52,13 @@ def draw_force(scene: Wiping, axes: Axes, share: float) -> None:
 
 
 def draw_board(scene: Wiping, axes: Axes, share: float) -> None:
-    """Draws the cells that were wiped, the path of the sponge, and all stains, those that are left filled."""
+    """Draws the wiped cells, the path of the sponge, and all stains. Stains that are not removed are filled.
+
+    Args:
+        scene: Scene after the episode.
+        axes: Axes to draw in.
+        share: Share of wiped cells [%].
+    """
     depth, width = SIZE_M
     extent = (-width / 2.0, width / 2.0, -depth / 2.0, depth / 2.0)
     axes.imshow(scene.covered, origin="lower", extent=extent, cmap=ListedColormap(["white", WIPED]), vmin=0, vmax=1)
@@ -66,7 +78,7 @@ def draw_board(scene: Wiping, axes: Axes, share: float) -> None:
 
 
 def main() -> None:
-    """Runs an episode, and draws it."""
+    """Runs the episode with the seed `--seed`, and writes the picture `--out`."""
     parser = argparse.ArgumentParser(description="Wipes a board, and draws force and coverage.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the episode, as in ./rpbi score wiping")
     parser.add_argument("--out", type=Path, default=Path("wiping.png"), help="the picture")

@@ -1,4 +1,4 @@
-"""An arm that moves one of its links along lines."""
+"""Moves a link of an arm along lines."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ from rpbi_examples.scenes.scene import Scene, SceneFailedError
 
 
 class LedArm:
-    """Moves a link of a robot by targets of its joints, from the last target on.
+    """Moves a link of a robot with joint targets from inverse kinematics. Each motion starts at the last target.
 
     Args:
-        scene: The scene that it acts in.
-        robot: The robot's name in the world.
-        urdf: Its URDF.
-        base_link: Link from which the chain begins.
-        link: The link that is led.
-        base: Pose of the base link in the world.
-        slot: Input of the targets; by default that of the robot.
+        scene: Scene in which the arm acts.
+        robot: Name of the robot in the world.
+        urdf: URDF file of the robot.
+        base_link: First link of the kinematic chain.
+        link: Last link of the kinematic chain, which is moved.
+        base: Pose of `base_link` in the world.
+        slot: Input for the joint targets. Default: `ROBOT/target`.
 
     Attributes:
-        target: The last pose that the link was sent to, in the world.
+        joint_names: Names of the joints in the chain.
+        target: Last target pose of the link, in the world.
     """
 
     def __init__(
@@ -50,20 +51,20 @@ class LedArm:
         self.target = self.pose()
 
     def pose(self) -> Pose:
-        """Returns the pose of the link in the world."""
+        """Returns the present pose of the link in the world."""
         joints = self._scene.seen.joints[self._robot]
         return self._base @ self._solver.chain.pose([joints[name] for name in self.joint_names])
 
     @property
     def positions(self) -> list[float]:
-        """The last positions that the joints were sent to [rad or m]."""
+        """Last target positions of the joints [rad or m]."""
         return list(self._positions)
 
     def positions_at(self, pose: Pose) -> list[float]:
-        """Returns positions of the joints for a pose in the world, near the last ones [rad or m].
+        """Returns joint positions for a pose of the link in the world, near the last targets [rad or m].
 
         Raises:
-            SceneFailedError: If it is out of reach.
+            SceneFailedError: If the pose is out of reach.
         """
         start = dict(zip(self.joint_names, self._positions))
         found = self._solver.solve(IKProblem(self._base.inverse() @ pose, start=start))
@@ -73,17 +74,17 @@ class LedArm:
         return list(found.positions)
 
     def send(self, pose: Pose) -> None:
-        """Sends the link to a pose in the world, near the last one.
+        """Sends the link to a pose in the world, which must be near the last target.
 
         Raises:
-            SceneFailedError: If it is out of reach.
+            SceneFailedError: If the pose is out of reach.
         """
         self._positions = self.positions_at(pose)
         self.target = pose
         self._scene.put(self._slot, dict(zip(self.joint_names, self._positions)))
 
     def go(self, pose: Pose, duration_s: float) -> Iterator[None]:
-        """Moves along a line to a pose in the world, from rest to rest; used as `yield from arm.go(...)`."""
+        """Moves the link along a line to a pose in the world, from rest to rest. Use: `yield from arm.go(...)`."""
         start, begin_s = self.target, self._scene.seen.time_s
         while (share := (self._scene.seen.time_s - begin_s) / duration_s) < 1.0:
             self.send(between(start, pose, smooth(share)))
@@ -92,7 +93,7 @@ class LedArm:
         yield
 
     def move_joints(self, positions: Sequence[float], duration_s: float) -> Iterator[None]:
-        """Moves the joints of the arm to positions [rad or m], from rest to rest."""
+        """Moves the joints of the arm to target positions [rad or m], from rest to rest."""
         goal = finite_vector(positions, len(self.joint_names), "positions").tolist()
         start, begin_s = list(self._positions), self._scene.seen.time_s
         share = 0.0
@@ -105,23 +106,29 @@ class LedArm:
 
 
 def smooth(share: float) -> float:
-    """Returns the share of a distance covered after a share of the time: a polynomial of degree 5, from rest to rest.
+    """Returns the covered share of a distance for an elapsed share of the time, for a motion from rest to rest.
 
-    T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5(7), 1985.
+    The polynomial has degree 5: T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5(7), 1985.
     """
     share = min(max(share, 0.0), 1.0)
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
 def between(start: Pose, end: Pose, share: float) -> Pose:
-    """Returns the pose at a share of the distance, on a line and by the shortest rotation."""
+    """Interpolates two poses: the position along a line, the orientation along the shortest rotation.
+
+    Args:
+        start: Pose at the share 0.
+        end: Pose at the share 1.
+        share: Share of the distance and of the rotation.
+    """
     position = plus(start.position, scaled(share, minus(end.position, start.position)))
     turn = quaternion_of(scaled(share, rotation_between(start.quat_xyzw, end.quat_xyzw)))
     return Pose(position, quaternion_product(turn, start.quat_xyzw))
 
 
 def about_z(yaw: float) -> Quaternion:
-    """Returns a rotation about the vertical [rad]."""
+    """Returns the quaternion of a rotation about the vertical by an angle [rad]."""
     return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
 
 

@@ -1,6 +1,4 @@
-"""The holders of a thing, from its contacts; whether it is at rest; and a Panda that closes its gripper until
-contact.
-"""
+"""Detects which bodies hold a thing and whether the thing is at rest, and moves a Panda that grasps the thing."""
 
 from __future__ import annotations
 
@@ -15,31 +13,33 @@ from rpbi_examples.scenes.scene import Scene, SceneFailedError
 from .arm import LedArm, about_z, between, smooth
 
 CYCLE_S = 0.02
-"""Time of a cycle [s]."""
+"""Duration of a cycle [s]."""
 STILL_S = 0.5
 """Time without motion after which a thing counts as at rest [s]."""
 FINGER, FINGER_LINKS = "panda_finger_joint1", {"panda_leftfinger", "panda_rightfinger"}
-"""The finger of a Panda that the other one mimics; it is closed at 0. And the links of both fingers."""
+"""The joint of a Panda's finger, which is 0 when closed and which the other finger mimics; and the links of both
+fingers.
+"""
 APPROACH = Pose(quat_xyzw=(0.0, math.sin(math.radians(-55.0)), 0.0, math.cos(math.radians(-55.0))))
 BEFORE = Pose((0.0, 0.0, -0.14))
-"""Pose of the gripper at a thing whose x axis points at the robot, 20 deg from above; and before it, relative to
-that.
+"""`APPROACH` is the gripper's orientation relative to a thing whose x axis points at the robot: the gripper points at
+the thing, 20 deg downwards. `BEFORE` is the pose before the grasp, relative to the gripper's pose at the grasp.
 """
 FINGER_SPEED, PRESS_S = 0.04, 0.3
-"""Speed of each finger [m/s], and time for which the fingers press before the grasp counts as firm."""
+"""Speed of each finger [m/s], and time for which the fingers press before the grasp counts as firm [s]."""
 
 
 class Holders:
     """Records in every cycle which bodies touch a thing.
 
     Args:
-        scene: The scene that it is in.
-        thing: The thing, whose contacts the scene sees.
+        scene: Scene with the thing. The scene must observe the thing's contacts.
+        thing: Name of the thing.
 
     Attributes:
-        names: Bodies that touch it now.
-        all_names: Bodies that have touched it so far.
-        alone_s: The longest time for which a body alone touched it [s], by body.
+        names: Names of the bodies that touch the thing now.
+        all_names: Names of all bodies that have touched the thing so far.
+        alone_s: Longest time for which only this body touched the thing [s], indexed by the body's name.
     """
 
     def __init__(self, scene: Scene, thing: str) -> None:
@@ -50,7 +50,7 @@ class Holders:
         self._since_s = 0.0
 
     def note(self) -> None:
-        """Records the bodies that touch it in this cycle."""
+        """Records the bodies that touch the thing in this cycle."""
         names = frozenset(touch.other for touch in self._scene.seen.contacts[self._thing])
         if names != self.names:
             self.names, self._since_s = names, self._scene.seen.time_s
@@ -60,10 +60,14 @@ class Holders:
             self.alone_s[name] = max(self.alone_s.get(name, 0.0), self.has_lasted_s())
 
     def watch(self, act: Iterator[None], hands: Collection[str]) -> Iterator[None]:
-        """Continues an action while only hands touch the thing.
+        """Continues an action as long as only the hands have touched the thing.
+
+        Args:
+            act: The action.
+            hands: Names of the bodies that may touch the thing.
 
         Raises:
-            SceneFailedError: If something else touches it.
+            SceneFailedError: If another body touches the thing.
         """
         for _ in act:
             if not self.all_names <= set(hands):
@@ -71,55 +75,59 @@ class Holders:
             yield
 
     def has_lasted_s(self) -> float:
-        """Returns the time for which the same bodies have touched it [s]."""
+        """Returns the time for which the same bodies have touched the thing [s]."""
         return self._scene.seen.time_s - self._since_s
 
     def is_alone(self, name: str, duration_s: float) -> bool:
-        """Returns whether only one body has touched it for a time [s]."""
+        """Returns whether only the named body has touched the thing, for at least a duration up to now [s]."""
         return self.names == {name} and self.has_lasted_s() >= duration_s
 
     def force(self, name: str) -> float:
-        """Returns the sum of the normal forces of a body on it [N]."""
+        """Returns the sum of the normal forces between a body and the thing [N]."""
         return sum(each.normal_force for each in self._scene.seen.contacts[self._thing] if each.other == name)
 
     def links(self) -> set[str]:
-        """Returns the links of other bodies that touch it."""
+        """Returns the names of the links of other bodies that touch the thing."""
         return {touch.other_link for touch in self._scene.seen.contacts[self._thing]}
 
 
 class RestDetector:
-    """Records the positions of a thing in every cycle, and decides whether it is at rest."""
+    """Records the position of a thing in every cycle, and decides whether the thing is at rest."""
 
     def __init__(self) -> None:
         self._places: deque[Vector] = deque(maxlen=round(STILL_S / CYCLE_S))
 
     def note(self, place: Vector) -> None:
-        """Records its position [m]."""
+        """Records the thing's position in this cycle [m]."""
         self._places.append(place)
 
     def is_within(self, way_m: float) -> bool:
-        """Returns whether it was within a distance of its present position for `STILL_S`."""
+        """Returns whether the thing stayed within a distance [m] of its present position for `STILL_S`."""
         is_known = len(self._places) == self._places.maxlen
         return is_known and all(norm(minus(self._places[-1], each)) < way_m for each in self._places)
 
 
 class PandaArm(LedArm):
-    """A Panda, moved by the point between its fingers, whose contacts are known.
+    """Moves a Panda's arm and gripper. All poses are poses of the point between the fingers.
 
     Args:
-        scene: The scene that it acts in.
-        robot: The robot's name in the world.
-        base: Pose of its base in the world.
+        scene: Scene in which the robot acts.
+        robot: Name of the robot in the world.
+        base: Pose of the robot's base in the world.
     """
 
     def __init__(self, scene: Scene, robot: str, base: Pose) -> None:
         super().__init__(scene, robot, "franka_panda/panda.urdf", "panda_link0", "panda_grasptarget", base)
 
     def follow(self, goal: Callable[[], Pose], duration_s: float) -> Iterator[None]:
-        """Moves to a goal that may move meanwhile, as `go` does.
+        """Moves the gripper to a goal that may move, from rest to rest.
+
+        Args:
+            goal: Returns the present goal pose in the world.
+            duration_s: Duration of the motion [s].
 
         Raises:
-            SceneFailedError: If it is out of reach.
+            SceneFailedError: If a pose on the path is out of reach.
         """
         start, begin_s, share = self.target, self._scene.seen.time_s, 0.0
         while share < 1.0:
@@ -128,14 +136,17 @@ class PandaArm(LedArm):
             yield
 
     def opening(self) -> float:
-        """Returns the opening of each finger [m]."""
+        """Returns the distance of each finger from its closed position [m]."""
         return self._scene.seen.joints[self._robot][FINGER]
 
     def close_on(self, holders: Holders) -> Iterator[None]:
-        """Closes until both fingers touch a thing, and then presses with all their force.
+        """Closes the gripper until both fingers touch a thing, and then presses with full force for `PRESS_S`.
+
+        Args:
+            holders: Record of the bodies that touch the thing.
 
         Raises:
-            SceneFailedError: If there is nothing between them.
+            SceneFailedError: If the gripper is closed without contact of both fingers.
         """
         target_m = self.opening()
         while not FINGER_LINKS <= holders.links():
@@ -148,7 +159,7 @@ class PandaArm(LedArm):
         yield from self._scene.wait(PRESS_S)
 
     def open(self, opening_m: float) -> Iterator[None]:
-        """Opens both fingers slowly, so that they push nothing away."""
+        """Opens both fingers to an opening [m], slowly, so that the fingers do not push things away."""
         target_m = self.opening()
         while target_m < opening_m:
             target_m = min(target_m + FINGER_SPEED * CYCLE_S, opening_m)
@@ -160,24 +171,27 @@ class PandaArm(LedArm):
 
 
 def above(place: Vector, height_m: float) -> Vector:
-    """Returns a place raised by a height [m]."""
+    """Returns the position above a place by a height [m]."""
     return plus(place, (0.0, 0.0, height_m))
 
 
 def upright_grasp(thing: Pose, height_m: float) -> Pose:
-    """Returns the pose of a gripper at a height above the origin of an upright thing [m], from the side of its x
-    axis.
+    """Returns the gripper's pose for the grasp of an upright thing, from the side to which the thing's x axis points.
+
+    Args:
+        thing: Pose of the thing in the world.
+        height_m: Height of the grasp above the thing's origin [m].
     """
     return Pose(above(thing.position, height_m), about_z(yaw_of(thing.quat_xyzw))) @ APPROACH
 
 
 def yaw_to(place: Vector, goal: Pose) -> float:
-    """Returns the direction from a place to a goal about the vertical [rad]."""
+    """Returns the horizontal direction from a position to a goal, as a yaw angle [rad]."""
     x, y, _ = minus(goal.position, place)
     return math.atan2(y, x)
 
 
 def until(condition: Callable[[], bool]) -> Iterator[None]:
-    """Waits until a condition holds; used as `yield from until(...)`."""
+    """Waits until a condition holds. Use: `yield from until(...)`."""
     while not condition():
         yield

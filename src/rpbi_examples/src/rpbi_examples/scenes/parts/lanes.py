@@ -1,4 +1,4 @@
-"""Areas that a rectangular tool covers lane by lane."""
+"""Paths in parallel lanes over a plane, and the areas that a tool covers on the plane."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from robot_model.geometry import Pose, Vector, rotated
 
 
 class Stamp(NamedTuple):
-    """Where a rectangular tool is on a plane.
+    """Pose of a tool on a plane, in the plane's frame.
 
     Attributes:
-        x: Its middle [m].
-        y: Its middle [m].
-        yaw: Its turn [rad].
+        x: x of the tool's middle [m].
+        y: y of the tool's middle [m].
+        yaw: Angle of the tool about the plane's normal [rad].
     """
 
     x: float
@@ -27,24 +27,29 @@ class Stamp(NamedTuple):
 
     @classmethod
     def of(cls, tool: Pose) -> Stamp:
-        """Returns the stamp of a tool whose pose is in the frame of the plane."""
+        """Projects a tool's pose, given in the plane's frame, onto the plane."""
         x, y, _ = rotated(tool.quat_xyzw, (1.0, 0.0, 0.0))
         return cls(*tool.position[:2], math.atan2(y, x))
 
 
 class Patch(NamedTuple):
-    """The convex area between the points where a tool touches a plane.
+    """The convex hull of the points at which a tool touches a plane.
 
     Attributes:
-        edges: Outward normal and offset of each edge, shape (n, 3): inside, their product with (x, y, 1) is at most 0.
-            Without any, nothing is inside.
+        edges: Outward normal and offset of each edge, shape (n, 3). A point is inside if the product of each row with
+            (x, y, 1) is at most 0. Without edges, the patch is empty.
     """
 
     edges: np.ndarray
 
     @classmethod
     def of(cls, plane: Pose, points: Iterable[Vector]) -> Patch:
-        """Returns the patch of contact points in the world [m], in the frame of a plane; none if they have no area."""
+        """Computes the patch of contact points. The patch is empty if the points do not span an area.
+
+        Args:
+            plane: Pose of the plane's frame in the world.
+            points: Positions of the contacts in the world [m].
+        """
         flat = [(plane.inverse() @ Pose(point)).position[:2] for point in points]
         try:
             return cls(ConvexHull(np.reshape(flat, (-1, 2))).equations)
@@ -52,11 +57,11 @@ class Patch(NamedTuple):
             return cls(np.zeros((0, 3)))
 
     def covers(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
-        """Returns whether points of the plane are inside, as far as a margin from each edge [m].
+        """Returns which points of the plane are inside the patch.
 
         Args:
-            points: Shape (..., 2) [m].
-            margin: Least distance from each edge [m].
+            points: x and y of the points in the plane's frame, shape (..., 2) [m].
+            margin: Least distance of a point from each edge [m].
 
         Returns:
             Booleans, shape (...).
@@ -68,16 +73,18 @@ class Patch(NamedTuple):
 
 
 def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:
-    """Returns places along a path of parallel lanes that half circles join.
+    """Returns points along a path of parallel lanes. Half circles join the lanes.
+
+    The lanes are parallel to y, and the path is centred at the origin.
 
     Args:
-        count: Number of lanes; they are parallel to y, and about the origin.
-        length: Length of a lane [m].
-        pitch: Distance between lanes [m].
-        step: Distance between places [m], rounded to divide the path.
+        count: Number of lanes.
+        length: Length of each lane [m].
+        pitch: Distance between neighbouring lanes [m].
+        step: Approximate distance between points [m]; the exact distance divides the path evenly.
 
     Returns:
-        Shape (n, 2) [m].
+        x and y of the points, shape (n, 2) [m].
     """
     angles = np.linspace(0.0, np.pi, 30)
     turn = pitch / 2.0 * np.column_stack((1.0 - np.cos(angles), np.sin(angles)))
@@ -91,37 +98,37 @@ def lanes(count: int, length: float, pitch: float, step: float) -> np.ndarray:
 
 
 def middles(size: tuple[float, float], count: tuple[int, int]) -> np.ndarray:
-    """Returns the middles of the cells of a rectangle about the origin.
+    """Divides a rectangle around the origin into cells, and returns the middles of the cells.
 
     Args:
         size: Extents of the rectangle along x and y [m].
         count: Numbers of cells along x and y.
 
     Returns:
-        Shape (*count, 2) [m].
+        x and y of each middle, shape (*count, 2) [m].
     """
     indices = np.moveaxis(np.indices(count), 0, -1)
     return np.asarray(size * ((indices + 0.5) / count - 0.5))
 
 
 def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
-    """Returns the distance from the first place to each, along the path.
+    """Returns the distance along a path from the first point to each point.
 
     Args:
-        places: At least one; x and y [m] of each come first.
+        places: The n points of the path, at least one. The first two values of each point are x and y [m].
 
     Returns:
-        Shape (n,) [m].
+        Distances, shape (n,) [m].
     """
     steps = np.linalg.norm(np.diff(np.array(places)[:, :2], axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def share_of_way(places: Sequence[Sequence[float]], holds: Sequence[bool]) -> float:
-    """Returns the share of the path along which a condition holds, from its value at the end of each step.
+    """Returns the share of a path's length along which a condition holds. A step counts by the value at its end.
 
     Args:
-        places: x and y [m] of each come first.
-        holds: Whether the condition holds, for each place.
+        places: Points of the path. The first two values of each point are x and y [m].
+        holds: Whether the condition holds at each point.
     """
     return float(np.average(holds[1:], weights=np.diff(ways_along(places)))) if len(places) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""A person who holds out the palm of the right hand and waves with the left one, by the motors of an avatar."""
+"""A simulated person, who moves the arms of an avatar: the right hand holds out its palm, and the left hand waves."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from .arm import LedArm, between, smooth
 from .holding import RestDetector
 
 NAME, URDF, ROOT = "human", "{rpbi_examples}/robots/human_hands.urdf", Pose((0.0, 0.0, 0.9275))
-"""The avatar in its world, its URDF, and where its trunk is."""
+"""Name of the avatar in the world, the avatar's URDF file, and the pose of its trunk in the world."""
 LEFT_HAND = Pose((0.0, 0.36, 0.0))
-"""Middle of the left hand in the frame of its forearm."""
+"""Middle of the left hand in the frame of the left forearm [m]."""
 OUT_X_M, CALM_M = 0.34, 0.008
-"""The place beyond which the palm counts as held out, and the distance within which the swaying palm counts as at
-rest.
-"""
+"""The palm counts as held out if its x exceeds the first value, and as at rest if it moves less than the second [m]."""
 SWAY_HZ, TREMOR_HZ = 0.4, 8.0
 SWAY_M, TREMOR_M, SWAY_RAD = 2.5e-3, 2e-4, 0.01
-"""Amplitudes of sway and tremor along each axis, and of the sway about it."""
+"""Amplitudes of sway and tremor along each axis [m], and of the sway about each axis [rad]."""
 RAISED = {"Shoulder_rotx": -35.0, "Shoulder_roty": -90.0, "Elbow_rotz": -115.0}
-"""Joints of the left arm that waves [deg]; the others are at 0."""
+"""Joint angles of the raised left arm [deg]. Joints without a value are at 0."""
 WAVE_DEG, WAVE_S, RAISE_S = 25.0, 0.8, 1.0
-"""Amplitude of the elbow, period of a wave, and time to raise or lower the arm."""
+"""Amplitude of the elbow [deg], period of a wave [s], and time for raising or lowering the arm [s]."""
 SHOULDER_M, MIDDLE_M, SWING_M = 1.43, 0.55, 0.08
-"""Height of the shoulders, at which the left hand waves along y, and least distance of a swing to each side."""
+"""Detection of swings [m]: height above which the left hand counts as raised, y of the middle of a swing, and least
+distance of the hand from the middle on each side.
+"""
 
 
 class SwayingPerson:
-    """Moves the arms of an avatar; the right palm sways as that of a standing person.
+    """Moves both arms of an avatar. The right palm sways like the hand of a standing person.
 
     Args:
-        scene: The scene that it acts in.
-        random: Random numbers of the sway.
+        scene: Scene in which the avatar acts.
+        random: Random generator for the phases of the sway.
 
     Attributes:
-        target: The pose around which the palm sways, in the world: z out of the palm, x along the fingers.
-        swings: Number of times that the raised left hand has moved from one side to the other, from the joints'
-            positions.
+        target: Pose around which the right palm sways, in the world: z out of the palm, x along the fingers.
+        swings: Number of times that the raised left hand has moved from one side to the other. The number is measured,
+            not commanded.
     """
 
     def __init__(self, scene: Scene, random: np.random.Generator) -> None:
@@ -54,11 +54,11 @@ class SwayingPerson:
         self.swings, self._side, self._calm = 0, 0.0, RestDetector()
 
     def palm(self) -> Pose:
-        """Returns the pose of the right palm."""
+        """Returns the present pose of the right palm in the world."""
         return self._right.pose()
 
     def note(self) -> None:
-        """Records the positions of both hands in a cycle."""
+        """Records the positions of both hands in this cycle, and counts the swings."""
         self._calm.note(self.palm().position)
         _, y, z = (self._left.pose() @ LEFT_HAND).position
         if z > SHOULDER_M and abs(y - MIDDLE_M) > SWING_M:
@@ -67,14 +67,14 @@ class SwayingPerson:
             self._side = side
 
     def holds_out(self) -> bool:
-        """Returns whether the right palm is held out and still."""
+        """Returns whether the right palm is held out and at rest."""
         return self.palm().position[0] > OUT_X_M and self._calm.is_within(CALM_M)
 
     def go(self, pose: Pose, duration_s: float) -> Iterator[None]:
         """Moves the right palm along a line to a pose in the world, from rest to rest.
 
         Raises:
-            SceneFailedError: If it is out of reach.
+            SceneFailedError: If the pose is out of reach.
         """
         start, begin_s = self.target, self._scene.seen.time_s
         while (share := (self._scene.seen.time_s - begin_s) / duration_s) < 1.0:
@@ -82,13 +82,13 @@ class SwayingPerson:
             yield
 
     def stay_until(self, is_over: Callable[[], bool]) -> Iterator[None]:
-        """Keeps the right palm at its place until a condition holds."""
+        """Keeps the right palm at its last target until a condition holds."""
         while not is_over():
             self._send(self.target)
             yield
 
     def wave(self, count: int) -> Iterator[None]:
-        """Raises the left arm, waves some times and lowers the arm."""
+        """Raises the left arm, waves `count` times, and lowers the arm."""
         joints = self._left.joint_names
         down = [self._scene.seen.joints[NAME][name] for name in joints]
         up = [math.radians(RAISED.get(name.removeprefix("jLeft"), 0.0)) for name in joints]
@@ -101,7 +101,7 @@ class SwayingPerson:
         yield from self._left.move_joints(down, RAISE_S)
 
     def _send(self, pose: Pose) -> None:
-        """Sends the palm to a pose, swaying a little around it."""
+        """Sends the right palm to a pose in the world, with sway and tremor added."""
         self.target = pose
         sway, tremor, turn = (
             np.sin(2.0 * math.pi * hz * self._scene.seen.time_s + phases)
@@ -113,7 +113,7 @@ class SwayingPerson:
 
 
 def together(*acts: Iterator[None]) -> Iterator[None]:
-    """Advances all actions in every cycle, in their order, until the last one has ended."""
+    """Runs several actions at the same time, until all have ended. Each cycle advances the actions in their order."""
     running = list(acts)
     while running := [act for act in running if next(act, running) is None]:
         yield

@@ -1,4 +1,4 @@
-"""An arm that moves a link around the axis of its base; the link points away from the axis."""
+"""Moves a link of an arm around the vertical axis of the arm's base. The link always points away from the axis."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ SHORTEST_S = 0.5
 
 
 class PolarPoint(NamedTuple):
-    """A place in cylindrical coordinates, whose axis is z of the world.
+    """A position in cylindrical coordinates about the z axis of the world.
 
     Attributes:
         radius: Distance from the axis [m].
-        azimuth: Angle about the axis, from x [rad].
+        azimuth: Angle about the axis, from the world's x axis [rad].
         height: Height [m].
     """
 
@@ -34,28 +34,28 @@ class PolarPoint(NamedTuple):
         return cls(math.hypot(x, y), math.atan2(y, x), z)
 
     def moved(self, out: float = 0.0, up: float = 0.0) -> PolarPoint:
-        """Returns the position that is further out and higher [m]."""
+        """Returns the position moved away from the axis by `out` and upwards by `up` [m]."""
         return PolarPoint(self.radius + out, self.azimuth, self.height + up)
 
     def pose(self) -> Pose:
-        """Returns the pose in the world whose axis x points away from the axis, and z up."""
+        """Returns the pose in the world with this position, with x away from the axis and z up."""
         x, y = self.radius * math.cos(self.azimuth), self.radius * math.sin(self.azimuth)
         return Pose((x, y, self.height), about_z(self.azimuth))
 
 
 class PolarArm(LedArm):
-    """Moves a link of an arm whose base is on the axis z of the world, without turning the wrist.
+    """Moves a link of an arm whose base is on the z axis of the world. The link always points away from this axis.
 
     Args:
-        scene: The scene that it acts in.
-        robot: The robot's name in the world.
-        urdf: Its URDF.
-        base_link: Link from which the chain begins.
-        link: The link that is led.
-        base: Pose of the base link in the world.
+        scene: Scene in which the arm acts.
+        robot: Name of the robot in the world.
+        urdf: URDF file of the robot.
+        base_link: First link of the kinematic chain.
+        link: Last link of the kinematic chain, which is moved.
+        base: Pose of `base_link` in the world.
 
     Attributes:
-        spot: The last position that the link was sent to.
+        spot: Last target position of the link.
     """
 
     def __init__(self, scene: Scene, robot: str, urdf: str, base_link: str, link: str, base: Pose) -> None:
@@ -63,11 +63,11 @@ class PolarArm(LedArm):
         self.spot = PolarPoint.of(self.target.position)
 
     def swing(self, end: PolarPoint, speed: float, turn_speed: float) -> Iterator[None]:
-        """Moves to a position, from rest to rest; used as `yield from arm.swing(...)`.
+        """Moves the link to a position, from rest to rest. Use: `yield from arm.swing(...)`.
 
         Args:
-            end: The position.
-            speed: Mean speed out and up [m/s].
+            end: Target position.
+            speed: Largest mean speed of radius and height together [m/s].
             turn_speed: Largest mean speed of the azimuth [rad/s].
 
         Raises:

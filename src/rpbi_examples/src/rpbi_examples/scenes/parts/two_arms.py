@@ -1,4 +1,4 @@
-"""Two arms of one robot that keep a distance from each other, a zone that one arm at a time may enter, and grippers."""
+"""Two arms of one robot that keep a distance between them, a zone that one arm at a time may enter, and grippers."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from safe_robot.checks.proximity_check import link_distances
 from .arm import LedArm, about_z, between, smooth
 
 FAR_M = 0.5
-"""Distances beyond this are not computed [m]."""
+"""Largest distance that `measured_m` computes [m]."""
 DOWN = (0.0, 1.0, 0.0, 0.0)
-"""Orientation of a hand at yaw 0: its z points down, its fingers move along y."""
+"""Orientation of a hand at yaw 0: the hand's z axis points down, and the fingers move along y."""
 
 
 class TwoArms:
-    """Moves both arms, and stops one while its next target would be too near to the other arm.
+    """Moves both arms of a robot, and rejects targets at which one arm would be too near to the other.
 
     Args:
-        scene: The scene that they act in.
-        robot: The robot's name in the world.
-        urdf: Its URDF.
-        base_link: Link on which both arms are.
-        links: By arm, the link that is led.
-        base: Pose of the base link in the world.
-        joints: Positions of further joints, such as those of fingers, for the distances [rad or m].
+        scene: Scene in which the robot acts.
+        robot: Name of the robot in the world.
+        urdf: URDF file of the robot.
+        base_link: Link on which both arms are mounted.
+        links: Link that is moved, indexed by the arm's name.
+        base: Pose of `base_link` in the world.
+        joints: Positions of other joints, such as fingers, that are assumed for the distances [rad or m].
         least_m: Least distance between the arms [m].
 
     Attributes:
-        arms: By name.
+        arms: The arms, indexed by name.
     """
 
     def __init__(
@@ -62,7 +62,9 @@ class TwoArms:
         self._sent_m = self._distance_m({}, least_m)
 
     def send(self, name: str, pose: Pose) -> bool:
-        """Sends an arm to a pose in the world, unless it would be too near to the other arm and not move away from it.
+        """Sends an arm to a pose in the world, unless the pose is too near to the other arm.
+
+        A pose at less than the least distance is accepted if the distance does not decrease.
 
         Returns:
             Whether the arm was sent.
@@ -82,11 +84,16 @@ class TwoArms:
         return True
 
     def measured_m(self) -> float:
-        """Returns the present distance between the arms [m]; inf beyond `FAR_M`."""
+        """Returns the present distance between the arms [m]; inf if it is larger than `FAR_M`."""
         return self._distance_m(self._scene.seen.joints[self._robot], FAR_M)
 
     def _distance_m(self, joints: Mapping[str, float], most_m: float) -> float:
-        """Returns the distance with other positions for some joints [m]; inf beyond `most_m`."""
+        """Returns the distance between the arms at given joint positions [m]; inf if it is larger than `most_m`.
+
+        Args:
+            joints: Positions of some joints [rad or m]. Other joints are at their last targets.
+            most_m: Largest distance that is computed [m].
+        """
         sent = [position for arm in self.arms.values() for position in arm.positions]
         places = zip(self._names, [*sent, *self._joints.values()])
         self._distances.place(np.array([joints.get(name, position) for name, position in places]))
@@ -100,27 +107,29 @@ class Zone:
         self._owner = ""
 
     def take(self, name: str) -> bool:
-        """Reserves the zone for an arm if it is free; returns whether the arm may enter."""
+        """Reserves the zone for an arm if the zone is free, and returns whether the arm may enter."""
         self._owner = self._owner or name
         return self._owner == name
 
     def leave(self, name: str) -> None:
-        """Releases the zone that an arm has left."""
+        """Releases the zone if the named arm has reserved it."""
         if self._owner == name:
             self._owner = ""
 
 
 class Gripper:
-    """Yields targets for an arm, and opens and closes its fingers.
+    """Yields target poses for an arm with a gripper, and opens and closes the gripper's fingers.
+
+    The caller must send the target poses to the arm, one in each cycle.
 
     Args:
-        scene: The scene that it acts in.
-        robot: The robot's name in the world.
-        arm: The arm; its link is between the fingers.
-        finger: Joint of a finger, which opens from 0 on; the other finger follows it.
-        speed: Mean speed of the hand [m/s].
-        turn_speed: Mean angular speed [rad/s].
-        cycle_s: Time of a cycle [s].
+        scene: Scene in which the robot acts.
+        robot: Name of the robot in the world.
+        arm: The arm. Its moved link has its origin between the fingers.
+        finger: Joint of a finger, which is 0 when closed. The other finger mimics this joint.
+        speed: Largest mean speed of the hand [m/s].
+        turn_speed: Largest mean angular speed of the hand [rad/s].
+        cycle_s: Duration of a cycle [s].
     """
 
     def __init__(
@@ -138,7 +147,7 @@ class Gripper:
 
     @property
     def target(self) -> Pose:
-        """The last pose that it was sent to, in the world."""
+        """Last target pose that was sent to the arm, in the world."""
         return self._arm.target
 
     def opening(self) -> float:
@@ -146,14 +155,19 @@ class Gripper:
         return self._scene.seen.joints[self._robot][self._finger]
 
     def open(self, way_m: float, duration_s: float) -> Iterator[Pose]:
-        """Opens both fingers to a distance [m] and waits; 0 closes them with full force."""
+        """Sends both fingers to a distance from the closed position [m], and waits. At 0, the gripper closes with full
+        force.
+        """
         self._scene.put(f"{self._robot}/target", {self._finger: way_m})
         for _ in range(round(duration_s / self._cycle_s)):
             yield self._arm.target
 
     def go(self, position: Vector, yaw: float) -> Iterator[Pose]:
-        """Moves along a line from rest to rest, until the gripper points down with a position [m] between its
-        fingers.
+        """Yields target poses along a line, from rest to rest.
+
+        Args:
+            position: Final position of the point between the fingers, in the world [m].
+            yaw: Final yaw of the gripper, which points down [rad].
         """
         start, end = self._arm.target, Pose(position, quaternion_product(about_z(yaw), DOWN))
         way_s = norm(minus(end.position, start.position)) / self._speed
