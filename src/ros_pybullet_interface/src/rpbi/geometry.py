@@ -1,7 +1,7 @@
 """Poses, twists and wrenches of the simulator, computed by PyBullet.
 
-PyBullet computes in another precision than Python, and the results of a simulation depend on the last bit. PyBullet
-therefore computes all products of poses in which one pose is a `Pose` of this module.
+PyBullet multiplies poses and rotates vectors in single precision, and the results of a simulation depend on the last
+bit. PyBullet therefore computes all products of poses in which at least one pose is a `Pose` of this module.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ class ExternalWrenches:
         return bool(self._acting)
 
     def check(self, given: ExternalWrench | Mapping[str, Any]) -> ExternalWrench:
-        """Checks a wrench, and returns it with the plain name of the link. Any thread may call this method.
+        """Checks a wrench, and returns the wrench with the plain name of its link. Any thread may call this method.
 
         Args:
             given: A wrench, or a mapping of the fields of `ExternalWrench`.

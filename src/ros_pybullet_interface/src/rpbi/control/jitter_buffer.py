@@ -50,7 +50,7 @@ class Playout(NamedTuple):
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
         speed: Ratio of the interval since the previous target as sent to the same interval as played.
         pace: Mean interval between the arrivals of recent targets [ticks].
-        gap: Time between the end of extrapolation and the arrival of this target [ticks]; 0 if it arrived earlier.
+        gap: Time from the end of extrapolation to the arrival of this target [ticks]; 0 if the target came before.
         apart: Interval since the previous target by stamps or arrivals [ticks]; 0 if unknown.
     """
 
@@ -71,12 +71,12 @@ class Playout(NamedTuple):
 class JitterBuffer:
     """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
 
-    Send times are estimated in two ways. The first way takes the stamps, or the arrivals if stamps are not valid; this
-    suits samples at irregular intervals. The second way fits a regular period to the times of the first; this suits
-    regular samples that a busy machine sends late. The way for which positions over time are smoother is used.
+    Send times are estimated in two ways. The first estimate is the stamps, or the arrivals if stamps are not valid. It
+    suits samples at irregular intervals. The second estimate is a regular period, fitted to the first estimate. It
+    suits regular samples that a busy machine sends late. The estimate with the smoother positions over time is used.
 
-    Delays are never negative, so the arrival with the smallest delay in the window is the reference without delay. The
-    buffer delay is added to the reference. The total delay changes slowly, except if a target comes too late for it.
+    Delays are never negative, so the arrival with the smallest delay in the window counts as undelayed. The buffer
+    delay is added. The total delay changes slowly, except if a target comes too late for the present delay.
 
     Args:
         dt_s: Length of a tick [s].
@@ -252,9 +252,9 @@ class JitterBuffer:
         self._out_of_step = 0
 
     def _count_lost(self, times: Sequence[float]) -> None:
-        """Decides from positions whether targets were lost before the newest one, and if so, counts them.
+        """Counts the targets that were lost before the newest target.
 
-        If no targets were lost, the newest target is late.
+        After a gap, the positions show whether targets were lost or the newest target is late.
         """
         periods = round((times[-1] - times[-2]) / self._interval)
         if not 1 < periods <= MAX_LOST:

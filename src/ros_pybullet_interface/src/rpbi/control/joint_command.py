@@ -35,14 +35,14 @@ class JointCommand(NamedTuple):
 
     @classmethod
     def of(cls, given: JointCommand | Mapping[str, float], quantity: str) -> JointCommand:
-        """Converts a mapping from joint names to numbers to a command; returns a command unchanged.
+        """Creates a command from a mapping; returns a command unchanged.
 
         Args:
-            given: The command or the mapping.
+            given: A mapping from joint names to numbers, or a command.
             quantity: Quantity of the mapping's numbers: `position`, `velocity` or `effort`.
 
         Raises:
-            ValueError: If `given` is neither a command nor a mapping.
+            ValueError: If `given` is neither a command nor a mapping from joint names to numbers.
         """
         if isinstance(given, cls):
             return given

@@ -49,7 +49,7 @@ class JointDrive:
         self._streams = TargetStreams(motors, name, self.dt_s, interpolation == "smooth", buffer_s)
 
     def follow(self, commands: Iterable[ResolvedCommand]) -> None:
-        """Accepts new targets for the joints. Targets checked for another control mode than the present are ignored."""
+        """Accepts new targets for the joints. Targets that were checked for an earlier control mode are ignored."""
         if self._interpolates and self.motors.mode in POSITION_MODES:
             self._streams.follow(commands)
         else:
@@ -77,7 +77,7 @@ class JointDrive:
         """Starts a motion at the next tick. A motion that runs already is halted.
 
         Raises:
-            ValueError: If the robot is under torque control, or a controller drives one of its joints.
+            ValueError: If the robot is under torque control, or a controller drives a joint of the motion.
         """
         if self.motors.mode == pybullet.TORQUE_CONTROL:
             raise ValueError("the robot is under TORQUE_CONTROL, which cannot hold a position")

@@ -25,7 +25,7 @@ PERIOD_S = 5.0
 class LimitReports:
     """Logs a warning when a joint leaves its position limits, at most one per joint within `PERIOD_S`.
 
-    The joint must return to its limits before the next warning.
+    There is no further warning until the joint has been within its limits again.
     """
 
     not_in_keyframes = ("_beyond", "_reported_s")
@@ -36,7 +36,10 @@ class LimitReports:
         self._reported_s: dict[int, float] = {}
 
     def observe(self, joint: Joint, position: float, what: str) -> None:
-        """Logs a warning if a position is outside the joint's limits, unless the joint was reported recently.
+        """Logs a warning if a position is outside the joint's limits.
+
+        There is no warning if the last observed position was outside, too, or if the last warning about the joint is
+        not older than `PERIOD_S`.
 
         Args:
             joint: The joint.
@@ -89,7 +92,7 @@ class ResolvedCommand(NamedTuple):
 
 
 def coalesce(older: tuple[ResolvedCommand, ...], newer: tuple[ResolvedCommand, ...]) -> tuple[ResolvedCommand, ...]:
-    """Joins two sequences of targets. If `older` is full, merges `newer` into its last target."""
+    """Joins two sequences of targets; merges the newer into the last older one if `MAX_WAITING_TARGETS` wait."""
     if len(older) < MAX_WAITING_TARGETS:
         return older + newer
     return (*older[:-1], older[-1].merged(*newer))
@@ -249,7 +252,7 @@ class Motors:
             self._drive(index, position)
 
     def track(self, index: int, position: float, velocity: float) -> None:
-        """Makes a joint move with a velocity during the next tick, in any control mode. Nothing is clipped.
+        """Makes a joint move with a velocity during the next tick, in any control mode. The arguments are not clipped.
 
         PyBullet's position motor drives at `velocity` plus a correction: its gain times the difference between
         `position` and the measured position, both before the tick.

@@ -70,7 +70,7 @@ class PosePath:
         return max(self._intervals)
 
     def ticks_to(self, pose: Pose) -> float:
-        """Returns the travel time [ticks] from the present line position to a pose at the largest speeds."""
+        """Returns the travel time [ticks] from the present point on the line to a pose at the largest speeds."""
         way = _numbers(pose, self._line) - self._line
         turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # rotation is fastest in the middle of the line
         return max(float(np.linalg.norm(way[:3])) / self._max_step, turn / self._max_turn)

@@ -27,7 +27,7 @@ class PoseTarget(NamedTuple):
     """Target pose of a point of a link.
 
     Attributes:
-        pose: Pose of the point in the world; the orientation is the link's.
+        pose: Position of the point and orientation of the link, in the world.
         stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
     """
 
@@ -85,7 +85,7 @@ class CartesianImpedanceController(Controller):
         return value._replace(pose=check_pose(value.pose))
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Sets the target pose and the posture to the measured ones, until the first target comes."""
+        """Sets the target pose to the measured pose, and the posture to the measured joint positions."""
         self._goal = self._pose()
         self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
@@ -140,9 +140,9 @@ class CartesianImpedanceController(Controller):
         return damping
 
     def _way(self, tick: int) -> Sequence[float]:
-        """Returns the pose error: 3 translations [m] and the rotation vector [rad] from the point to its set point.
+        """Advances the target stream by one tick, and returns the pose error: 6 numbers.
 
-        The set point is the pose at the end of the tick; the call advances the target stream by one tick.
+        The error is the translation [m] and the rotation vector [rad] from the measured pose to the stream's pose.
         """
         x, y, z, *quat = self._stream.advance(tick + 1.0).values()
         pose = self._pose()

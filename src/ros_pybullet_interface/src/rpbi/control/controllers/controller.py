@@ -43,10 +43,10 @@ class RobotState(NamedTuple):
 
 
 class SetPoints(NamedTuple):
-    """Output of a controller that commands positions; PyBullet's motors move the joints there within the tick.
+    """Joint positions that a controller commands; PyBullet's motors move the joints to these positions within a tick.
 
     Attributes:
-        position: Position of each of the controller's m joints at the end of the tick [rad or m], shape (m,).
+        position: Positions of the controller's m joints at the end of the tick [rad or m], shape (m,).
     """
 
     position: Array
@@ -103,7 +103,9 @@ class Controller(ABC):
         self.config = config
 
     def check(self, key: str, value: Any) -> Any:
-        """Checks a value received on a topic, and returns the value to store in `targets`. Any thread may call it.
+        """Checks a value received on a topic, and returns the value to store in `targets`.
+
+        Any thread may call this method.
 
         Args:
             key: Name of the input.

@@ -42,7 +42,7 @@ class JointSprings(ConfigModel):
     )
 
     def by_joint(self, key: str, joints: Iterable[Joint]) -> Array:
-        """Returns one value per joint of a key; joints that the configuration does not name get the key's default.
+        """Returns the values of a key for joints, shape (n,). Joints that the configuration lacks get the default.
 
         Args:
             key: `stiffness` or `damping_ratio`.
@@ -81,7 +81,7 @@ class Disturbance:
         """Corrects the estimate by the error of the last prediction.
 
         Args:
-            velocity: n velocities [rad/s or m/s] measured after the tick that `predict` predicted.
+            velocity: n measured velocities [rad/s or m/s] after the tick of the last `predict`.
         """
         if self._predicted is not None:
             self.estimate += self._share * (velocity - self._predicted)

@@ -115,7 +115,7 @@ class ControllerManager:
         motors: The robot's motors.
 
     Raises:
-        ConfigError: If a configuration does not fit.
+        ConfigError: If a configuration does not fit the robot.
     """
 
     def __init__(self, robot: ControlledRobot, configs: Mapping[str, ControllerConfig], motors: Motors) -> None:

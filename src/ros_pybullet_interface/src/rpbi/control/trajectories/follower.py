@@ -73,8 +73,8 @@ class TrajectoryFollower:
     ) -> TrajectoryMotion:
         """Starts a motion that follows a trajectory, and returns the motion. The present motion is preempted.
 
-        Until the start time, the joints continue their present trajectories. Joints that the request leaves out
-        continue theirs to the end.
+        Until the start time, all joints continue their present trajectories. Joints that the request leaves out follow
+        their present trajectories to the end.
 
         Args:
             request: Result of `check`.
@@ -110,7 +110,8 @@ class TrajectoryFollower:
         Args:
             reason: Reason for the message of the motion's result.
             clock: The world's clock.
-            motion: Motion to end. If another motion is present, the call has no effect. None ends any present motion.
+            motion: The motion to end; the call has no effect if another motion has replaced it. None ends the present
+                motion.
         """
         running = self._running
         if running is None or motion not in (None, running):
@@ -173,7 +174,7 @@ class TrajectoryFollower:
         return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
-        """Starts a motion, and preempts the present trajectory motion with a reason for its result.
+        """Starts a motion, and ends the present trajectory motion with `reason` as the message of its result.
 
         Raises:
             TrajectoryRefusedError: If the control mode is torque control, or a controller drives a joint.

@@ -90,7 +90,7 @@ def validate_trajectory(
         may_be_partial: Whether the trajectory may leave joints out.
 
     Raises:
-        TrajectoryRefusedError: If a name, a number, or a limit is violated.
+        TrajectoryRefusedError: If a joint is unknown or missing, a number is invalid, or a limit is exceeded.
     """
     _check_names(request, joints, may_be_partial)
     _check_points(request)

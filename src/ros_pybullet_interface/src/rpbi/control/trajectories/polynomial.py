@@ -32,7 +32,7 @@ def cubic(duration_s: float, p0: float, p1: float, v0: float, v1: float) -> Poly
 def quintic(duration_s: float, p0: float, p1: float, v0: float, v1: float, a0: float, a1: float) -> Polynomial:
     """Returns the quintic Hermite polynomial between positions `p`, with velocities `v` and accelerations `a`.
 
-    Units are rad or m, and s. 0 marks the start, 1 the end.
+    Index 0 marks the start, index 1 the end. Units are rad or m, and s.
     """
     t = duration_s
     mean = (p1 - p0) / t
