@@ -58,8 +58,7 @@ class Body:
 
     @classmethod
     def prepare(cls, config: Any, has_window: bool) -> None:
-        """Prepares and caches data that are slow to compute, without calls to PyBullet; any thread may call this
-        method.
+        """Prepares and caches data that are slow to compute, without calling PyBullet; any thread may call it.
 
         Raises:
             ConfigError: If data cannot be prepared from the configuration.
@@ -231,11 +230,7 @@ class Body:
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether an object of the section `section` has this type, for sections that several types share.
-
-        Args:
-            data: Content of the object's YAML.
-        """
+        """Returns whether a YAML object has this type; called if several types share a section."""
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:

@@ -24,9 +24,9 @@ class ForceTorqueSensor(Sensor):
 
     PyBullet's own measurement lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and would still be
     wrong if they were added, see docs/force_torque.md. This sensor computes the wrench from an impulse balance
-    (Newton-Euler) for all links below the joint. The wrench is their change of momentum during the last tick, minus
-    their weight and minus all contact, attachment and external forces. The balance holds for all types of joints,
-    control modes and limits.
+    (Newton-Euler) for all links below the joint. The wrench is the rate of change of these links' momentum during the
+    last tick, minus their weight and minus all contact, attachment and external forces. The balance holds for all types
+    of joints, control modes and limits.
 
     Args:
         default_hz: Rate of the sensor if its configuration has no rate [Hz].
@@ -90,7 +90,7 @@ class ForceTorqueSensor(Sensor):
                 yield load
 
     def zero(self, count: int) -> Zeroing:
-        """Starts to zero the sensor to the mean of its next `count` samples; returns the running zeroing, if any."""
+        """Starts zeroing the sensor to the mean of its next `count` samples; does not restart a zeroing that runs."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing

@@ -33,7 +33,7 @@ class MobileRobot(Robot):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether the YAML of an object in the section `robots` describes a robot whose base drives."""
+        """Returns whether a YAML object of the section `robots` is a robot whose base drives."""
         return data.get("planar_base") is not None
 
     def inputs(self) -> Mapping[str, Input]:

@@ -99,7 +99,7 @@ class Robot(JointedBody):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether the YAML of an object in the section `robots` is neither a visual nor a mobile robot's."""
+        """Returns whether a YAML object of the section `robots` is neither a visual nor a mobile robot."""
         return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:

@@ -36,7 +36,7 @@ class VisualRobot(JointedBody):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether the YAML of an object in the section `robots` describes a visual robot."""
+        """Returns whether a YAML object of the section `robots` is a visual robot."""
         return data.get("is_visual_robot") in (True, 1)
 
     def inputs(self) -> Mapping[str, Input]:

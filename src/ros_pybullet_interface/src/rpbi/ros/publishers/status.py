@@ -111,7 +111,7 @@ class ClockPublisher:
             self._send()
 
     def publish_now(self) -> None:
-        """Publishes the time of the present tick regardless of the rate, for instance before a stop."""
+        """Publishes the time of the present tick regardless of the rate, for instance when the world stops."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 

@@ -26,7 +26,7 @@ class ContactArrowsSensor(Sensor):
         self._metres_per_newton = metres_per_newton
 
     def enter(self, world: SensedWorld) -> None:
-        """Stores the world's contacts."""
+        """Stores the world's contact reader."""
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:

@@ -121,7 +121,7 @@ class ContactsSensor(Sensor):
         self._reader: ContactReader | None = None
 
     def enter(self, world: SensedWorld) -> None:
-        """Stores the world's contacts."""
+        """Stores the world's contact reader."""
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactsSample:
