@@ -27,7 +27,7 @@ class Pose(geometry.Pose):
         return Pose(*pybullet.multiplyTransforms(*other, *self))
 
     def inverse(self) -> Pose:
-        """Returns the inverse: for the pose of b in a, the pose of a in b."""
+        """Returns the inverse pose: the inverse of `pose_b_in_a` is the pose of a in b."""
         return Pose(*pybullet.invertTransform(*self))
 
 

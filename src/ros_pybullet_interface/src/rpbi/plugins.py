@@ -14,18 +14,19 @@ own_folders.append(str(Path(__file__).parent))
 
 
 def is_foreign(thing: Any) -> bool:
-    """Returns whether a class, a function, or an object's class comes from another package than this one."""
+    """Returns whether a class, a function, or an object's class is defined outside this package."""
     return full_name(thing).split(":")[0].split(".")[0] != _OWN_PACKAGE
 
 
 def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
-    """Raises a PluginError from an error in code of another package; returns if there is no need.
+    """Raises a PluginError for an error in code of another package.
 
-    An InterfaceError needs no PluginError. Errors in this package's own classes are bugs, and keep their type.
+    Returns without effect if the error is an InterfaceError, or if the code belongs to this package. Errors in this
+    package's own classes are bugs, and keep their traceback.
 
     Args:
         thing: The class, function or object that failed.
-        doing: What it did, for the message, such as `compute`.
+        doing: The action that failed, for the message, such as `compute`.
         error: The error.
 
     Raises:
@@ -51,7 +52,7 @@ def check_sample(sample: Any, sample_type: Any, name: str) -> None:
     Args:
         sample: The sample.
         sample_type: Expected class of the sample.
-        name: Expected name in the sample: that of the sensor.
+        name: Name of the sensor, which the sample must contain.
 
     Raises:
         TypeError: If the sample has another class.

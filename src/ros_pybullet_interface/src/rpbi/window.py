@@ -76,7 +76,7 @@ class Window:
                     yield WindowKeyEvent(key, happened)
 
     def mouse_events(self) -> Iterator[MouseEvent]:
-        """Yields mouse events since the last call, and one event for each button that is held."""
+        """Yields mouse events since the last call."""
         for kind, x, y, button, state in self._pb.getMouseEvents():
             if button < 0:
                 yield MouseEvent(kind, x, y, button, 0)

@@ -226,8 +226,9 @@ def _jerk_line(length: int) -> np.ndarray:
 def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
     """Returns an upper bound of the duration of braking from any state within limits and speeds up to `FASTEST` [s].
 
-    In continuous time, the largest jerk of the least-squares braking of duration D is (6 v + 4 a D) / D^2, at its
-    start. Its acceleration in the opposite direction is at most a third of the present acceleration plus 1.5 v / D.
+    The longest braking starts with v and a of the same sign. In continuous time, the largest jerk of the least-squares
+    braking of duration D is then (6 v + 4 a D) / D^2, at the start. The acceleration in the opposite direction is at
+    most a third of the present acceleration plus 1.5 v / D.
     """
     velocity = min(velocity, FASTEST)
     acceleration = min(acceleration, 2.0 * math.sqrt(velocity * jerk))

@@ -17,8 +17,8 @@ class ObjectEntry(NamedTuple):
 
     Attributes:
         file: Name of the file, as in YAML.
-        overrides: Values that replace those of the file, by key. Mappings are merged key by key, and null removes a
-            key.
+        overrides: Values that replace the file's values, keyed as in the file. Mappings are merged key by key, and null
+            removes a key.
     """
 
     file: str

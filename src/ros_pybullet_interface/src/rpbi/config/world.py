@@ -64,7 +64,7 @@ def checked_real_time_factor(factor: float) -> float:
     """Checks a real-time factor, and returns it.
 
     Raises:
-        ValueError: If the factor is neither 0 (as fast as possible) nor a finite number from MIN_REAL_TIME_FACTOR on.
+        ValueError: If the factor is neither 0 (as fast as possible) nor a finite number >= MIN_REAL_TIME_FACTOR.
     """
     if factor == 0.0 or MIN_REAL_TIME_FACTOR <= factor < math.inf:
         return factor
@@ -151,7 +151,7 @@ class AttachmentConfig(ConfigModel):
 
 
 class WorldConfig(ConfigModel):
-    """Keys of the main YAML file, without its lists of object files, which `main_file_model` adds."""
+    """Keys of the main YAML file, except the lists of object files. `main_file_model` adds these lists."""
 
     model_config = ConfigDict(extra="ignore")
 

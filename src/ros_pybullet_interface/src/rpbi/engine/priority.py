@@ -60,7 +60,7 @@ class RealTimePriority:
 
 
 def yield_to_simulator() -> None:
-    """Gives all threads of this process, a renderer, a lower priority than the simulator's.
+    """Lowers the priority of all threads of this process, a renderer, below the simulator's priority.
 
     The threads get the batch policy, so they do not preempt other threads when they wake up. The idle policy would be
     too low: any process with nice value 19 would take the processor from the renderer.

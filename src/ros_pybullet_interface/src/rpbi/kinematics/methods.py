@@ -170,14 +170,16 @@ def _cost(q: np.ndarray, rest: np.ndarray, ranges: np.ndarray) -> float:
 def _step(
     jacobian: np.ndarray, error: np.ndarray, wish: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
-    """Returns the joint step nearest to a desired step that corrects the link's error within the joint limits.
+    """Returns the joint step that corrects the link's error and, beyond that, comes nearest to a desired step.
+
+    Joints stop at their limits. All steps are divided by the joints' weights.
 
     Args:
-        jacobian: Jacobian of the link.
+        jacobian: Jacobian of the link, multiplied by the joints' weights.
         error: Error of the link to its target.
-        wish: Desired step.
-        lower: Steps to the lower limits.
-        upper: Steps to the upper limits.
+        wish: Desired step of the m joints.
+        lower: Steps of the m joints to their lower limits.
+        upper: Steps of the m joints to their upper limits.
     """
     step = np.zeros(len(wish))
     free = np.ones(len(wish), dtype=bool)

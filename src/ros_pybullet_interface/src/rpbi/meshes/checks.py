@@ -13,7 +13,7 @@ SOFT_MESH_FORMATS = (".obj", ".vtk")
 
 
 def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
-    """Returns a key of YAML and a message for each error in the mesh of a shape."""
+    """Returns the YAML key and a message for each error in the mesh of a shape."""
     problems = []
     if shape.fileName is not None and (problem := mesh_file_problem(shape.fileName)):
         problems.append(("fileName", f"{problem}: {shape.fileName}"))

@@ -164,7 +164,7 @@ def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> 
         mapping: Schema of the outer mapping.
         root: Schema of the whole file.
         path: Prefix of the paths.
-        files: Kinds of files.
+        files: Kinds of files; mappings whose path is one of these are left out.
     """
     for key, value in _values(mapping).items():
         inner_path = f"{path}{key}"
@@ -175,7 +175,7 @@ def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> 
 
 
 def _values(mapping: Schema) -> dict[str, Schema]:
-    """Returns the schemas of a mapping's keys; `NAME` has the schema of keys that the user names, if allowed."""
+    """Returns the schemas of a mapping's keys. If users may add keys, `NAME` has the schema of the added values."""
     more = mapping.get("additionalProperties")
     return {**mapping["properties"], **({"NAME": more} if isinstance(more, dict) else {})}
 
