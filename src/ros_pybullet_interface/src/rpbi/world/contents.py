@@ -93,9 +93,9 @@ class WorldContents:
         self.log: list[LogEntry] = []
         self._config = WorldConfig()
         self._filled_entries = 0
-        """Number of log entries made by `fill` or `rebuild`."""
+        """Number of log entries that the last `fill` or `rebuild` made."""
         self._changed: set[str] = set()
-        """Names of bodies that had been added or removed before `rebuild`."""
+        """Names of bodies that had been added or removed before the last `rebuild`."""
 
     def body(self, name: str) -> Body:
         """Returns the body with a given name.

@@ -21,7 +21,7 @@ class _Scheduled:
         self._is_foreign = is_foreign(sensor)
         self.order = order
         self.read_tick = -1
-        """Tick of the last sample, -1 before the first."""
+        """Tick of the last sample; -1 before the first sample."""
         self.schedule_from(tick, dt_ns)
 
     def schedule_from(self, tick: int, dt_ns: int) -> None:
@@ -53,12 +53,12 @@ class SensorSchedule:
         self._clock = clock
         self._scheduled: dict[str, list[_Scheduled]] = {}
         self.watching: list[Sensor] = []
-        """Sensors that act at every tick."""
+        """Sensors that have a `before_step` or `after_step` to be called at every tick."""
         self._queue: list[tuple[int, int, _Scheduled]] = []
-        """A heap with the tick at which each sensor is due, the order in which it was added, and the sensor."""
+        """Heap with an entry for each sensor: its next due tick, its number in the order of adding, and the sensor."""
         self._count = 0
         self._warned: set[tuple[str, float]] = set()
-        """Names and rates of sensors in warnings so far; a reset does not repeat them."""
+        """Sensor names and rates of all warnings so far, so that a reset does not repeat a warning."""
 
     def __contains__(self, name: str) -> bool:
         """Returns whether a body or camera with this name was added, even if it has no sensors."""

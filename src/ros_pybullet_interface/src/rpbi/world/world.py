@@ -90,14 +90,14 @@ class World:
         self.clock = Clock(self.config.timeStep, simulated_time)
         self.mailbox = Mailbox()
         self.commands = CommandLog()
-        """Commands since it was built or reset."""
+        """Commands since the world was built or reset."""
         self.resets = 0
-        """Number of resets."""
+        """Number of resets since the world was built."""
         self._shadow: Shadow | None = None
         self.physics_s = 0.0
-        """Wall time that PyBullet's steps took [s]."""
+        """Total wall time that PyBullet's steps took [s]."""
         self.loaded = loaded
-        """Configuration that it was built from, and is again at a reset."""
+        """Configuration from which the world was built, and is built again at a reset."""
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
         mode = configured_mode if connection_mode is None else connection_mode
@@ -110,9 +110,9 @@ class World:
         self.contacts = self._contents.contacts
         self.attachments = self._contents.attachments
         self._idle_row = 1
-        """Number of idle ticks in a row, by the time that the last ones took."""
+        """Number of idle ticks until the next check for new inputs, adapted to the wall time of the last ticks."""
         self._pushed: dict[str, Body] = {}
-        """Bodies that external wrenches act on, or acted on in the last tick."""
+        """Bodies on which external wrenches act now, or acted in the last tick, indexed by name."""
         self.log = self._contents.log
         self._sensors = self._contents.sensors
         self._stepping = self._contents.stepping
@@ -125,12 +125,12 @@ class World:
             raise
         self.pb.changes.unrecorded = ""
         self.start_hash = self.state_hash()
-        """Hash of the state when it was built, or was reset the last time."""
+        """Hash of the world's state after it was built or last reset."""
         self._description = self._built_from = ""
         self._start: StartState | None = None
-        """Its start, since the first reset without rebuilding."""
+        """The state to which `reset(rebuild=False)` returns; None until the first such reset."""
         self._keyframe, self._keyframe_tick = "", 0
-        """Its last keyframe since it was built or reset, and its tick."""
+        """Text and tick of the last keyframe since the world was built or reset; empty and 0 without a keyframe."""
 
     @classmethod
     def from_file(cls, path: str, **options: Any) -> World:

@@ -53,7 +53,7 @@ class GraphWriter:
         self._anchors = {id(anchor): name for name, anchor in anchors.items()}
         self._numbers: dict[int, int] = {}
         self._written: list[Any] = []
-        """All objects with a number; kept, so that no other one has the same `id`."""
+        """All written objects; the list keeps them alive, so that Python does not reuse their `id`."""
 
     def plain(self, value: Any, where: str = "") -> Any:
         """Returns the plain form of a value, or a reference if the same object was written before.
@@ -173,7 +173,7 @@ class GraphReader:
         self._fixed, self._anchors = fixed, anchors
         self._read: dict[int, Any] = {}
         self._filled: set[int] = set()
-        """The `id` of all objects that were filled: another one that shared such an object is made anew."""
+        """The `id` of each filled object, so that no existing object is filled twice for different objects."""
         self._kinds: dict[str, Callable[..., Any]] = {
             "array": self._array,
             "config": self._config,
