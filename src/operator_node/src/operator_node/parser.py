@@ -1,4 +1,4 @@
-"""Windows of the operator's signal: the records of a time span, and messages of them as arrays."""
+"""Buffers the operator's signals over a time span, and converts window messages to arrays."""
 
 import math
 from collections import deque
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 
 class SignalWindow:
-    """Buffers the signals of a time span.
+    """Buffers the newest signals within a time span.
 
     Args:
-        duration_s: Age beyond which signals are dropped [s].
-        most: Largest number of signals; the oldest are dropped beyond it, so that a stopped clock cannot fill the
-            memory.
+        duration_s: Age above which signals are dropped [s].
+        most: Largest number of buffered signals. Beyond this number, the oldest signals are dropped, so that a stopped
+            clock cannot fill the memory.
     """
 
     def __init__(self, duration_s: float, most: int = 20_000) -> None:
@@ -24,17 +24,17 @@ class SignalWindow:
 
     @property
     def size(self) -> int:
-        """Numbers per signal; 0 if there is none."""
+        """Number of values in each signal; 0 while the buffer is empty."""
         return len(self._records[0]) - 1 if self._records else 0
 
     def add(self, time_s: float, signal: Sequence[float]) -> None:
-        """Adds the newest signal, at a time [s].
+        """Adds a signal at a time [s].
 
-        All earlier signals are dropped if the size of the signal changes or time goes back, as it does when a
-        simulation is restarted.
+        Drops all earlier signals if the size of the signal changes or time goes back, as after the restart of a
+        simulation.
 
         Raises:
-            ValueError: If the signal is empty or not finite; then nothing is added.
+            ValueError: If the signal is empty or not finite. The buffer then stays unchanged.
         """
         if not signal or not all(map(math.isfinite, (time_s, *signal))):
             raise ValueError(f"expected finite numbers, got {', '.join(f'{v:g}' for v in signal) or 'none'}")
@@ -44,12 +44,12 @@ class SignalWindow:
         self.forget(time_s)
 
     def forget(self, now_s: float) -> None:
-        """Drops the signals that are too old at a time [s]."""
+        """Drops the signals that are older than `duration_s` at the time `now_s` [s]."""
         while self._records and now_s - self._records[0][0] > self._duration_s:
             self._records.popleft()
 
     def data(self) -> list[float]:
-        """Returns the records, each a time [s] and its signal, one after the other, oldest first."""
+        """Returns all records in one list, oldest first. Each record is a time [s] followed by the signal's values."""
         return [value for record in self._records for value in record]
 
 
@@ -57,14 +57,14 @@ def reconstruct_interface_log_msg(msg: Any, Nd: int) -> tuple[NDArray[np.float64
     """Returns the times and signals of a message of `operator_node/window`.
 
     Args:
-        msg: The message; its `data` are records of a time and a signal, one after the other.
-        Nd: Numbers per signal.
+        msg: Message whose `data` hold the records: for each record a time followed by `Nd` values.
+        Nd: Number of values in each signal.
 
     Returns:
         Times [s], shape (N,), oldest first, and signals, shape (Nd, N).
 
     Raises:
-        ValueError: If the data are not records of this size.
+        ValueError: If the length of the data is not a multiple of Nd + 1.
     """
     data = np.asarray(msg.data, dtype=float)
     if Nd < 1 or data.size % (Nd + 1):

@@ -1,4 +1,4 @@
-"""A frame that a user moves by velocities, within a box."""
+"""Moves a frame within a box by velocity signals of a user."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from custom_ros_tools.schema import ConfigModel, FrameId, Hz, KeyedError, Positi
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 LATE_PERIODS = 2
-"""Longest interval of one step, in periods; the rest of a longer one is dropped, so that a late timer causes no jump.
-"""
+"""Longest time that one step counts, in periods of the timer. Limits the motion after a late timer."""
 _Limit = Annotated[float, Field(allow_inf_nan=True), Unit("m")]
 Limits = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 
@@ -72,14 +71,14 @@ class TeleopPose(NamedTuple):
 
 
 class Teleop:
-    """Moves a frame by a velocity signal; only `reset` changes its pose at once.
+    """Moves a frame by a velocity signal. Only `reset` changes the frame's pose at once.
 
-    A step never counts more than `LATE_PERIODS` periods. No step is therefore longer than `max_speed * LATE_PERIODS /
-    hz`, whenever the signal starts, stops or resumes. Times are those of a clock that never goes back [s].
+    A step never counts more than `LATE_PERIODS` periods. The frame therefore never moves by more than
+    `max_speed * LATE_PERIODS / hz` [m] in one step. Times are seconds of a clock that never goes back.
 
     Args:
-        config: The frame and its limits.
-        timeout_s: Time for which a signal stays in force when no other follows [s]; 0 means forever.
+        config: Names of the frame and its parent, and the limits of the motion.
+        timeout_s: Time after which a signal ends if no other signal follows [s]; 0 means never.
 
     Attributes:
         pose: Pose of the frame in its parent.
@@ -92,15 +91,15 @@ class Teleop:
         self._commanded_s = self._stepped_s = -math.inf
 
     def command(self, signal: Sequence[float], now_s: float) -> bool:
-        """Sets the velocity until the next signal; returns whether it was reduced to the limits.
+        """Sets the velocity until the next signal. Returns whether the velocity was reduced to the limits.
 
         Args:
             signal: Velocity along x, y, z of the parent [m/s], optionally followed by the rates of roll, pitch and yaw
-                [rad/s], which are 0 otherwise.
-            now_s: The time.
+                [rad/s]. Missing rates are 0.
+            now_s: Present time [s].
 
         Raises:
-            ValueError: If it does not consist of 3 or 6 finite numbers; then the frame stops.
+            ValueError: If the signal does not consist of 3 or 6 finite numbers. The frame then stops.
         """
         self.stop()
         if len(signal) not in (3, 6):
@@ -120,7 +119,7 @@ class Teleop:
         return share < 1.0 or self._angular != tuple(rates or ZERO)
 
     def stop(self) -> None:
-        """Stops until the next signal."""
+        """Stops the frame until the next signal."""
         self._linear = self._angular = ZERO
 
     @property
@@ -129,9 +128,9 @@ class Teleop:
         return any(self._linear + self._angular)
 
     def step(self, now_s: float) -> TeleopPose:
-        """Moves the frame for the time since the last step; returns its pose.
+        """Moves the frame for the time since the last step, and returns the frame's pose.
 
-        A signal older than the timeout ends.
+        Stops the frame if the last signal is older than the timeout.
         """
         dt_s = min(max(now_s - self._stepped_s, 0.0), LATE_PERIODS / self._config.hz)
         self._stepped_s = now_s
@@ -149,10 +148,10 @@ class Teleop:
         return self.pose
 
     def reset(self, pose: TeleopPose) -> None:
-        """Sets the pose of the frame; it stands still until the next signal.
+        """Sets the pose of the frame, and stops the frame until the next signal.
 
         Raises:
-            ValueError: If the pose is outside of the box or not finite; then the frame keeps its pose and its motion.
+            ValueError: If the pose is outside the box or not finite. Pose and motion of the frame then stay unchanged.
         """
         if not all(map(math.isfinite, (*pose.position, *pose.rpy))):
             raise ValueError("must be finite")

@@ -1,4 +1,4 @@
-"""Sizes and masses of people, from published tables.
+"""Body dimensions and masses of people, from published tables.
 
 - Drillis and Contini (1966), as Winter prints them (Biomechanics and Motor Control of Human Movement, 4th ed. 2009,
   fig. 4.1): lengths of limbs as fractions of the height.
@@ -7,8 +7,8 @@
 - Dempster (1955), as in Winter's table 4.1: densities.
 - Bell, Pedersen and Brand (1990), J. Biomechanics 23(6): position of the hip joints between the iliac spines.
 
-The division of a part of the tables among several segments of `SEGMENTS` is our own choice. Columns are x (forward),
-y (left) and z (up) of a person in the T-pose.
+Some parts of the tables cover several segments of `SEGMENTS`. How they are divided among these segments is our own
+choice. Vectors have the components x (forward), y (left) and z (up), for a person in the T-pose.
 """
 
 from typing import NamedTuple
@@ -25,23 +25,29 @@ HIP_HEIGHT, SHOULDER_HEIGHT, ANKLE_HEIGHT = 0.530, 0.818, 0.039
 THIGH, SHANK, UPPER_ARM, FOREARM, HAND = 0.245, 0.246, 0.186, 0.146, 0.108
 SHOULDER_HALF_BREADTH, CHEST_BREADTH, HIP_BREADTH = 0.129, 0.174, 0.191
 FOOT_LENGTH, FOOT_BREADTH = 0.152, 0.055
-"""Fractions of the height (Drillis and Contini)."""
+"""Lengths as fractions of the body height (Drillis and Contini)."""
 HEEL, BALL = 0.038, 0.073
-"""Distances of heel and ball of the foot behind and before the ankle; a quarter and a half of the foot."""
+"""Distance from the ankle back to the heel, and forward to the ball of the foot, as fractions of the body height.
+
+They are a quarter and about half of the foot's length.
+"""
 HIP_HALF_WIDTH = 0.049
-"""Half the distance of the hip joints: 0.72 of that of the iliac spines (Bell), which is about 0.24 m at 1.75 m."""
+"""Half the distance between the hip joints, as a fraction of the body height.
+
+The hip joints are 0.72 times as far apart as the iliac spines (Bell), which are about 0.24 m apart at 1.75 m height.
+"""
 
 _LOWER, _MIDDLE, _UPPER, _HEAD = 145.7, 215.5, 242.1, 242.9
-"""Hip to navel, to lower end of the breastbone, to seventh cervical vertebra, to crown [mm] (de Leva)."""
+"""Lengths from hip to navel, to lower end of the breastbone, to seventh cervical vertebra, to crown [mm] (de Leva)."""
 _ABOVE_HIPS = (1.0 - HIP_HEIGHT) / (_LOWER + _MIDDLE + _UPPER + _HEAD)
 LOWER_TRUNK, MIDDLE_TRUNK, UPPER_TRUNK, HEAD_AND_NECK = (
     _ABOVE_HIPS * part for part in (_LOWER, _MIDDLE, _UPPER, _HEAD)
 )
-"""The same as fractions of the height, so that all of them reach from the hips to the crown."""
+"""Lengths of trunk and head as fractions of the body height. Together, they reach from the hips to the crown."""
 PELVIS_SHARE, NECK_SHARE = 0.6, 0.37
-"""Share of the pelvis in the length of the lower trunk, and of the neck in that of head and neck."""
+"""Share of the pelvis in the lower trunk's length, and share of the neck in the common length of head and neck."""
 CLAVICLE_Y = 0.02
-"""Distance of the shoulder girdles' origins from the middle."""
+"""Distance of the shoulder girdles' origins from the sagittal plane, as a fraction of the body height."""
 
 _SPINE_TO_SHOULDERS = SHOULDER_HEIGHT - HIP_HEIGHT - LOWER_TRUNK - MIDDLE_TRUNK
 _RIGHT_LIMBS: dict[str, tuple[float, float, float]] = {
@@ -65,7 +71,7 @@ _OFFSETS: dict[str, tuple[float, float, float]] = {
     **{f"Right{name}": offset for name, offset in _RIGHT_LIMBS.items()},
     **{f"Left{name}": (x, -y, z) for name, (x, y, z) in _RIGHT_LIMBS.items()},
 }
-"""Origin of each segment in its parent, as fractions of the height."""
+"""Origin of each segment in its parent's frame, as fractions of the body height."""
 
 _LIMB_MASSES = {
     "Shoulder": 0.1 * 15.96,
@@ -87,7 +93,7 @@ MASS_PERCENT: dict[str, float] = {
     "Head": 0.8 * 6.94,
     **{f"{side}{name}": mass for side in ("Right", "Left") for name, mass in _LIMB_MASSES.items()},
 }
-"""Mass of each segment in percent of the whole; they add up to 100."""
+"""Mass of each segment in percent of the body mass. The sum is 100."""
 
 _TRUNK, _HEAD_DENSITY = 1030.0, 1110.0
 _LIMB_DENSITIES = {
@@ -105,16 +111,16 @@ DENSITY: dict[str, float] = {
     **dict.fromkeys(("Neck", "Head"), _HEAD_DENSITY),
     **{f"{side}{name}": density for side in ("Right", "Left") for name, density in _LIMB_DENSITIES.items()},
 }
-"""Density of each segment [kg/m^3]; with mass and length it determines the thickness."""
+"""Density of each segment [kg/m^3]. Mass, length and density determine the segment's thickness."""
 
 
 class Gyration(NamedTuple):
-    """Mass distribution of a limb, as fractions of its length.
+    """Mass distribution of a limb. All values are fractions of the limb's length.
 
     Attributes:
-        centre: Distance of the centre of mass from the joint towards the body.
-        across: Radius of gyration about the axes across the limb; the mean of the table's two, which differ little.
-        along: Radius of gyration about the axis along it.
+        centre: Distance of the centre of mass from the limb's joint on the side of the trunk.
+        across: Radius of gyration about the axes across the limb. It is the mean of the table's two similar values.
+        along: Radius of gyration about the limb's longitudinal axis.
     """
 
     centre: float
@@ -129,11 +135,11 @@ GYRATION: dict[str, Gyration] = {
     "UpperLeg": Gyration(0.4095, 0.329, 0.149),
     "LowerLeg": Gyration(0.4395, (0.251 + 0.246) / 2.0, 0.102),
 }
-"""Mass distribution of the limbs that consist of one segment, by name without the side (de Leva)."""
+"""Mass distribution of the limbs that consist of one segment, keyed by name without the side (de Leva)."""
 
 
 def segment_offsets(height_m: float) -> Array:
-    """Returns the origin of each segment in its parent (23 x 3) [m]; that of the pelvis is 0.
+    """Returns the origin of each segment in its parent's frame (23 x 3) [m]. The row of the pelvis is 0.
 
     Args:
         height_m: Height of the person [m].
@@ -142,7 +148,7 @@ def segment_offsets(height_m: float) -> Array:
 
 
 def measured_offsets(frame: SegmentFrame) -> Array:
-    """Returns these origins as measured by a suit (23 x 3) [m], in any pose of the person."""
+    """Returns the origin of each segment in its parent's frame (23 x 3) [m], from a measured frame in any pose."""
     offsets = np.zeros((len(SEGMENTS), 3))
     parents, children = BONES.T
     vectors = frame.positions[children] - frame.positions[parents]
@@ -151,6 +157,10 @@ def measured_offsets(frame: SegmentFrame) -> Array:
 
 
 def leg_length(offsets: Array) -> float:
-    """Returns the mean length of thigh and shank together [m]."""
+    """Returns the length of thigh plus shank, as the mean of both legs [m].
+
+    Args:
+        offsets: Origin of each segment in its parent's frame (23 x 3) [m].
+    """
     legs = [SEGMENTS.index(f"{side}{part}") for side in ("Right", "Left") for part in ("LowerLeg", "Foot")]
     return float(np.linalg.norm(offsets[legs], axis=1).sum() / 2.0)

@@ -1,4 +1,4 @@
-"""`avatar_node.py`: from segments of a person to joint targets and base of an avatar."""
+"""`avatar_node.py`: converts segments of a person to joint targets and a base frame of an avatar."""
 
 import threading
 import time
@@ -27,9 +27,9 @@ from .retargeting import AvatarPlace, AvatarPose, Engagement, Retargeting
 Place3 = Annotated[tuple[float, float, float], Field(strict=False)]
 SEGMENTS_TOPIC = "mvn/segments"
 START_PATIENCE_S = 5.0
-"""Time without joint states after which a warning reports that the avatar waits for them [s]."""
+"""Time after the start from which missing joint states of the avatar cause warnings [s]."""
 LOOKS_HZ = 20.0
-"""Rate of the check for ceased segments."""
+"""Rate of the check whether segments still arrive [Hz]."""
 
 
 class AvatarParameters(ConfigModel):
@@ -50,7 +50,7 @@ class AvatarParameters(ConfigModel):
 
 
 class AvatarNode:
-    """Moves an avatar like a person, as long as segments arrive.
+    """Makes an avatar follow the motion of a person, as long as segments arrive.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -64,7 +64,7 @@ class AvatarNode:
         self._warn = ThrottledWarning()
         self._lock = threading.Lock()
         self._hinges: np.ndarray | None = None
-        """Positions of the avatar's hinges in the simulator; None until they are known."""
+        """Angles of the avatar's hinges in the simulator [rad]; None before the first joint state."""
         self._begins, self._last_s, self._holds = True, 0.0, True
         self._began_s, self._last_stamp = time.monotonic(), rospy.Time()
         self._states = f"rpbi/{config.robot_name}/joint_states"
@@ -90,7 +90,7 @@ class AvatarNode:
         with self._lock:
             try:
                 self._follow(frame_in(message))
-            except (ValueError, InterfaceError, OSError) as error:  # an OSError follows the loss of the ROS master
+            except (ValueError, InterfaceError, OSError) as error:  # OSError: the ROS master was lost
                 self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
 
     def _follow(self, frame: SegmentFrame) -> None:
@@ -112,10 +112,10 @@ class AvatarNode:
         self._last_stamp, self._last_s, self._holds = now, time.monotonic(), False
 
     def _begin(self, frame: SegmentFrame) -> None:
-        """Starts at the present pose of the avatar, with a person of any size.
+        """Starts to follow a person from the present pose of the avatar.
 
         Raises:
-            ValueError: If the pose of the avatar is not known yet.
+            ValueError: If no joint state of the avatar has arrived yet, or the person's legs are too short or long.
         """
         name, place = self._config.robot_name, self._config.place
         if self._hinges is None:
@@ -149,7 +149,7 @@ class AvatarNode:
                 rospy.logwarn("%s: %s; the avatar holds its last pose", rospy.resolve_name(SEGMENTS_TOPIC), silence)
 
     def _engage(self, _: object) -> TriggerResponse:
-        """Restarts from the present pose of the avatar, with the present person."""
+        """Service callback that restarts the mapping from the avatar's present pose, with the next frame."""
         with self._lock:
             self._begins = True
         return TriggerResponse(True, "the avatar restarts with the next segments")

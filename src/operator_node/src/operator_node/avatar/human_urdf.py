@@ -1,4 +1,4 @@
-"""URDF of the body of a person, and the segment lengths in the URDF of an avatar."""
+"""Creates the URDF of a person, and reads the segments' origins from the URDF of an avatar."""
 
 import math
 import tempfile
@@ -15,12 +15,11 @@ from .anthropometry import Array
 from .joints import HINGES, JOINTS, HumanJoint
 
 HEIGHTS_M, MASSES_KG = (0.5, 2.5), (3.0, 300.0)
-"""Ranges of height and mass; other values are rejected."""
+"""Allowed ranges of height and mass."""
 MIN_LENGTH_M = 1e-3
-"""Least length of a measured segment; shorter ones are rejected."""
+"""Smallest allowed distance between the origins of a segment and its parent [m]."""
 HELPER_MASS_KG, HELPER_INERTIA = 0.01, 1e-4
-"""Mass and inertia of the links between the hinges of a joint [kg, kg m^2]; the mass is subtracted from the segment's.
-"""
+"""Mass [kg] and inertia [kg m^2] of the links between a joint's hinges. The segment's mass is reduced accordingly."""
 MAX_SPEED = 20.0
 """Largest speed of each hinge [rad/s]."""
 _SKIN, _CLOTHES, _SHOES = "0.87 0.72 0.60 1", "0.25 0.37 0.55 1", "0.20 0.20 0.22 1"
@@ -33,20 +32,20 @@ _TIPS = {
     "LowerLeg": "Foot",
     "Neck": "Head",
 }
-"""The segment at the end of each limb, without the side."""
+"""Next segment, whose origin is the end of a limb. Names are without the side."""
 
 
 def human_urdf(height_m: float, mass_kg: float, offsets: Array | None = None) -> str:
-    """Returns the URDF of a person in the T-pose; links have the names of `SEGMENTS`, hinges those of `HINGES`.
+    """Returns the URDF of a person. Links are named as in `SEGMENTS`, joints as in `HINGES`.
 
-    The frame of a link is that of its segment. Each segment has a simple shape for display and collision, whose
-    thickness follows from the mass and the density of its tissue.
+    All joints are at 0 in the T-pose. The frame of a link equals the frame of its segment. Each segment has a simple
+    shape for display and collision. Its thickness follows from the segment's mass, length and density.
 
     Args:
         height_m: Height of the person [m].
-        mass_kg: Their mass [kg].
-        offsets: Origin of each segment in its parent (23 x 3) [m], such as from `measured_offsets`; without them, those
-            of the tables.
+        mass_kg: Mass of the person [kg].
+        offsets: Origin of each segment in its parent's frame (23 x 3) [m], such as from `measured_offsets`; None: from
+            the tables.
 
     Raises:
         ValueError: If height or mass is out of range, or an offset is invalid.
@@ -80,7 +79,7 @@ def _checked(offsets: Array, height_m: float) -> Array:
 
 
 def _joint(joint: HumanJoint, offset: Array) -> Iterator[str]:
-    """Yields three hinges and the two links between them."""
+    """Yields the URDF lines of a joint: three hinges, and the two links between the hinges."""
     first, second = f"{joint.child}_f1", f"{joint.child}_f2"
     ends = ((joint.parent, first), (first, second), (second, joint.child))
     for number, ((parent, child), hinge, axis, (low, high)) in enumerate(
@@ -128,7 +127,7 @@ def _link(name: str, offsets: Array, height_m: float, mass_kg: float, helpers: i
 
 
 def _tip_of(name: str, limb: str, offsets: Array, height_m: float) -> Array:
-    """Returns the vector from a limb's origin to its tip [m]; a hand continues the direction of its forearm."""
+    """Returns the vector from a limb's origin to its tip [m]. A hand has the direction of its forearm."""
     if limb == "Hand":
         forearm = offsets[SEGMENTS.index(name)]
         return np.asarray(forearm * table.HAND * height_m / np.linalg.norm(forearm))
@@ -136,7 +135,10 @@ def _tip_of(name: str, limb: str, offsets: Array, height_m: float) -> Array:
 
 
 def _limb_inertia(limb: str, mass: float, tip: Array, radius: float) -> tuple[Array, Array]:
-    """Returns centre of mass and inertia about it; a limb that is not in the table is a cylinder."""
+    """Returns the centre of mass (3) [m] and the inertia about this centre (3 x 3) [kg m^2] of a limb.
+
+    A limb that is not in the table is treated as a cylinder.
+    """
     length = float(np.linalg.norm(tip))
     along = np.outer(tip, tip) / length**2
     if limb in table.GYRATION:
@@ -148,7 +150,7 @@ def _limb_inertia(limb: str, mass: float, tip: Array, radius: float) -> tuple[Ar
 
 
 def _box_of(name: str, limb: str, offsets: Array, height_m: float, volume: float) -> tuple[Array, Array]:
-    """Returns centre and size of a segment that is a box [m]: those of the trunk, and the feet."""
+    """Returns centre and size of the box that represents a segment of the trunk or a foot [m]."""
     sole, breadth = table.ANKLE_HEIGHT * height_m, table.FOOT_BREADTH * height_m
     if limb in ("Foot", "Toe"):
         toe = offsets[SEGMENTS.index(name.replace("Foot", "Toe"))]
@@ -185,7 +187,7 @@ def _sphere(radius: float, centre: Array) -> str:
 
 
 def _cylinder(radius: float, tip: Array) -> str:
-    """Returns a cylinder from the origin along a vector."""
+    """Returns the URDF elements of a cylinder from the link's origin to the point `tip` [m]."""
     length = float(np.linalg.norm(tip))
     tilt, turn = math.acos(max(-1.0, min(1.0, tip[2] / length))), math.atan2(tip[1], tip[0])
     origin = f'<origin xyz="{_text(tip / 2.0)}" rpy="0 {_number(tilt)} {_number(turn)}"/>'
@@ -202,14 +204,14 @@ def _number(value: float) -> str:
 
 
 def urdf_offsets(name: str, text: str) -> Array:
-    """Returns the origin of each segment in its parent (23 x 3) [m].
+    """Returns the origin of each segment in its parent's frame (23 x 3) [m], from the URDF of a person.
 
     Args:
-        name: Source of the URDF, for messages.
-        text: The URDF.
+        name: Source of the URDF, for error messages.
+        text: Content of the URDF.
 
     Raises:
-        ConfigError: If it is not valid, or lacks a hinge of a person.
+        ConfigError: If the URDF is invalid, or lacks one of `HINGES`.
     """
     with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
         file.write(text)

@@ -1,4 +1,4 @@
-"""`human_urdf.py`: prints a person as URDF."""
+"""`human_urdf.py`: prints the URDF of a person."""
 
 import argparse
 import sys

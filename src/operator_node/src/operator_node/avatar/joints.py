@@ -1,4 +1,4 @@
-"""Joints between the segments: names, order of axes, ranges of motion, and forward kinematics."""
+"""Joints between the segments of a person: names, orders of axes, ranges of motion, and forward kinematics."""
 
 import math
 from typing import NamedTuple
@@ -15,17 +15,16 @@ Range = tuple[float, float]
 
 
 class HumanJoint(NamedTuple):
-    """Three hinges between a segment and its parent; all at 0 in the T-pose.
+    """Joint between a segment and its parent, modelled as three hinges. All hinges are at 0 in the T-pose.
 
     Attributes:
-        name: Its name, as in MVN.
-        parent: The segment that it is attached to.
-        child: The segment that it moves.
-        order: Axes of the hinges from parent to child, such as "yxz": the child is rotated by R_y R_x R_z in the
-            parent.
+        name: Name of the joint, as in MVN.
+        parent: Name of the parent segment, towards the pelvis.
+        child: Name of the segment that the joint moves.
+        order: Axes of the hinges from parent to child. For "yxz", the child's orientation in the parent is R_y R_x R_z.
         x: Lower and upper limit of the hinge about x (forward) [deg].
-        y: Likewise about y (left).
-        z: Likewise about z (up).
+        y: Lower and upper limit of the hinge about y (left) [deg].
+        z: Lower and upper limit of the hinge about z (up) [deg].
         effort: Largest torque of each hinge [N m].
     """
 
@@ -79,7 +78,7 @@ _RIGHT = (
 
 
 def _mirrored(joint: HumanJoint) -> HumanJoint:
-    """Returns the joint of the left side: rotations about x and z are mirrored."""
+    """Returns the left joint for a right joint. The limits of rotations about x and z are mirrored."""
     return joint._replace(
         name=joint.name.replace("Right", "Left"),
         parent=joint.parent.replace("Right", "Left"),
@@ -91,13 +90,12 @@ def _mirrored(joint: HumanJoint) -> HumanJoint:
 
 _BY_CHILD = {joint.child: joint for joint in (*_MIDDLE, *_RIGHT, *map(_mirrored, _RIGHT))}
 JOINTS: tuple[HumanJoint, ...] = tuple(_BY_CHILD[name] for name in SEGMENTS[1:])
-"""The joint of each segment but the pelvis, in the order of `SEGMENTS`.
+"""The joints of all segments except the pelvis, in the order of `SEGMENTS`.
 
-Ranges are those of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording, 1965)
-and some 10 deg more, to allow for errors of suits. Those of trunk and neck are divided evenly among their joints and
-enlarged by half, since people divide them otherwise. The three angles of a shoulder depend on each other, so its ranges
-are wider. About axes that are not in the tables, joints yield a little. Efforts are of the order of those of strong
-adults.
+The ranges are those of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording,
+1965), enlarged by some 10 deg for errors of suits. The ranges of trunk and neck are divided evenly among their joints,
+and enlarged by half because people bend unevenly. The ranges of the shoulders are wider because their three angles
+depend on each other. Axes that are not in the tables have small ranges. Efforts have the magnitude of a strong adult's.
 """
 HINGES: tuple[str, ...] = tuple(hinge for joint in JOINTS for hinge in joint.hinges)
 """The 66 hinges: three for each joint, in the order of `JOINTS`."""
@@ -106,16 +104,16 @@ LOWER, UPPER = np.array([limits for joint in JOINTS for limits in joint.limits])
 
 
 def segment_frame(offsets: Array, position: Array, quat_xyzw: Array, hinges: dict[str, float]) -> SegmentFrame:
-    """Returns the segments of a person for poses of pelvis and hinges.
+    """Returns the segments of a person by forward kinematics.
 
     Args:
-        offsets: Origin of each segment in its parent (23 x 3) [m].
+        offsets: Origin of each segment in its parent's frame (23 x 3) [m].
         position: Origin of the pelvis in the world (3) [m].
-        quat_xyzw: Orientation of the pelvis in the world (4).
-        hinges: Positions of hinges by name [rad]; others are at 0.
+        quat_xyzw: Orientation of the pelvis in the world (4), x, y, z, w.
+        hinges: Angles of hinges, keyed by name [rad]. Missing hinges are at 0.
 
     Raises:
-        ValueError: If there is no such hinge.
+        ValueError: If the name of a hinge is unknown.
     """
     if unknown := sorted(set(hinges) - set(HINGES)):
         raise ValueError(f"unknown hinge '{unknown[0]}', expected names such as '{HINGES[0]}'")

@@ -1,4 +1,4 @@
-"""Maps the segments of a person to the base and the joints of an avatar, which moves there at limited speeds."""
+"""Maps the segments of a person to the base and the hinges of an avatar, and limits the speeds of the avatar."""
 
 import math
 from typing import NamedTuple
@@ -12,14 +12,14 @@ from .anthropometry import Array, leg_length, measured_offsets
 from .joints import AXES, JOINTS, LOWER, UPPER
 
 NEAR_SINGULAR = 1e-3
-"""Cosine of the middle hinge below which the first one is held; this rotates the link by at most 0.06 deg."""
+"""Cosine of a joint's middle hinge below which its first hinge is held. This rotates the link by at most 0.06 deg."""
 BEYOND = 1e-6
-"""Tolerance of limits [rad]; a hinge beyond a limit by more counts as outside."""
+"""Angle by which a hinge may exceed a limit and still count as inside [rad]."""
 LEG_RATIOS = (0.2, 5.0)
-"""Range of the ratio of the avatar's leg length to the person's; other people are rejected."""
+"""Allowed range of the avatar's leg length divided by the person's leg length."""
 _TURN = 2.0 * math.pi
 MAX_STEP_S = 0.1
-"""Longest time that counts between two frames [s]; the rest is dropped."""
+"""Longest time between two frames that counts for the speed limits [s]. Longer times count as this time."""
 
 
 class AvatarPose(NamedTuple):
@@ -28,7 +28,7 @@ class AvatarPose(NamedTuple):
     Attributes:
         position: Origin of the pelvis in the world (3) [m].
         quat_xyzw: Orientation of the pelvis in the world (4).
-        hinges: Positions of `HINGES` (66) [rad].
+        hinges: Angles of `HINGES` (66) [rad].
     """
 
     position: Array
@@ -37,7 +37,7 @@ class AvatarPose(NamedTuple):
 
 
 class AvatarPlace(NamedTuple):
-    """Initial place of the avatar on the floor: x and y [m], and the angle about z [rad]."""
+    """Initial position of the avatar on the floor, x and y [m], and its rotation about z [rad]."""
 
     x: float
     y: float
@@ -45,19 +45,19 @@ class AvatarPlace(NamedTuple):
 
 
 class Retargeting:
-    """Computes the motion of an avatar from the frames of one person; each person needs an object of its own.
+    """Computes poses of an avatar from the frames of one person. Each person needs a separate object.
 
-    The hinges of each joint are computed in closed form from the orientation of a segment in its parent (R = R_i(a)
-    R_j(b) R_k(c) has the solutions (a, b, c) and (a + pi, pi - b, c + pi)). Of the two solutions and all whole turns,
-    those within the limits and nearest to the last ones are chosen. The links then have the orientations of the
-    segments. A rotation beyond a limit is cut off, which rotates all segments after that joint, too.
+    The three hinge angles of a joint are computed in closed form from the orientation of a segment in its parent:
+    R = R_i(a) R_j(b) R_k(c) has the solutions (a, b, c) and (a + pi, pi - b, c + pi), plus full turns. The solution
+    within the limits that is nearest to the last angles is chosen. The avatar's links then have the orientations of the
+    person's segments. An angle beyond a limit is clipped, which also rotates all segments further from the pelvis.
 
-    Where the lengths of avatar and person differ, orientations are kept, and the hands are at other places. The
-    displacement of the pelvis is then scaled by the length of the legs, so that the feet stay on the ground.
+    If avatar and person differ in size, orientations are kept, but positions such as those of the hands differ. The
+    displacement of the pelvis is scaled by the ratio of the leg lengths, so that the feet stay on the ground.
 
     Args:
-        offsets: Origin of each segment of the avatar in its parent (23 x 3) [m].
-        place: Place of the avatar at the first frame; by default that of the person.
+        offsets: Origin of each segment of the avatar in its parent's frame (23 x 3) [m].
+        place: Place of the avatar at the first frame; None: the place of the person.
     """
 
     def __init__(self, offsets: Array, place: AvatarPlace | None = None) -> None:
@@ -68,20 +68,20 @@ class Retargeting:
         self._turn, self._shift = np.eye(3), np.zeros(3)
 
     def begin(self, hinges: Array | None = None) -> None:
-        """Restarts with the next frame, for instance with another person.
+        """Makes the next frame the first frame again, for instance of another person.
 
         Args:
-            hinges: Present positions of the avatar's hinges (66) [rad]; by default the last ones.
+            hinges: Present angles of the avatar's hinges (66) [rad]; None: the last computed angles.
         """
         self._scale = None
         if hinges is not None:
             self._last = np.array(hinges, dtype=float).reshape(-1, 3)
 
     def pose(self, frame: SegmentFrame) -> AvatarPose:
-        """Returns the pose of the avatar.
+        """Returns the avatar's pose for a frame of the person.
 
         Raises:
-            ValueError: If the ratio of the leg lengths is outside of `LEG_RATIOS`.
+            ValueError: If the ratio of the leg lengths is outside `LEG_RATIOS`.
         """
         rotations = Rotation.from_quat(frame.quats_xyzw).as_matrix()
         if self._scale is None:
@@ -93,7 +93,7 @@ class Retargeting:
         return AvatarPose(position, quat, np.clip(self._last, _LOWER, _UPPER).reshape(-1))
 
     def _begin(self, frame: SegmentFrame, pelvis: Array) -> None:
-        """Determines scale and displacement from the first frame of the person."""
+        """Computes scale, rotation and displacement of the avatar's world from the person's first frame."""
         ratio = self._leg / max(leg_length(measured_offsets(frame)), 1e-9)
         if not LEG_RATIOS[0] <= ratio <= LEG_RATIOS[1]:
             least, most = (self._leg / each for each in reversed(LEG_RATIOS))
@@ -112,7 +112,7 @@ _ORDER = np.array([[AXES.index(axis) for axis in joint.order] for joint in JOINT
 _ROWS, _COLUMNS = _ORDER[:, :, None], _ORDER[:, None, :]
 _NUMBER = np.arange(len(JOINTS))[:, None, None]
 _SIGN = np.array([1.0 if joint.order in ("xyz", "yzx", "zxy") else -1.0 for joint in JOINTS])
-"""1 where the order of the axes is cyclic, else -1."""
+"""Sign of each joint: 1 if the order of its axes is cyclic, otherwise -1."""
 _LOWER, _UPPER = LOWER.reshape(-1, 3), UPPER.reshape(-1, 3)
 _MIDDLE = (_LOWER + _UPPER) / 2.0
 _OTHER = np.array((math.pi, math.pi, math.pi))
@@ -120,13 +120,13 @@ _FLIP = np.array((1.0, -1.0, 1.0))
 
 
 def _hinges(relative: Array, last: Array) -> Array:
-    """Returns the hinges of all joints (22 x 3) [rad], without regard to limits.
+    """Returns the hinge angles of all joints (22 x 3) [rad]. Prefers angles within the limits, but does not clip them.
 
     Args:
-        relative: Orientation of each segment in its parent (22 x 3 x 3).
-        last: The last hinges (22 x 3) [rad].
+        relative: Orientation of each segment in its parent, as rotation matrices (22 x 3 x 3).
+        last: The last hinge angles (22 x 3) [rad].
     """
-    m = relative[_NUMBER, _ROWS, _COLUMNS]  # as if all orders were x, y, z
+    m = relative[_NUMBER, _ROWS, _COLUMNS]  # permuted, as if the order of all joints were x, y, z
     cosine = np.hypot(m[:, 0, 0], m[:, 0, 1])
     first = np.stack(
         (
@@ -137,7 +137,7 @@ def _hinges(relative: Array, last: Array) -> Array:
         axis=1,
     )
     both = np.stack((first, _OTHER + _FLIP * first))
-    # Whole turns: into the limits, whose width is less than one; if none fits, near the last value
+    # Adds full turns to get within the limits, whose width is less than one turn; otherwise to get near the last angle
     inside = both + _TURN * np.round((_MIDDLE - both) / _TURN)
     fits = (inside >= _LOWER - BEYOND) & (inside <= _UPPER + BEYOND)
     both = np.where(fits, inside, both + _TURN * np.round((last - both) / _TURN))
@@ -152,7 +152,7 @@ def _hinges(relative: Array, last: Array) -> Array:
 
 
 def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
-    """Returns the hinges of one joint for a given first hinge [rad]."""
+    """Returns the three hinge angles of one joint if its first hinge is held at the angle `a` [rad]."""
     c, s = math.cos(a), math.sin(a)
     row_1, row_2 = c * m[1] + sign * s * m[2], c * m[2] - sign * s * m[1]
     angles = np.array((a, math.atan2(sign * m[0, 2], row_2[2]), math.atan2(sign * row_1[0], row_1[1])))
@@ -160,7 +160,7 @@ def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
 
 
 class Engagement:
-    """Moves the avatar to its target pose at limited speeds, at the start, after a pause, and at any other time.
+    """Moves the avatar towards its target pose at limited speeds, at all times.
 
     Args:
         max_joint_speed: Largest speed of each hinge [rad/s].
@@ -177,10 +177,10 @@ class Engagement:
         self._last = pose
 
     def step(self, target: AvatarPose, dt: float) -> AvatarPose:
-        """Returns the next pose of the avatar.
+        """Moves the avatar towards a target pose, and returns the avatar's new pose.
 
         Args:
-            target: Its target pose.
+            target: Target pose of the avatar.
             dt: Time since the last step [s].
         """
         if self._last is None:
@@ -196,7 +196,7 @@ class Engagement:
 
 
 def _turned(start: Array, end: Array, most_rad: float) -> Array:
-    """Returns a quaternion on the shortest path between two, limited to an angle from the first [rad]."""
+    """Rotates the orientation `start` towards `end` by at most `most_rad` [rad], and returns the result."""
     first = Rotation.from_quat(start)
     rotvec = (first.inv() * Rotation.from_quat(end)).as_rotvec()
     angle = float(np.linalg.norm(rotvec))

@@ -1,9 +1,9 @@
-"""Forces on the segments of a person's body, and the limits for robots.
+"""Forces on the segments of a person's body, and limits of the forces that robots may exert.
 
-Source of the limits: ISO/TS 15066:2016, Annex A, table A.2, column of forces. They are limits for contact with
-industrial robots, from the onset of slight injury, not of comfort. The table has a factor of 2 for transient contact,
-and none for skull and face, where no transient contact is allowed. Its pressures are left out, since contacts of the
-simulation have no area; it has no values for feet.
+Source of the limits: ISO/TS 15066:2016, Annex A, table A.2, column of forces. The limits hold for contact with
+industrial robots. They mark the onset of slight injury, not of discomfort. The limits for transient contact are twice
+as high, except for skull and face, where transient contact is not allowed. The table's pressures are not used, because
+contacts in the simulation have no area. The table has no values for feet.
 """
 
 import math
@@ -15,8 +15,8 @@ class ForceLimit(NamedTuple):
     """Largest forces on a region of the body.
 
     Attributes:
-        quasi_static_n: Limit for a contact that clamps the region, or that lasts [N].
-        transient_n: Limit for a contact from which the region can recoil [N]; 0 where none is allowed.
+        quasi_static_n: Limit for a contact that lasts, or that clamps the region [N].
+        transient_n: Limit for a short contact from which the region can recoil [N]; 0 if such contact is not allowed.
     """
 
     quasi_static_n: float
@@ -37,7 +37,7 @@ LIMITS: Mapping[str, ForceLimit] = {
     "thighs and knees": ForceLimit(220.0, 440.0),
     "lower legs": ForceLimit(130.0, 260.0),
 }
-"""Limits by body region, as the standard names it."""
+"""Limits, keyed by the standard's name of the body region."""
 
 REGIONS: Mapping[str, str] = {
     "RightShoulder": "back and shoulders",
@@ -45,11 +45,11 @@ REGIONS: Mapping[str, str] = {
     "RightForeArm": "lower arms and wrist joints",
     "RightHand": "hands and fingers",
 }
-"""Body region of each segment of the arm that is dressed."""
+"""Body region of each segment of the right arm, which the robot dresses."""
 
 
 class SegmentForce(NamedTuple):
-    """Forces on a segment of the body in one tick, as magnitudes: forces from opposite sides do not cancel.
+    """Magnitudes of the forces on a segment of the body in one tick. Forces from opposite sides do not cancel.
 
     Attributes:
         sum_n: Sum over all contacts [N].
@@ -63,11 +63,11 @@ class SegmentForce(NamedTuple):
 def forces_by_segment(
     segments: Iterable[str], contacts: Iterable[tuple[str, Sequence[float]]]
 ) -> dict[str, SegmentForce]:
-    """Returns the force on each segment.
+    """Returns the forces on each segment, keyed by the segment's name.
 
     Args:
-        segments: Their names.
-        contacts: Segment and force (3) [N] of each contact; those of other segments are ignored.
+        segments: Names of the segments.
+        contacts: Segment and force (3) [N] of each contact. Contacts of other segments are ignored.
     """
     sizes: dict[str, list[float]] = {name: [] for name in segments}
     for segment, force in contacts:

@@ -1,4 +1,4 @@
-"""`segment_forces_node.py`: from contacts of the avatar to the forces on each segment."""
+"""`segment_forces_node.py`: computes the force on each segment of the avatar from the avatar's contacts."""
 
 import numpy as np
 import rospy
@@ -25,7 +25,7 @@ class SegmentForcesParameters(ConfigModel):
 
 
 class SegmentForcesNode:
-    """Adds up the forces on each segment of the avatar.
+    """Adds up the contact forces on each segment of the avatar, and publishes the sums.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -55,7 +55,7 @@ class SegmentForcesNode:
 
 
 def _force(point: ContactPoint) -> Array:
-    """Returns the total force of a contact on the body (3) [N]."""
+    """Returns the force of a contact point, normal force plus friction (3) [N]."""
     parts = (
         (point.normal, point.normal_force),
         (point.friction_direction_1, point.friction_force_1),

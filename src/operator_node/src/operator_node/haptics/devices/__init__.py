@@ -1,4 +1,4 @@
-"""The haptic devices; a new one is a class in its own file and a line here."""
+"""Table of the haptic devices. A new device needs a class in a file of its own and a line in this table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from operator_node.haptics.device import HapticDevice
@@ -13,4 +13,4 @@ HAPTIC_DEVICES: PluginTable[HapticDevice] = PluginTable(
         "virtual": "operator_node.haptics.devices.virtual:VirtualDevice",
     },
 )
-"""All haptic devices; each is imported when it is looked up, so a missing library matters to its own device only."""
+"""All haptic devices. A device is imported when it is looked up, so a missing library affects only this device."""

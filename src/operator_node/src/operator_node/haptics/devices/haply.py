@@ -1,4 +1,4 @@
-"""Haply Inverse3, through the websocket of its service."""
+"""Haptic device Haply Inverse3, used through the websocket of its service."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ PATIENCE_S = 1.0
 PERIOD_S = 0.001
 MAX_FRAME_BYTES = 1 << 18
 MAX_UNFELT = 50
-"""Number of consecutive forces without effect after which the other key is tried."""
+"""Number of consecutive forces without effect after which the other key for forces is tried."""
 FELT_N = 0.3
-"""Force below which the reported force is not evaluated [N]."""
+"""Smallest sent force that is compared with the reported force [N]."""
 KEYS = ("vector", "values")
 
 
@@ -63,7 +63,7 @@ class HaplyDevice(HapticDevice):
         """Connects to the service.
 
         Raises:
-            DeviceError: If it does not answer, or has no Inverse3.
+            DeviceError: If the service does not answer, or has no Inverse3.
         """
         self._closing, self._opened = threading.Event(), threading.Event()
         self._trouble = ""
@@ -78,17 +78,17 @@ class HaplyDevice(HapticDevice):
             raise DeviceError("haply", self._trouble or f"{self.config.url} does not answer")
 
     def read(self) -> HapticReading | None:
-        """Returns the newest state.
+        """Returns the newest state; None if no new state has arrived since the last call.
 
         Raises:
-            DeviceError: If the service has gone.
-            ReadingError: If the state makes no sense.
+            DeviceError: If the connection to the service is lost.
+            ReadingError: If the state is invalid.
         """
         frame, self._frame = self._frame, None
         if frame is None:
             if self._trouble:
                 raise DeviceError("haply", self._trouble)
-            if time.monotonic() - self._came_s > 2.0 * PATIENCE_S:  # it reads nothing: sending blocks forever
+            if time.monotonic() - self._came_s > 2.0 * PATIENCE_S:  # the service reads nothing, and sending blocks
                 raise DeviceError("haply", f"{self.config.url}: it accepts no forces any more")
             return None
         self._came_s = time.monotonic()
@@ -102,7 +102,7 @@ class HaplyDevice(HapticDevice):
         return HapticReading((y, -x, z), (vy, -vx, vz), (qy, -qx, qz, qw), state.buttons)
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Hands a force to the thread, which sends it until it expires."""
+        """Passes a force to the thread, which sends the force until it expires."""
         self._command = force, expires_s
 
     def close(self) -> None:
@@ -149,13 +149,15 @@ class HaplyDevice(HapticDevice):
 
 
 class ForceKey:
-    """Key under which the service accepts a force: its documentation has `vector`, its examples `values`.
+    """Determines the JSON key under which the service accepts a force: `vector` or `values`.
+
+    The service's documentation uses `vector`, its examples use `values`.
 
     Args:
-        key: One of them, or `auto` to determine it from the forces that the service reports back.
+        key: `vector`, `values`, or `auto` to choose the key from the forces that the service reports back.
 
     Attributes:
-        key: The one in use.
+        key: The key in use.
     """
 
     def __init__(self, key: str) -> None:
@@ -164,7 +166,7 @@ class ForceKey:
         self._unfelt = 0
 
     def judge(self, sent: Vector, reported: Vector) -> bool:
-        """Compares a force that was sent with the reported one [N]; returns False when it seems to have no effect."""
+        """Compares a sent force with the reported force [N]. Returns False if forces seem to have no effect."""
         if norm(sent) < FELT_N:
             return True
         if norm(reported) > 0.1 * norm(sent):

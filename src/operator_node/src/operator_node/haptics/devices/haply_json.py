@@ -1,4 +1,4 @@
-"""JSON messages of the service of a Haply Inverse3: states in, forces out."""
+"""Reads and writes the JSON messages of a Haply Inverse3's service: states and forces."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from robot_model.geometry import ZERO, Quaternion, Vector
 
 
 class HaplyState(NamedTuple):
-    """State in a message of the service, in the device's own axes: x right, y forward, z up.
+    """State in a message of the service. The axes are those of the service: x right, y forward, z up.
 
     Attributes:
         position: Position of the cursor [m].
         velocity: Velocity of the cursor [m/s].
-        quat_xyzw: Orientation of the grip; identity without one.
-        buttons: Buttons of the grip.
-        force: Force of the device [N].
+        quat_xyzw: Orientation of the grip, x, y, z, w; identity without a grip.
+        buttons: 1 for each button of the grip that is held, 0 for the others.
+        force: Force of the device on the hand, as reported by the service [N].
     """
 
     position: Vector
@@ -28,17 +28,23 @@ class HaplyState(NamedTuple):
 
 
 def command_of(device_id: str, force: Vector, key: str) -> str:
-    """Returns the message that sends a force, in the axes of `HapticReading` [N]."""
+    """Returns the JSON message that sends a force to a device.
+
+    Args:
+        device_id: Id of the Inverse3.
+        force: Force in the axes of `HapticReading` [N].
+        key: Name of the force's vector in the message: `vector` or `values`.
+    """
     x, y, z = -force[1], force[0], force[2]
     commands = {"set_cursor_force": {key: {"x": x, "y": y, "z": z}}}
     return json.dumps({"inverse3": [{"device_id": device_id, "commands": commands}]})
 
 
 def device_in(frame: str | bytes, device_id: str) -> str:
-    """Returns the id of an Inverse3 in the first message.
+    """Returns `device_id`, or the id of the first Inverse3 in a message if `device_id` is empty.
 
     Raises:
-        ReadingError: If there is none, or not the given one.
+        ReadingError: If the message has no Inverse3, or not the Inverse3 `device_id`.
     """
     known = [str(each.get("device_id", "")) for each in _entries(_message(frame), "inverse3")]
     if not known or (device_id and device_id not in known):
@@ -48,10 +54,10 @@ def device_in(frame: str | bytes, device_id: str) -> str:
 
 
 def state_in(frame: str | bytes, device_id: str) -> HaplyState:
-    """Returns the state of an Inverse3, and of the first grip, in a message.
+    """Returns the state of the Inverse3 `device_id` in a message, including its first grip.
 
     Raises:
-        ReadingError: If it is missing, or not made of finite numbers.
+        ReadingError: If the state is missing, or a number is not finite.
     """
     message = _message(frame)
     states = [each for each in _entries(message, "inverse3") if each.get("device_id") == device_id]

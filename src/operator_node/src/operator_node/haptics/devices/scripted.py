@@ -1,4 +1,4 @@
-"""A hand that presses and releases by itself, for demonstrations and tests."""
+"""A haptic device whose simulated hand presses and releases by itself, for demonstrations and tests."""
 
 import random
 
@@ -10,7 +10,7 @@ from operator_node.haptics.emulated import EmulatedDevice, Hand, PressMotion
 from robot_model.geometry import Vector
 
 SPREAD = 0.15
-"""Share by which depths, times and the properties of the hand vary with the seed."""
+"""Largest share by which depth, times and the hand's properties vary with the seed."""
 
 
 class ScriptedConfig(HapticConfig):
@@ -40,19 +40,19 @@ class ScriptedDevice(EmulatedDevice):
         self._hand = Hand(0.3 * some[3], 400.0 * some[4])
 
     def make_hand(self) -> Hand:
-        """Returns the hand of this seed."""
+        """Returns the hand, whose properties depend on the seed, at rest in the middle of the workspace."""
         self._hand.position = self._hand.velocity = (0.0, 0.0, 0.0)
         return self._hand
 
     def goal(self, time_s: float) -> Vector:
-        """Returns the position to which the hand pulls the handle."""
+        """Returns the position to which the hand pulls the handle [m], `time_s` [s] after `open`."""
         return self._press.goal(time_s)
 
     def read(self) -> HapticReading | None:
         """Returns the state of the handle.
 
         Raises:
-            DeviceEnded: When the hand has come back.
+            DeviceEnded: When the hand has returned to its start.
         """
         if self._now_s - self._start_s > self._press.duration_s:
             raise DeviceEnded("scripted", "pressed and released")

@@ -1,4 +1,4 @@
-"""3D Systems Touch (Phantom Omni, Geomagic Touch), through the topics of its drivers."""
+"""Haptic device 3D Systems Touch (Phantom Omni, Geomagic Touch), used through the ROS topics of its drivers."""
 
 import math
 import threading
@@ -19,10 +19,11 @@ from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticDevice
 from robot_model.geometry import ZERO, Vector, minus, scaled
 
 PATIENCE_S = 1.0
-"""Time without a state after which the driver counts as gone [s]."""
+"""Time without a state after which the driver counts as disconnected [s]."""
 FINAL_ZEROS, FINAL_PERIOD_S = 30, 0.01
-"""Number and period of zero forces at the end [s]: the driver holds the last force forever, and rospy's own thread
-needs the time to send.
+"""Number and period [s] of the zero forces that are sent at the end.
+
+The driver holds the last force forever, and rospy's thread needs some time to send messages.
 """
 
 MAX_LEAVE_S = 2.0
@@ -31,7 +32,7 @@ FORCES: dict[str, tuple[str, type]] = {
     "pose": ("force_feedback", TouchXFeedback),
     "touch_x": ("cmd_force", Wrench),
 }
-"""Topic and type of the forces of each driver."""
+"""Topic and message type of the forces, keyed by driver."""
 ENDED = "its ROS node was shut down"
 
 
@@ -55,8 +56,8 @@ class TouchConfig(HapticConfig):
 class TouchDevice(HapticDevice):
     """Exchanges states and forces by topics; only the newest state counts.
 
-    It makes its process a ROS node, unless it is one already. The loop's process therefore communicates with the driver
-    itself, and sends zero force also when the haptic node has gone.
+    The device turns its process into a ROS node. The loop's process therefore communicates with the driver directly,
+    and sends zero force even if the haptic node has crashed.
     """
 
     Config = TouchConfig
@@ -75,11 +76,11 @@ class TouchDevice(HapticDevice):
         self._closed.set()
 
     def open(self) -> None:
-        """Subscribes, and waits for the first state.
+        """Subscribes to the driver's topics, and waits for the first state.
 
         Raises:
-            DeviceError: If none arrives.
-            DeviceEnded: If ROS has shut the node down.
+            DeviceError: If no state arrives within `PATIENCE_S`.
+            DeviceEnded: If ROS has shut down.
         """
         if rospy.is_shutdown():
             raise DeviceEnded("touch", ENDED)
@@ -111,12 +112,12 @@ class TouchDevice(HapticDevice):
             time.sleep(0.01)
 
     def read(self) -> HapticReading | None:
-        """Returns the newest state.
+        """Returns the newest state; None if no new state has arrived since the last call.
 
         Raises:
-            DeviceError: If none has arrived for too long.
-            DeviceEnded: If ROS shuts the node down.
-            ReadingError: If it is not made of finite numbers.
+            DeviceError: If no state has arrived for `PATIENCE_S`.
+            DeviceEnded: If ROS is shutting down.
+            ReadingError: If a coordinate is not finite.
         """
         if self._is_leaving:
             raise DeviceEnded("touch", ENDED)
@@ -131,7 +132,7 @@ class TouchDevice(HapticDevice):
         return reading
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Publishes a force; a driver holds it, so that zero has to follow, which the loop ensures."""
+        """Publishes a force, at most `force_hz` times a second. Ignores the expiry: the driver holds the last force."""
         now_s = time.monotonic()
         if self._force is None or (force != ZERO and now_s - self._sent_s < 1.0 / self.config.force_hz):
             return
@@ -149,9 +150,7 @@ class TouchDevice(HapticDevice):
         self._closed.set()
 
     def silence(self) -> None:
-        """Sends zero force with a publisher that persists after the first call, so that it is connected at the next
-        one.
-        """
+        """Sends zero force. Keeps the publisher open, so that it is already connected at the next call."""
         if self._force is None:
             self._force = self._publisher()
         self._send_zeros()
@@ -166,7 +165,7 @@ class TouchDevice(HapticDevice):
             time.sleep(FINAL_PERIOD_S)
 
     def _leave(self) -> None:
-        """Ensures zero force before ROS shuts the node down."""
+        """Makes the loop close the device, and waits until zero force is sent, before ROS shuts down."""
         self._is_leaving = True
         self._closed.wait(MAX_LEAVE_S)
 
@@ -189,12 +188,12 @@ class TouchDevice(HapticDevice):
             self._newest = HapticReading(position, velocity, quat, self._buttons)
 
     def _on_state(self, message: OmniState) -> None:
-        """Stores a state in axes x right, y forward, z up."""
+        """Stores a state of the driver `omni`, whose axes are x right, y forward, z up."""
         v, unit_m = message.velocity, self.config.metres_per_unit
         self._put_pose(message.pose.position, message.pose.orientation, unit_m, scaled(unit_m, (v.y, -v.x, v.z)))
 
     def _on_pose(self, message: PoseStamped) -> None:
-        """Stores a pose in the same axes, in metres; the driver reports no velocity."""
+        """Stores a pose of the driver `pose` [m], with axes x right, y forward, z up. The driver sends no velocity."""
         self._place = message.pose.position
         self._put_pose(message.pose.position, message.pose.orientation, 1.0, None)
 
@@ -206,7 +205,7 @@ class TouchDevice(HapticDevice):
         self._buttons = int(bool(message.grey_button)), int(bool(message.white_button))
 
     def _on_tf(self, message: TFMessage) -> None:
-        """Stores a transform in axes x right, y up, z towards the user."""
+        """Stores the handle's transform from the driver `touch_x`, with axes x right, y up, z towards the user."""
         for transform in message.transforms:
             if transform.child_frame_id.strip("/") == self.config.handle_frame:
                 p, q = transform.transform.translation, transform.transform.rotation

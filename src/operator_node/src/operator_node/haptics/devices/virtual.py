@@ -1,4 +1,4 @@
-"""A haptic device without hardware: a window, a mouse, and an arrow for the force."""
+"""A haptic device without hardware: the mouse moves a handle in a window, and an arrow shows the force."""
 
 import math
 import os
@@ -17,9 +17,9 @@ from operator_node.haptics.emulated import EmulatedDevice
 from robot_model.geometry import ZERO, Vector, shortened_to
 
 FROM_WINDOW = struct.Struct("=4d")
-"""x, y, z of the mouse [m] and whether the button is held."""
+"""Message from the window: position x, y, z of the mouse [m], and 1 if the button is held, otherwise 0."""
 TO_WINDOW = struct.Struct("=6d")
-"""Position of the handle [m] and force [N]."""
+"""Message to the window: position of the handle [m] and force [N]."""
 SHOW_S = 0.02
 """Period at which the window is updated [s]."""
 
@@ -40,7 +40,7 @@ class VirtualConfig(HapticConfig):
 class VirtualDevice(EmulatedDevice):
     """A handle on a spring that the mouse pulls: a force moves it away from the mouse, and is drawn as an arrow.
 
-    The window is a process of its own, so that drawing does not hold up the loop.
+    The window runs in a separate process, so that drawing does not delay the loop.
     """
 
     Config = VirtualConfig
@@ -73,11 +73,11 @@ class VirtualDevice(EmulatedDevice):
         super().open()
 
     def goal(self, time_s: float) -> Vector:
-        """Returns the position of the mouse."""
+        """Returns the position of the mouse [m], to which the spring pulls the handle."""
         return self._mouse
 
     def read(self) -> HapticReading | None:
-        """Returns the state of the handle.
+        """Reads the mouse, updates the window, and returns the state of the handle.
 
         Raises:
             DeviceEnded: If the window was closed.
@@ -127,6 +127,6 @@ class VirtualDevice(EmulatedDevice):
         try:
             self._socket.send(message)
         except BlockingIOError:
-            return  # a slow window gets the next one
+            return  # the window is slow, and gets the next message
         except OSError:
             raise DeviceEnded("virtual", "its window was closed") from None

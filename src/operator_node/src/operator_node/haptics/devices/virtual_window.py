@@ -1,7 +1,7 @@
-"""The window of the virtual haptic device, a program: a mouse moves a handle, and an arrow shows the force.
+"""Program that shows the window of the virtual haptic device: a mouse moves a handle, and an arrow shows the force.
 
-Its arguments are the number of a socket, the radius of the workspace [m], the largest force [N], and 1 if the handle
-returns to the middle when it is released, else 0.
+The program has four arguments: the file descriptor of a socket, the radius of the workspace [m], the largest force [N],
+and 1 or 0. With 1, the handle returns to the middle when it is released.
 """
 
 import os
@@ -12,22 +12,22 @@ import tkinter
 
 FROM_WINDOW, TO_WINDOW = struct.Struct("=4d"), struct.Struct("=6d")
 SIZE, BAR, MARGIN = 420, 90, 30
-"""The square for x and y, the bar for z beside it, and the margin around them [px]."""
+"""Side of the square for x and y, width of the bar for z, and margin around both [px]."""
 WHEEL_PARTS = 50
-"""Number of notches of the wheel for the radius of the workspace."""
+"""Number of notches of the wheel that move the handle by the radius of the workspace."""
 PERIOD_MS = 16
 WHEEL_RETURN_MS = 300
-"""Time after the last notch of the wheel at which a returning handle goes back [ms]."""
+"""Time from the last notch of the wheel until the handle returns, if `returns` is set [ms]."""
 TEXT = "drag: x, y    wheel or right button: z    space: button"
 
 
 class HandleWindow:
-    """Shows a workspace from above, its front at the top, and the height in a bar.
+    """Window that shows the workspace from above, with x upwards, and the height z of the handle in a bar.
 
     Args:
         connection: Socket to the device.
         radius_m: Radius of the workspace [m].
-        max_force_n: Force that is drawn as half of the workspace [N].
+        max_force_n: Force whose arrow is half as long as the workspace's radius [N].
         returns: Whether the handle returns to the middle when it is released.
     """
 
@@ -56,11 +56,11 @@ class HandleWindow:
         self._wheel_return: str | None = None
         root.bind("<KeyPress-space>", lambda _: self._hold(1.0))
         root.bind("<KeyRelease-space>", lambda _: self._hold(0.0))
-        root.bind("<FocusOut>", lambda _: self._hold(0.0))  # the release of the key goes to another window then
+        root.bind("<FocusOut>", lambda _: self._hold(0.0))  # the key's release goes to another window
         root.after(PERIOD_MS, self._update)
 
     def run(self) -> None:
-        """Shows the window until it or the device is closed."""
+        """Shows the window until the user closes the window, or the device closes the socket."""
         self._root.mainloop()
 
     def _draw_room(self) -> None:

@@ -1,4 +1,4 @@
-"""Former import path of the base class of a device's topics."""
+"""Former import path of the class `DeviceTopics`, kept for compatibility."""
 
 from operator_node.devices.device_topics import DeviceTopics
 
