@@ -1,1 +1,1 @@
-"""Inverse kinematics with exchangeable solvers behind one interface."""
+"""Inverse kinematics: several solvers with the same interface."""

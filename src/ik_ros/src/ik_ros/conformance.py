@@ -1,4 +1,4 @@
-"""Tests for pytest that every solver passes; derive from `SolverConformance` to test a solver of your own."""
+"""Pytest tests that every solver must pass; derive from `SolverConformance` to test a solver of your own."""
 
 import math
 import os
@@ -24,7 +24,7 @@ from .solver import Solver
 from .solvers import SOLVERS
 
 PROBLEMS = "IK_CONFORMANCE_PROBLEMS"
-"""Environment variable: number of random problems in place of `random_problems`."""
+"""Name of the environment variable that overrides the number `random_problems`."""
 _IN_ANOTHER_PROCESS = """
 import pickle, sys
 from ik_ros.lookup import make_solver
@@ -35,17 +35,17 @@ pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "
 
 
 class SolverConformance:
-    """Tests that any solver of a link's pose passes.
+    """Tests that every solver for the pose of one link must pass.
 
-    A subclass names the solver and its robot, and may override the methods below.
+    A subclass names the solver and the robot, and may override the first four methods.
 
     Attributes:
-        solver_name: Argument of `make_solver`: a name of the table, or `"their_package.module:Class"`.
-        options: Its options. `forward` reads the robot from `urdf_filename`, `base_link` and `tip_link`.
-        least_share: Smallest share of reachable problems that must be solved.
-        reachable_problems: Number of reachable problems to solve.
-        random_problems: Number of problems, reachable or not, for which only limits and finiteness are checked.
-        reach_m: Largest distance of random targets from the base [m].
+        solver_name: Argument of `make_solver`: a name in the table of solvers, or `"their_package.module:Class"`.
+        options: Options of the solver. `forward` needs the keys `urdf_filename`, `base_link` and `tip_link`.
+        least_share: Smallest fraction of reachable problems that the solver must solve.
+        reachable_problems: Number of reachable problems.
+        random_problems: Number of problems whose targets may be unreachable. Their answers must be valid, not solved.
+        reach_m: Largest absolute coordinate of random target positions in the base [m].
     """
 
     solver_name: ClassVar[str]
@@ -58,33 +58,33 @@ class SolverConformance:
     # --- Methods that a subclass may override
 
     def make(self) -> Solver:
-        """Returns a new solver."""
+        """Makes a new solver."""
         return SOLVERS.make(self.solver_name, self.options)
 
     def problem(self, target: Pose, start: Mapping[str, float], seed: int = 0) -> IKProblem:
-        """Returns a problem with a target."""
+        """Makes a problem with a target pose in the base, start positions by joint [rad or m], and a seed."""
         return IKProblem(target=target, start=start, seed=seed)
 
     def forward(self, positions: Sequence[float]) -> Pose:
-        """Returns the pose of the link in the base by `robot_model`, independently of the solver."""
+        """Computes the pose of the tip in the base with `RobotModel`, independently of the solver."""
         at = dict(zip(self.solver.joint_names, positions))
         q = [at.get(name, 0.0) for name in self.robot.joint_names]
         return self.robot.pose(q, str(self.options["tip_link"]), str(self.options["base_link"]))
 
     def positions(self, generator: random.Random) -> list[float]:
-        """Returns random positions within limits."""
+        """Draws random positions of the solver's joints within their limits [rad or m]."""
         return self.limits.random(generator, self.limits.middle)
 
     # --- Helpers of the tests
 
     @cached_property
     def solver(self) -> Solver:
-        """The solver."""
+        """The solver that is tested."""
         return self.make()
 
     @cached_property
     def limits(self) -> Limits:
-        """Its limits; joints without limits are sampled within half a turn in both directions."""
+        """The solver's limits, with all joints as revolute; joints without limits are sampled from -pi to pi."""
         return Limits(self.solver.lower, self.solver.upper, [True] * len(self.solver.joint_names))
 
     @cached_property
@@ -93,18 +93,21 @@ class SolverConformance:
         return RobotModel(str(self.options["urdf_filename"]))
 
     def start_at(self, positions: Sequence[float]) -> dict[str, float]:
-        """Returns positions by joint."""
+        """Converts positions in the solver's order to positions by joint name [rad or m]."""
         return dict(zip(self.solver.joint_names, positions))
 
     def reachable(self, generator: random.Random, count: int) -> list[IKProblem]:
-        """Returns solvable problems with random starts."""
+        """Makes `count` problems with reachable targets and random starts."""
         return [
             self.problem(self.forward(self.positions(generator)), self.start_at(self.positions(generator)))
             for _ in range(count)
         ]
 
     def checked(self, problem: IKProblem) -> IKSolution:
-        """Returns an answer after checks of order, length, finiteness, limits, message, and of a claimed success."""
+        """Solves a problem, checks the answer, and returns it.
+
+        Checks the joints' order, number, finiteness and limits, the message, and whether a claimed success is true.
+        """
         solution = self.solver.solve(problem)
         assert solution.joint_names == self.solver.joint_names, "joints are in another order"
         assert len(solution.positions) == len(self.solver.joint_names), solution
@@ -124,7 +127,7 @@ class SolverConformance:
     # --- The tests.
 
     def test_its_joints_and_limits_belong_together(self) -> None:
-        """Names are unique; each joint has ordered limits, and a velocity limit, which continuity needs."""
+        """Names are unique, and each joint has ordered limits and a velocity limit, which may be inf."""
         names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
         assert names and len(set(names)) == len(names) == len(lower) == len(upper)
         assert all(low <= high for low, high in zip(lower, upper))
@@ -132,13 +135,13 @@ class SolverConformance:
         assert all(velocity > 0.0 for velocity in self.solver.velocity_limits)
 
     def test_reachable_targets_are_reached(self) -> None:
-        """Reported successes are true, and frequent enough; a solver that always fails does not pass."""
+        """Reported successes are true, and at least the fraction `least_share` of the problems is solved."""
         problems = self.reachable(random.Random(1), self.reachable_problems)
         share = sum(self.checked(problem).success for problem in problems) / self.reachable_problems
         assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
 
     def test_unreachable_target_returns_the_best_pose_and_its_distance(self) -> None:
-        """A failure is an answer, not an exception."""
+        """The solver answers `success=False` instead of raising an exception, and reports the true error."""
         start = self.start_at(self.limits.middle)
         target = Pose((0.0, 0.0, 100.0))
         solution = self.checked(self.problem(target, start))
@@ -148,7 +151,7 @@ class SolverConformance:
         assert abs(angle - solution.orientation_error_rad) < 0.01, (angle, solution)
 
     def test_answers_to_random_problems_are_finite_and_within_limits(self) -> None:
-        """Targets reachable or not, starts within limits or not."""
+        """This holds even if targets are unreachable, and starts are outside the limits."""
         generator = random.Random(2)
         for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
             x, y, z = (generator.uniform(-self.reach_m, self.reach_m) for _ in range(3))
@@ -156,20 +159,20 @@ class SolverConformance:
             self.checked(self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed))
 
     def test_a_target_that_is_not_finite_is_refused(self) -> None:
-        """The problem itself must refuse it."""
+        """Such a target raises a ValueError; `IKProblem` already refuses it."""
         for bad in (math.nan, math.inf, 1e300):
             for target in (Pose((0.1, bad, 0.3)), Pose((0.1, 0.2, 0.3), (0.0, 0.0, bad, 1.0))):
                 with pytest.raises(ValueError, match="finite"):
                     self.solver.solve(self.problem(target, {}))
 
     def test_unknown_joint_is_refused_naming_the_known_ones(self) -> None:
-        """A misspelt joint would silently start elsewhere."""
+        """An unknown joint name in the start raises an error; otherwise a misspelt joint would silently be ignored."""
         problem = self.problem(self.forward(self.limits.middle), {"no_such_joint": 0.0})
         with pytest.raises(UnknownNameError, match=f"no_such_joint.*{self.solver.joint_names[0]}"):
             self.solver.solve(problem)
 
     def test_equal_problems_have_equal_answers(self) -> None:
-        """The answers do not depend on earlier problems, on the solver object, or on the number of threads."""
+        """The answers do not depend on earlier problems, on the solver object, on the process or on its threads."""
         if not self.solver.deterministic:
             pytest.skip(f"'{self.solver_name}' is not declared deterministic")
         problems = self.reachable(random.Random(3), 10) + [self.problem(Pose((0.0, 0.0, 100.0)), {})]
@@ -192,10 +195,10 @@ class SolverConformance:
 
 
 def distances(pose: Pose, other: Pose) -> tuple[float, float]:
-    """Returns distance [m] and angle [rad] between two poses."""
+    """Returns the distance between two positions [m], and the angle between two orientations [rad]."""
     return math.dist(pose.position, other.position), angle_between(pose.quat_xyzw, other.quat_xyzw)
 
 
 def random_quat(generator: random.Random) -> Quaternion:
-    """Returns a uniformly distributed random rotation."""
+    """Draws a uniformly distributed random rotation as a quaternion x, y, z, w."""
     return normalized([generator.gauss(0.0, 1.0) for _ in range(4)])

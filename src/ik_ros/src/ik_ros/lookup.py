@@ -1,6 +1,6 @@
-"""The function that makes a solver by its name, for scripts."""
+"""The function `make_solver` for scripts."""
 
 from .solvers import SOLVERS
 
 make_solver = SOLVERS.make
-"""Makes a solver, see `PluginTable.make`."""
+"""Makes a solver that is given by name, see `PluginTable.make`."""

@@ -1,4 +1,4 @@
-"""Parameters of the nodes, and the schemas of the YAML files that have them."""
+"""Parameters of the ik_ros nodes, and the JSON Schemas of YAML files with these parameters."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class TfToFloatArrayConfig(TargetParameters):
 
 
 def schemas() -> dict[str, Schema]:
-    """Returns the schemas by solver, of those whose libraries are installed."""
+    """Generates the JSON Schema of each solver's options by solver name; leaves out solvers with missing libraries."""
     found = {}
     for name, config in SOLVERS.configs().items():
         both = create_model(config.__name__, __base__=(config, SolverNodeParameters), __doc__=config.__doc__)
@@ -132,7 +132,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _tasks() -> dict[str, Schema]:
-    """Returns the definitions of all types of tasks, with the definitions that they refer to."""
+    """Generates the schema definitions of all types of tasks, and of the models that task options contain."""
     own_type = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     definitions: dict[str, Schema] = {
         _OWN_TYPE: {"type": "object", "properties": {"type": own_type}, "required": ["type"]}
@@ -145,5 +145,9 @@ def _tasks() -> dict[str, Schema]:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file of a workspace."""
+    """Generates the JSON Schema files of this package, and returns the text by file path.
+
+    Args:
+        root: Folder of the workspace.
+    """
     return schema_texts(root / "src/ik_ros/schema", schemas())

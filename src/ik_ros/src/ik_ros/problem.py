@@ -1,4 +1,4 @@
-"""Problems and solutions of inverse kinematics, the same for every solver."""
+"""Problems and solutions of inverse kinematics; all solvers use the same classes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,16 +8,16 @@ from robot_model.geometry import Pose, Vector, normalized
 from robot_model.limits import MAX_MAGNITUDE
 
 JointPositions = Mapping[str, float]
-"""Positions by joint [rad or m]."""
+"""Joint positions by joint name [rad or m]."""
 
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A pose that a link passes at a time.
+    """A pose that a link passes through at a given time.
 
     Attributes:
-        time_s: Time from the start [s].
-        pose: The link's pose in the solver's base frame; positions [m], unit quaternion x, y, z, w.
+        time_s: Time since the start of the motion [s].
+        pose: Pose of the link in the solver's base frame.
     """
 
     time_s: float
@@ -26,11 +26,11 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class AttachedFrame:
-    """A frame of a scene.
+    """A frame of a scene, attached to a link or to another frame.
 
     Attributes:
-        parent: The link or frame that it is attached to; empty for the root.
-        pose: Its pose there; position [m], unit quaternion x, y, z, w.
+        parent: Name of the link or frame that the frame is attached to; empty for the robot's root.
+        pose: Pose of the frame in `parent`.
     """
 
     parent: str
@@ -39,22 +39,24 @@ class AttachedFrame:
 
 @dataclass(frozen=True)
 class IKProblem:
-    """A problem for a solver; fields that the solver does not need stay empty.
+    """A problem for a solver. Fields that the solver does not need can stay empty.
 
     Attributes:
-        target: Pose of the solver's link in its base frame; quaternions of any length but 0.
-        position_tolerance: Largest error along each axis of the target, both ways [m].
-        rotation_tolerance: Largest rotation about each axis, both ways [rad]; from pi on, any rotation is accepted.
-        start: Start of the search, by joint [rad or m]; joints that are left out start at the middle of their limits.
-            Positions outside limits are brought within them, with a warning.
-        previous: Previous solutions, newest last; solvers that can stay near them.
-        goals: Values of the goals of tasks by the name of the task, for solvers that have tasks.
-        waypoints: Waypoints of the link, by time, for solvers of trajectories.
-        frames: Frames of the scene by name, for solvers that have a scene; the others stay where they are.
-        seed: Seed of everything random: a deterministic solver returns equal answers for equal problems.
+        target: Target pose of the solver's link in the solver's base frame. The quaternion may have any length but 0.
+        position_tolerance: Largest allowed error along each axis of the target, in both directions [m].
+        rotation_tolerance: Largest allowed rotation about each axis of the target, in both directions [rad]. From pi
+            on, every rotation is accepted.
+        start: Start positions of the search by joint [rad or m]. Joints that are left out start at the middle of their
+            limits. Positions outside the limits are moved into the limits, with a warning.
+        previous: Previous solutions, the newest last, for solvers that can stay near them.
+        goals: Numbers of each task's goal, by task name, for solvers with tasks.
+        waypoints: Waypoints of the link, sorted by time, for solvers that find trajectories.
+        frames: Frames of the scene to attach to another parent, by name, for solvers with a scene. Other frames of the
+            scene do not change.
+        seed: Seed of the solver's random generator. A deterministic solver returns equal answers for equal problems.
 
     Raises:
-        ValueError: If a number is not finite or out of its range; it names the field.
+        ValueError: If a number is not finite or out of range; the message names the field.
     """
 
     target: Pose | None = None
@@ -117,12 +119,12 @@ def _number(what: str, value: float) -> float:
 
 @dataclass(frozen=True)
 class SampledTrajectory:
-    """Positions of n joints over time.
+    """Positions and velocities of n joints at m times.
 
     Attributes:
-        times_s: m times from the start [s], increasing.
-        positions: For each of them, n positions [rad or m].
-        velocities: For each of them, n velocities [rad/s or m/s].
+        times_s: m increasing times since the start [s].
+        positions: n positions for each of the m times [rad or m].
+        velocities: n velocities for each of the m times [rad/s or m/s].
     """
 
     times_s: tuple[float, ...]
@@ -135,16 +137,17 @@ class IKSolution:
     """Result of a solver.
 
     Attributes:
-        success: Whether all requirements are met within the tolerances, and the limits are kept.
-        message: Description of the result, in words with numbers.
-        joint_names: The solver's n joints, always in the same order.
-        positions: n positions within limits [rad or m]; without success the best that were found, or else the start of
-            the search.
-        position_error_m: Distance of the link from its target beyond the tolerance [m]; for several, the largest.
-        orientation_error_rad: Rotation from the target beyond the tolerance [rad]; for several, the largest.
-        alternatives: Other solutions, the best first, if the solver searches several; n positions each.
-        trajectory: Trajectory, from solvers of trajectories; `positions` are then its last ones.
-        base_pose: Pose of a floating root in the solver's base frame; None for a fixed one.
+        success: Whether all requirements are met within the tolerances, and all joints are within their limits.
+        message: Description of the result in words, with numbers.
+        joint_names: Names of the solver's n joints, always in the same order.
+        positions: n positions within the limits [rad or m]. Without success, the best positions that the solver found,
+            or the start of the search.
+        position_error_m: Position error of the link, reduced by the tolerances [m]. For several links or waypoints, the
+            largest error.
+        orientation_error_rad: Orientation error, reduced by the tolerances [rad]; for several, the largest error.
+        alternatives: Other solutions with n positions each, the best first, from solvers that find several.
+        trajectory: The trajectory, from solvers that find trajectories; `positions` are then its last positions.
+        base_pose: Pose of a floating root in the solver's base frame; None for a fixed root.
     """
 
     success: bool

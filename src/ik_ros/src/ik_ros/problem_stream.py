@@ -1,4 +1,4 @@
-"""Streams of problems, and targets without jumps."""
+"""Solves streams of problems, and limits the joint velocities between successive targets."""
 
 import dataclasses
 import time
@@ -33,21 +33,22 @@ class JointRateLimiterConfig(ConfigModel):
 class JointRateLimiter:
     """Limits the joint velocities between successive targets.
 
-    If the solution is further away, the target moves towards it as far as the slowest joint allows, all joints in
-    proportion. Near a singularity, where small motions of the link need large joint motions, the robot therefore lags
-    instead of jumping. Changes of posture are limited to the speed of the joints.
+    If a solution is too far from the last target, the next target is on the straight line between both in joint space.
+    The joint that needs most time moves at its velocity limit, the others move in proportion. So near a singularity or
+    at a change of posture, the robot lags behind instead of jumping.
 
     Args:
-        config: Its configuration.
-        joint_names: The n joints.
-        velocity_limits: Their velocities by the URDF [rad/s or m/s]; 0 and inf mean none.
+        config: The configuration.
+        joint_names: Names of the n joints.
+        velocity_limits: Velocity limits of the n joints in the URDF [rad/s or m/s]; 0 and inf mean no limit.
 
     Attributes:
-        hold: Whether targets continue while problems have no solution.
-        max_period_s: Longest time since the last target that counts [s].
+        hold: Whether targets continue towards the last solution while problems have no solution.
+        max_period_s: Longest time between two targets that is taken into account [s].
 
     Raises:
-        ValueError: If the configuration names a joint that is not there, or a joint has no limit at all.
+        ValueError: If the configuration names an unknown joint, or a joint has a velocity limit neither in the
+            configuration nor in the URDF.
     """
 
     def __init__(
@@ -69,18 +70,19 @@ class JointRateLimiter:
         self._last: np.ndarray | None = None
 
     def begin(self, positions: Sequence[float] | None) -> None:
-        """Continues from n positions [rad or m]; after None, the first target is the first solution."""
+        """Sets the last target to n positions [rad or m]. With None, the next target is the next solution."""
         self._last = None if positions is None else np.array(positions, dtype=float)
 
     def next(self, solution: Sequence[float], period_s: float) -> tuple[np.ndarray, float]:
-        """Returns the next target.
+        """Computes the next target.
 
         Args:
-            solution: The n positions to go to [rad or m].
+            solution: n positions to move to [rad or m].
             period_s: Time since the last target [s].
 
         Returns:
-            n positions [rad or m], and the share of the motion to the solution that they complete, 1 at the solution.
+            The target, n positions [rad or m], and the completed fraction of the motion from the last target to the
+            solution; 1 if the target is the solution.
         """
         goal = np.array(solution, dtype=float)
         if self._last is None:
@@ -95,14 +97,14 @@ class JointRateLimiter:
 
 
 class ProblemStream:
-    """Solves problems one after the other, each from the last solution.
+    """Solves problems one after the other; each search starts at the last target.
 
     Args:
         solver: The solver.
-        continuity: Keeps the joints within their velocities; without it, targets are the solutions.
+        continuity: Limits the joint velocities between targets. None: the targets are the solutions.
 
     Attributes:
-        target: n positions to be commanded after the last problem [rad or m]; None if there are none.
+        target: n positions to command after the last problem [rad or m]; None if the problem gives no target.
     """
 
     def __init__(self, solver: Solver, continuity: JointRateLimiter | None = None) -> None:
@@ -114,7 +116,7 @@ class ProblemStream:
         self._last_s: float | None = None
 
     def restart(self) -> None:
-        """Treats the next problem as the first."""
+        """Forgets the last target, so that the next problem counts as the first problem."""
         self.target = self._goal = self._last_s = None
         self._last = {}
         if self._continuity is not None:
@@ -124,16 +126,17 @@ class ProblemStream:
         """Solves the next problem.
 
         Args:
-            problem: With its poses in the solver's base. Joints that its `start` leaves out start at the last target.
-                With continuity all joints do, and the first start has to be complete.
-            stamp_s: Its time [s]; 0 is now.
+            problem: The problem, with poses in the solver's base frame. Joints that `problem.start` leaves out start at
+                the last target. With continuity, `start` applies to the first problem only: it must have all joints, or
+                be empty. Later, all joints start at the last target.
+            stamp_s: Time of the problem [s]; 0 for now.
 
         Returns:
-            The solution, with positions as close to it as continuity allows. A trajectory is returned unchanged.
+            The solution. With continuity, its positions are replaced by the target; a trajectory is not changed.
 
         Raises:
-            UnknownNameError: If it names an unknown joint.
-            ValueError: If it makes no sense.
+            UnknownNameError: If the problem names an unknown joint.
+            ValueError: If the problem is invalid.
         """
         self.target, is_first = None, not self._last
         start: JointPositions = {**self._last, **problem.start}
@@ -159,21 +162,21 @@ class ProblemStream:
     def _advance(
         self, continuity: JointRateLimiter, goal: tuple[float, ...], stamp_s: float
     ) -> tuple[tuple[float, ...], float]:
-        """Returns the next target towards a goal, and the share of the motion that it completes."""
+        """Sets the next target towards a goal; returns the target, and the completed fraction of the motion."""
         positions, share = continuity.next(goal, self._period_s(stamp_s))
         self.target = tuple(positions.tolist())
         self._last = dict(zip(self._solver.joint_names, self.target))
         return self.target, share
 
     def _complete(self, start: JointPositions) -> JointPositions:
-        """Returns a start, which must have all joints or none: with guessed positions, the robot would jump."""
+        """Checks that a start has all joints or is empty, since the robot would jump to guessed positions."""
         missing = [name for name in self._solver.joint_names if name not in start]
         if start and missing:
             raise ValueError(f"start: continuity begins there and needs all joints; it lacks {', '.join(missing)}")
         return start
 
     def _period_s(self, stamp_s: float) -> float:
-        """Returns the time since the last problem [s]."""
+        """Returns the time from the last call to `stamp_s` [s], or 0 at the first call; `stamp_s=0` means now."""
         now_s = stamp_s or time.monotonic()
         period_s = 0.0 if self._last_s is None else now_s - self._last_s
         self._last_s = now_s

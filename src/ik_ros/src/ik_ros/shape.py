@@ -1,4 +1,4 @@
-"""Simple shapes that approximate links and obstacles."""
+"""Spheres, boxes and capsules that approximate links and obstacles."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from robot_model.geometry import Pose
 
 
 class RoundedCore(NamedTuple):
-    """The core of a rounded shape: the point, line or box at its centre.
+    """A shape as a core (a point, a line or a box) and a radius around the core.
 
     Attributes:
-        half: Half lengths along x, y, z [m].
-        radius: Distance of the surface from the core [m].
+        half: Half lengths of the core along x, y and z [m].
+        radius: Distance of the shape's surface from the core [m].
     """
 
     half: np.ndarray
@@ -24,21 +24,21 @@ class RoundedCore(NamedTuple):
 
     @property
     def is_box(self) -> bool:
-        """Whether it is a box, not a point or a line along z."""
+        """Whether the core is a box; otherwise it is a point, or a line along z."""
         return bool(self.half[:2].any())
 
 
 class ShapeConfig(ConfigModel):
-    """A shape; one of `sphere`, `box` and `capsule`.
+    """A shape on a link, or an obstacle; exactly one of `sphere`, `box` and `capsule` is given.
 
     Attributes:
-        name: Its name in tasks and messages.
-        link: The link it belongs to; None: it is fixed in the base.
-        position: Its centre, in the link or base [m].
-        orientation: Its orientation there, quaternion x, y, z, w.
-        sphere: Its radius [m].
-        box: Its whole lengths along x, y, z [m].
-        capsule: Its radius, and its length along z between the centres of the round ends [m].
+        name: Name of the shape in tasks and messages.
+        link: Link that the shape is attached to. None: the shape is fixed in the base.
+        position: Position of the shape's centre in the link or base [m].
+        orientation: Orientation of the shape in the link or base, quaternion x, y, z, w.
+        sphere: Radius of a sphere [m].
+        box: Full lengths of a box along x, y and z [m].
+        capsule: Radius of a capsule, and its length along z between the centres of the round ends [m].
     """
 
     name: Text
@@ -62,12 +62,12 @@ class ShapeConfig(ConfigModel):
 
     @property
     def pose(self) -> Pose:
-        """Its pose in the link or base."""
+        """Pose of the shape in the link or base."""
         return Pose(self.position, self.orientation)
 
     @property
     def core(self) -> RoundedCore:
-        """Its core: the shape without its roundness."""
+        """The shape as a core and a radius."""
         if self.sphere is not None:
             return RoundedCore(np.zeros(3), self.sphere)
         if self.capsule is not None:

@@ -1,4 +1,4 @@
-"""The interface of solvers of inverse kinematics."""
+"""Base class of the solvers of inverse kinematics."""
 
 import logging
 from abc import ABC, abstractmethod
@@ -16,18 +16,18 @@ _log = logging.getLogger(__name__)
 class Solver(ABC):
     """Solves problems of inverse kinematics for one robot.
 
-    The options of a subclass are its `Config`, in YAML or as parameters of the solver's node. A problem without
-    solution is an answer (`success` is false, and `message` has the reason); an exception means that the problem is
-    invalid.
+    A subclass declares its options in `Config`; users give them in YAML, or as parameters of the solver's node. If a
+    problem has no solution, the answer has `success=False` and the reason in `message`. An exception means that the
+    problem is invalid.
 
     Attributes:
-        Config: Model of its options.
+        Config: Pydantic model of the options.
         deterministic: Whether equal problems with equal seeds have equal answers, to the last bit.
-        joint_names: The n joints that it finds positions for, always in the same order.
-        lower: Their n lower limits [rad or m], -inf where there is none.
-        upper: Their n upper limits [rad or m], inf where there is none.
-        velocity_limits: Their n largest velocities by the URDF [rad/s or m/s], inf where there is none.
-        base_frame: The link of the robot that poses of problems are expressed in.
+        joint_names: Names of the n joints that the solver finds positions for, always in the same order.
+        lower: Lower limits of the n joints [rad or m]; -inf for joints without a lower limit.
+        upper: Upper limits of the n joints [rad or m]; inf for joints without an upper limit.
+        velocity_limits: Velocity limits of the n joints in the URDF [rad/s or m/s]; inf for joints without a limit.
+        base_frame: Name of the frame in which the poses of problems are expressed, usually a link of the robot.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -45,13 +45,15 @@ class Solver(ABC):
         Raises:
             ValueError: If the problem does not fit the solver: a required field is missing, or the solver does not
                 support a requirement.
-            UnknownNameError: If it names a joint or task that is not known.
+            UnknownNameError: If the problem names an unknown joint or task.
         """
 
 
 class StartLimits:
-    """Brings starts into limits; warns once of each joint, since a stream may repeat a start a hundred times a
-    second."""
+    """Moves start positions into the joint limits, and logs a warning once per joint.
+
+    The warning is not repeated, since a stream may have the same start a hundred times per second.
+    """
 
     def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
         self._joint_names = tuple(joint_names)
@@ -59,7 +61,7 @@ class StartLimits:
         self._warned_of: set[str] = set()
 
     def wrap_to_limits(self, start: Sequence[float]) -> list[float]:
-        """Returns n positions within limits [rad or m], for n positions [rad or m]."""
+        """Moves n positions into the limits, and returns them [rad or m]; see `Limits.wrap_to_limits`."""
         inside = self._limits.wrap_to_limits(start, start)[0]
         joints = zip(self._joint_names, start, inside)
         outside = {name: asked for name, asked, used in joints if abs(asked - used) > LIMIT_ROUNDING}

@@ -1,4 +1,4 @@
-"""A chain of joints and its goal in the Orocos Kinematics and Dynamics Library."""
+"""Kinematics of a chain, and a target pose with tolerances, in the Orocos Kinematics and Dynamics Library (KDL)."""
 
 import math
 from collections.abc import Sequence
@@ -13,11 +13,14 @@ from robot_model.reach import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, R
 
 
 class KdlChain:
-    """Forward kinematics and Jacobian of the tip of a chain; not thread-safe.
+    """Forward kinematics and Jacobian of a chain's tip; not thread-safe.
+
+    Args:
+        description: The chain, with n joints to solve for.
 
     Attributes:
-        kdl: KDL's chain; its m joints are those that are not fixed.
-        is_plain: Whether the m joints are the n variables, since none mimics another.
+        kdl: KDL's chain; its m joints are the moving joints, mimic joints included.
+        is_plain: Whether the chain has no mimic joints, so that the m joints are the n joints to solve for.
     """
 
     def __init__(self, description: Chain) -> None:
@@ -31,19 +34,19 @@ class KdlChain:
         self._to_jacobian = PyKDL.ChainJntToJacSolver(self.kdl)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
-        """Returns the pose of the tip in the base at n positions [rad or m], valid until the next call."""
+        """Returns the pose of the tip in the base at n joint positions [rad or m]; the next call changes the object."""
         self._set(q)
         self._to_frame.JntToCart(self._positions, self._frame)
         return self._frame
 
     def pose(self, q: Sequence[float]) -> Pose:
-        """Returns the pose of the tip in the base."""
+        """Returns the pose of the tip in the base at n joint positions [rad or m]."""
         frame = self.frame(q)
         x, y, z = frame.p
         return Pose((x, y, z), frame.M.GetQuaternion())
 
     def jacobian(self, q: Sequence[float]) -> np.ndarray:
-        """Returns the Jacobian of the tip in the base: 6 x n, 3 rows of translation [m], 3 rows of rotation [rad]."""
+        """Returns the Jacobian of the tip in the axes of the base, 6 x n: linear rows, then angular rows."""
         self._set(q)
         self._to_jacobian.JntToJac(self._positions, self._jacobian)
         joints = range(self._jacobian.columns())
@@ -56,14 +59,14 @@ class KdlChain:
 
 
 class Goal:
-    """The target of a problem with a box of tolerances around it.
+    """The target pose of a problem, with tolerances for each axis.
 
     Attributes:
-        frame: The target in the base.
-        inverse: The base in the target.
-        tolerance: Largest errors of the link: 3 distances along the axes of the target [m], and 3 components of the
-            rotation vector from the target to the link, in the target [rad]; inf where free.
-        is_point: Whether the box is no larger than the tolerance of success.
+        frame: Pose of the target in the base.
+        inverse: Pose of the base in the target.
+        tolerance: Largest allowed errors of the link: 3 distances along the axes of the target [m], and 3 components of
+            the rotation vector from target to link, in the axes of the target [rad]; inf for free rotations.
+        is_point: Whether all tolerances are at most those up to which a target without tolerances counts as reached.
 
     Raises:
         ValueError: If the problem has no target.
@@ -84,28 +87,28 @@ class Goal:
 
     @property
     def any_orientation(self) -> bool:
-        """Whether any orientation of the link is accepted."""
+        """Whether every orientation of the link is accepted."""
         return min(self.tolerance[3:]) == math.inf
 
     def off(self, frame: PyKDL.Frame) -> list[float]:
-        """Returns the error of a link at a pose: 3 distances [m] and a rotation vector [rad], in the target frame."""
+        """Returns the error of a link pose: 3 distances [m] and a rotation vector [rad], in the target frame."""
         difference = self.inverse * frame
         p, turn = difference.p, difference.M.GetRot()
         return [p[0], p[1], p[2], turn[0], turn[1], turn[2]]
 
     def beyond(self, off: list[float]) -> list[float]:
-        """Returns the part of a 6-vector of errors that exceeds the tolerances."""
+        """Returns by how much each of 6 errors exceeds its tolerance, with the sign of the error."""
         return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
 
     def residual(self, frame: PyKDL.Frame) -> Residual:
-        """Returns the error of a link at a pose in excess of the tolerances."""
+        """Returns position and orientation error of a link pose, each reduced by the tolerances."""
         x, y, z, rx, ry, rz = self.beyond(self.off(frame))
         return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
 
 
 def _kdl_chain(description: Chain) -> PyKDL.Chain:
     chain = PyKDL.Chain()
-    fixed = PyKDL.Frame()  # of the joint's parent link in the link that the last moving joint moves
+    fixed = PyKDL.Frame()  # pose of the joint's parent link in the child link of the last moving joint
     for joint in description.joints:
         origin = fixed * PyKDL.Frame(PyKDL.Rotation.RPY(*joint.rpy), PyKDL.Vector(*joint.xyz))
         if not joint.is_moving:

@@ -1,4 +1,4 @@
-"""The method of Levenberg and Marquardt, within limits and tolerances."""
+"""The Levenberg-Marquardt method for inverse kinematics, with joint limits and target tolerances."""
 
 import math
 from collections.abc import Sequence
@@ -12,26 +12,32 @@ from .kdl import Goal, KdlChain
 
 ITERATIONS = 60
 LEVER_M = 0.1
-"""Lever arm that weighs rotation against translation [m]: 0.01 rad count as 1 mm."""
+"""Length that converts rotation errors to metres [m]: 0.01 rad count as 1 mm."""
 DONE_M = 1e-5
-"""Residual at which to stop [m]."""
+"""Error at which the descent ends [m]."""
 LARGEST_STEP = 1.0
 """Largest motion of a joint in one iteration [rad or m]."""
 LEAST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-4, 1e2
 STALLED = 0.99
-"""Ratio of successive squared residuals above which an iteration counts as stalled."""
+"""Ratio of successive squared errors above which an iteration counts as stalled."""
 PATIENCE = 3
-"""Number of stalled iterations after which the descent ends."""
+"""Number of successive stalled iterations after which the descent ends."""
 
 
 def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
-    """Brings the tip of a chain towards a goal, from n positions within the limits of its joints [rad or m].
+    """Searches for joint positions that bring the tip of a chain to a goal, by descent from a start.
 
-    It minimises the link's error in excess of its tolerances. Joints at a limit that would exceed it are held for that
-    iteration.
+    The descent minimises the part of the error that exceeds the goal's tolerances. In each iteration, joints at a limit
+    are held if the step would move them beyond the limit.
+
+    Args:
+        chain: The chain, with n joints to solve for.
+        goal: The goal of the tip.
+        limits: Limits of the n joints.
+        start: n positions within the limits [rad or m].
 
     Returns:
-        The n best positions within limits that were found [rad or m].
+        The n best positions that were found, within the limits [rad or m].
     """
     lower, upper = np.array(limits.lower), np.array(limits.upper)
     to_target = np.array([[goal.inverse.M[row, column] for column in range(3)] for row in range(3)])
@@ -42,7 +48,7 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
         if cost <= DONE_M**2 or patience == 0 or damping > LARGEST_DAMPING:
             break
         jacobian = _jacobian(chain, q, to_target, turn)
-        jacobian[error == 0.0] = 0.0  # within its tolerance: leave it free
+        jacobian[error == 0.0] = 0.0  # errors within their tolerance do not restrict the step
         gradient = jacobian.T @ error
         free = ~(((q <= lower) & (gradient > 0.0)) | ((q >= upper) & (gradient < 0.0)))
         if not free.any():
@@ -66,7 +72,8 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
 
 
 def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
-    """Returns the error in excess of the tolerances [m], and the rotation vector from target to link [rad]."""
+    """Returns the 6 errors that exceed the tolerances, rotations times `LEVER_M` [m], and the rotation vector from
+    target to link [rad]."""
     off = goal.off(chain.frame(q.tolist()))
     error = np.array(goal.beyond(off))
     error[3:] *= LEVER_M
@@ -74,10 +81,16 @@ def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list
 
 
 def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
-    """Returns the Jacobian of the error, without regard to tolerances, 6 x n.
+    """Returns the Jacobian of the 6 errors by the n joints, ignoring tolerances, 6 x n.
 
-    The derivative of a rotation vector is the angular velocity times the inverse of the left Jacobian of SO(3)
-    (Barfoot, State Estimation for Robotics, 2017, section 7.1.5).
+    The derivative of a rotation vector is the inverse left Jacobian of SO(3) times the angular velocity (Barfoot, State
+    Estimation for Robotics, 2017, section 7.1.5).
+
+    Args:
+        chain: The chain.
+        q: n joint positions [rad or m].
+        to_target: Rotation from the base to the axes of the target, 3 x 3.
+        turn: Rotation vector from target to link [rad].
     """
     x, y, z = turn
     angle = math.hypot(x, y, z)

@@ -1,4 +1,4 @@
-"""The common part of solvers of one link's pose."""
+"""Base class of the solvers that bring one link to a target pose."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from .kdl import Goal, KdlChain
 
 
 class ChainConfig(ConfigModel):
-    """Options of every solver of one link's pose.
+    """Options of every solver that brings one link to a target pose.
 
     Attributes:
-        urdf_filename: The robot; `{package}/path` and `package://` are resolved.
-        base_link: The link that targets are expressed in; above the tip.
-        tip_link: The link that is moved to the target.
+        urdf_filename: The robot's URDF; `{package}/path` and `package://` are resolved.
+        base_link: Link in whose frame targets are expressed; an ancestor of the tip.
+        tip_link: Link that is moved to the target.
     """
 
     urdf_filename: ExistingFile
@@ -38,7 +38,7 @@ class ChainConfig(ConfigModel):
 
     @cached_property
     def chain(self) -> Chain:
-        """The chain between the links."""
+        """The chain from `base_link` to `tip_link`."""
         return Chain(self.urdf_filename, self.base_link, self.tip_link)
 
     @model_validator(mode="after")
@@ -54,15 +54,15 @@ class ChainConfig(ConfigModel):
 
 
 class ChainSolver(Solver):
-    """Brings the tip of a chain of joints to a target.
+    """Brings the tip of a chain of joints to a target pose.
 
-    Thread-safe by a lock. A subclass only searches for positions. This class brings them into limits and checks them by
-    forward kinematics, so a reported success is always true.
+    Subclasses only search for joint positions. This class moves the positions into the limits and checks them by
+    forward kinematics, so a reported success is always true. A lock makes `solve` thread-safe.
 
     Attributes:
-        description: The chain in the URDF.
-        chain: Its kinematics.
-        limits: Limits of its joints.
+        description: The chain, read from the URDF.
+        chain: Kinematics of the chain.
+        limits: Limits of the n joints.
     """
 
     Config: ClassVar[type[ChainConfig]] = ChainConfig
@@ -77,7 +77,7 @@ class ChainSolver(Solver):
         self._lock = threading.Lock()
 
     def use_limits(self, limits: Limits) -> None:
-        """Sets the limits of the n joints."""
+        """Replaces the limits of the n joints."""
         self.limits, self.lower, self.upper = limits, limits.lower, limits.upper
         self._start_limits = StartLimits(self.joint_names, limits)
 
@@ -87,19 +87,19 @@ class ChainSolver(Solver):
 
         Args:
             problem: The problem.
-            goal: Its target with tolerances.
-            start: n positions within limits [rad or m].
+            goal: The problem's target with tolerances.
+            start: Start of the search: n positions within the limits [rad or m].
 
         Returns:
-            Solutions with n positions each, the best first; empty if none was found.
+            Solutions with n positions each, the best first. May be empty, or contain positions that miss the goal.
         """
 
     def solve(self, problem: IKProblem) -> IKSolution:
         """Searches for joint positions that bring the tip to the target.
 
         Raises:
-            ValueError: If the problem has no target, or a requirement that the solver does not support.
-            UnknownNameError: If the robot has no joint of a name in `start`.
+            ValueError: If the problem lacks a target, or has a requirement that the solver does not support.
+            UnknownNameError: If `problem.start` names a joint that the robot does not have.
         """
         with self._lock:
             goal = Goal(problem)
@@ -118,17 +118,17 @@ class ChainSolver(Solver):
         )
 
     def residual(self, goal: Goal, q: Sequence[float]) -> Residual:
-        """Returns the error of the tip in excess of the tolerances at n positions [rad or m]."""
+        """Returns the tip's error, reduced by the goal's tolerances, at n joint positions [rad or m]."""
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
-        """Returns whether the target is beyond the reach of the chain."""
+        """Returns whether the target's position is certainly unreachable, see `Reach`; false without a target."""
         if problem.target is None:
             return False
         return not self.description.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
 
     def _start(self, given: Mapping[str, float]) -> list[float]:
-        """Returns n positions within limits [rad or m]."""
+        """Completes start positions by the middle of the limits, moves them into the limits, and returns them."""
         for name in given:
             if name not in self.description.robot_joints:
                 raise UnknownNameError("joint", name, self.joint_names)
@@ -143,10 +143,14 @@ class ChainSolver(Solver):
 
 
 def refuse_mimics(config: ChainConfig, solver: str) -> None:
-    """Refuses chains with joints that mimic others.
+    """Checks that a chain has no mimic joints.
+
+    Args:
+        config: Options with the chain.
+        solver: Name of the solver, for the message.
 
     Raises:
-        ConfigError: If there are some; it names them.
+        ConfigError: If the chain has mimic joints; the error names them.
     """
     if mimics := config.chain.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
@@ -157,15 +161,20 @@ _COUNTS_AS_REACHED = {"position_tolerance": POSITION_TOLERANCE_M, "rotation_tole
 
 
 def large_tolerances(problem: IKProblem) -> list[str]:
-    """Returns the tolerances, by field, that exceed the tolerance of success."""
+    """Returns the names of the tolerance fields of a problem that exceed the default tolerance of a reached target."""
     return [name for name, most in _COUNTS_AS_REACHED.items() if max(getattr(problem, name)) > most]
 
 
 def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
-    """Refuses tolerances that exceed the tolerance of success; `may_turn` allows those for rotations.
+    """Checks that the tolerances of a problem do not exceed the default tolerance of a reached target.
+
+    Args:
+        problem: The problem.
+        solver: Name of the solver, for the message.
+        may_turn: Whether larger tolerances for rotations are allowed.
 
     Raises:
-        ValueError: If there are some; it names the field.
+        ValueError: If a tolerance is larger; the message names the field.
     """
     for name in large_tolerances(problem):
         if not (may_turn and name == "rotation_tolerance"):

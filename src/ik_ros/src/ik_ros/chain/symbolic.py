@@ -1,4 +1,7 @@
-"""Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel lacks CasADi bindings."""
+"""Symbolic kinematics of a chain in CasADi: link poses, and distances of spheres on links from obstacles.
+
+Pinocchio cannot be used here, since its wheel lacks CasADi bindings.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,15 +15,18 @@ from robot_model.chain import Chain
 from robot_model.urdf.elements import UrdfJoint
 
 SMALL = 1e-12
-"""Added under square roots to keep them smooth at 0 [m^2]."""
+"""Constant added below square roots, so that they are smooth at 0 [m^2]."""
 
 
 def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
-    """Returns rotation (3 x 3) and position (3) [m] of each link of a chain in the base.
+    """Returns the pose of each link of a chain in the base, by link name.
 
     Args:
-        chain: The chain; none of its joints mimics another.
-        q: n positions [rad or m], CasADi's symbols.
+        chain: The chain, which must not have mimic joints.
+        q: Symbolic positions of the n joints [rad or m].
+
+    Returns:
+        Rotation matrix, 3 x 3, and position, 3 numbers [m], of each link.
     """
     rotation: Any = casadi.DM.eye(3)
     position: Any = casadi.DM.zeros(3)
@@ -38,11 +44,11 @@ def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
 
 
 def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[Any, Any]]) -> list[Any]:
-    """Returns the distance of each sphere on a link from each shape in the base [m]; negative if they penetrate.
+    """Returns the distance of each sphere on a link from each obstacle [m]; negative if they penetrate each other.
 
     Args:
-        shapes: Spheres on links of the chain, and shapes fixed in the base.
-        frames: Rotation and position of each link in the base.
+        shapes: Spheres on links of the chain, and obstacles, which are shapes fixed in the base.
+        frames: Pose of each link in the base, see `link_frames`.
     """
     obstacles = [shape for shape in shapes if shape.link is None]
     distances = []
@@ -54,7 +60,7 @@ def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[A
 
 
 def rotation_vector(rotation: Any) -> Any:
-    """Returns axis times angle of a symbolic rotation [rad], smooth except at half a turn."""
+    """Converts a symbolic rotation matrix to a rotation vector [rad], smooth except at half a turn."""
     trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
     w = 0.5 * casadi.sqrt(casadi.fmax(1.0 + trace, 1e-9))
     difference = (rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1])
@@ -64,7 +70,7 @@ def rotation_vector(rotation: Any) -> Any:
 
 
 def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
-    """Returns the rotation and translation of a joint's child, in the joint's frame."""
+    """Returns rotation matrix and translation [m] of a joint's motion to the position q, in the joint's frame."""
     if not joint.is_revolute:
         return casadi.DM.eye(3), np.array(joint.axis) * q
     cross = casadi.skew(casadi.DM(joint.axis))
@@ -73,7 +79,7 @@ def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
 
 
 def _distance(point: Any, obstacle: ShapeConfig) -> Any:
-    """Returns the distance of a point from the surface of a shape."""
+    """Returns the distance of a point in the base from the surface of an obstacle; negative inside [m]."""
     half, radius = obstacle.core
     local = Rotation.from_quat(obstacle.orientation).as_matrix().T @ (point - np.array(obstacle.position))
     if not obstacle.core.is_box:

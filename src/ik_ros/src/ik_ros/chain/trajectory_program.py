@@ -1,4 +1,4 @@
-"""Splines of joints, and the nonlinear program that shapes them."""
+"""Joint splines, and the nonlinear program that computes their control points."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,9 +15,9 @@ from .symbolic import link_frames, rotation_vector, sphere_distances
 
 DEGREE = 3
 SAMPLES = 2
-"""Number of points in each interval of the spline at which distances to obstacles are constrained."""
+"""Number of samples in each interval of the spline at which distances to obstacles are constrained."""
 SAFETY_M = 5e-3
-"""Additional clearance at these points [m], since spheres may come nearer between them."""
+"""Clearance added at the samples [m], since spheres may come nearer to obstacles between two samples."""
 ITERATIONS = 100
 OPTIONS: Any = {
     "print_time": False,
@@ -37,17 +37,18 @@ OPTIONS: Any = {
 class Spline:
     """Cubic B-splines over the time from 0 to 1, for any number of joints.
 
-    A B-spline is a convex combination of its control points, and so are its derivatives: limits that hold at the
-    control points hold everywhere (de Boor, A Practical Guide to Splines, 1978). Accelerations are piecewise linear.
+    At each time, a B-spline is a convex combination of its control points. The same holds for its derivatives and their
+    control points. So limits that hold at all control points hold at all times (de Boor, A Practical Guide to Splines,
+    1978). Accelerations are piecewise linear.
 
     Args:
-        intervals: Number of successive polynomials.
+        intervals: Number of polynomials of the spline.
 
     Attributes:
         count: Number m of control points.
-        times: Time of the largest weight of each control point, from 0 to 1: the mean of its knots.
-        to_velocity: Control points of the velocity from those of the position, (m - 1) x m.
-        to_acceleration: The same of the acceleration, (m - 2) x m.
+        times: Time of each control point, from 0 to 1, as the mean of the control point's knots.
+        to_velocity: Matrix from position control points to velocity control points, (m - 1) x m.
+        to_acceleration: Matrix from position control points to acceleration control points, (m - 2) x m.
     """
 
     def __init__(self, intervals: int) -> None:
@@ -60,23 +61,23 @@ class Spline:
         self.to_acceleration = self._spline.derivative(2).c[: self.count - 2]
 
     def basis(self, times: np.ndarray, order: int = 0) -> np.ndarray:
-        """Returns the weight of each control point.
+        """Returns the matrix that maps the m control points to the spline's values at k times.
 
         Args:
             times: k times from 0 to 1.
-            order: 0 for positions, 1 for velocities, 2 for accelerations, per unit of time.
+            order: Order of the derivative: 0 for positions, 1 for velocities, 2 for accelerations.
 
         Returns:
-            k x m numbers; times the control points, they are the k values.
+            The matrix, k x m.
         """
         return np.asarray((self._spline.derivative(order) if order else self._spline)(times))
 
     @property
     def roughness(self) -> np.ndarray:
-        """The matrix of the integral of the squared acceleration, m x m."""
+        """Matrix R, m x m: p R p is the integral of the squared acceleration of a spline with control points p."""
         pair = np.array(((2.0, 1.0), (1.0, 2.0))) / (
             6.0 * self.intervals
-        )  # integral of the square of a line, from its ends
+        )  # integral of the square of a linear function, given by its end values
         weights = np.zeros((self.count - 2,) * 2)
         for i in range(self.intervals):
             weights[i : i + 2, i : i + 2] += pair
@@ -84,16 +85,16 @@ class Spline:
 
 
 class Program:
-    """Finds the smoothest splines that pass all waypoints within limits; Ipopt solves it.
+    """Nonlinear program for the smoothest splines that pass through all waypoints within limits, solved by Ipopt.
 
     Args:
         chain: The chain.
-        shapes: Spheres on its links, and obstacles in the base to avoid.
+        shapes: Spheres on links of the chain, and obstacles fixed in the base.
         intervals: Number of polynomials of each joint's spline.
         waypoints: Number of waypoints.
 
     Attributes:
-        spline: The splines.
+        spline: Basis of the splines.
     """
 
     def __init__(self, chain: Chain, shapes: Sequence[ShapeConfig], intervals: int, waypoints: int) -> None:
@@ -109,7 +110,7 @@ class Program:
         target = casadi.reshape(pose[:9], 3, 3)
         off = casadi.vertcat(target.T @ (position - pose[9:]), rotation_vector(target.T @ rotation))
         to_off = casadi.Function("off", [q, pose], [off])
-        postures = casadi.MX.sym("postures", joints, waypoints)  # unknowns too, so that the Hessian stays sparse
+        postures = casadi.MX.sym("postures", joints, waypoints)  # additional unknowns, so that the Hessian is sparse
         passed = to_off.map(waypoints)(postures, poses)
         distances = sphere_distances(shapes, frames)
         times = np.linspace(0.0, 1.0, SAMPLES * spline.intervals + 1)[1:]
@@ -144,25 +145,28 @@ class Program:
         clearance: float,
         guess: np.ndarray,
     ) -> tuple[np.ndarray, str]:
-        """Solves it over the time from 0 to 1, for n joints, m control points and w waypoints.
+        """Solves the program for n joints, m control points and w waypoints.
+
+        The unit of time is the duration of the trajectory.
 
         Args:
             start: n start positions, at rest [rad or m].
-            poses: Rotation (9 numbers, by columns) and position (3) of each waypoint, 12 x w.
-            basis: Weight of each control point at each waypoint, w x m.
-            tolerance: Largest errors of the tip at a waypoint, along and about its axes: 6 numbers [m, rad].
+            poses: Poses of the waypoints in the base, 12 x w: 9 numbers of the rotation matrix, column by column, and 3
+                numbers of the position [m].
+            basis: Matrix from control points to the positions at the waypoints, w x m, see `Spline.basis`.
+            tolerance: Largest errors of the tip at a waypoint: 3 along [m] and 3 about [rad] the waypoint's axes.
             limits: Limits of the n joints.
-            max_velocity: n largest speeds, per unit of time.
-            max_acceleration: n largest accelerations, per unit of time squared.
+            max_velocity: Largest speeds of the n joints, per unit of time.
+            max_acceleration: Largest accelerations of the n joints, per unit of time squared.
             clearance: Smallest distance of spheres from obstacles [m].
-            guess: m x n control points to start from.
+            guess: Control points where the search starts, m x n [rad or m].
 
         Returns:
-            m x n control points within limits [rad or m], and Ipopt's status.
+            Control points within the limits, m x n [rad or m], and Ipopt's status.
         """
         count = self.spline.count
         lower, upper = (np.tile(ends, (count, 1)) for ends in (limits.lower, limits.upper))
-        lower[:2] = upper[:2] = start  # two equal control points: at rest at that end
+        lower[:2] = upper[:2] = start  # two equal control points at the start: the spline starts at rest
         speed = np.tile(max_velocity, (count - 1, 1))
         speed[-1] = 0.0
         change = np.tile(max_acceleration, (count - 2, 1))
@@ -188,5 +192,5 @@ class Program:
 
 
 def _sparse(matrix: np.ndarray) -> casadi.DM:
-    """Returns a matrix with its zeros as structural ones, so that derivatives do not depend on them."""
+    """Converts a matrix to a sparse CasADi matrix, so that CasADi leaves out its zeros in derivatives."""
     return casadi.sparsify(casadi.DM(matrix))

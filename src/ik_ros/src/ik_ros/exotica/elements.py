@@ -1,4 +1,4 @@
-"""The elements of an EXOTica problem as models: their fields, types and defaults, and notations of rotations."""
+"""Pydantic models of the XML elements of an EXOTica problem, and EXOTica's notations of rotations."""
 
 from __future__ import annotations
 
@@ -42,14 +42,18 @@ NOTATIONS: Mapping[str, tuple[int, Callable[[Sequence[float]], Rotation]]] = {
     "Quaternion": (4, _checked_quaternion),
     "Matrix": (9, _checked_matrix),
 }
-"""Count of numbers of each notation, and their rotation."""
+"""For each notation: number of values, and the function that converts the values to a rotation."""
 
 
 def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
-    """Returns the quaternion x, y, z, w of a rotation in one of the `NOTATIONS`.
+    """Converts a rotation to a quaternion x, y, z, w.
+
+    Args:
+        notation: A key of `NOTATIONS`.
+        numbers: The rotation in this notation.
 
     Raises:
-        ValueError: If the numbers are no rotation, or are too many or too few.
+        ValueError: If the numbers are not a rotation, or there are too many or too few.
     """
     count, make = NOTATIONS[notation]
     if len(numbers) != count:
@@ -87,10 +91,13 @@ def _flag(value: Any) -> Any:
 
 
 def pose_of(numbers: tuple[float, ...]) -> Pose:
-    """Returns the pose given by 3 numbers (position), 6 (with roll, pitch, yaw) or 7 (with a quaternion).
+    """Converts numbers to a pose.
+
+    Args:
+        numbers: Position x, y, z [m], alone or followed by roll, pitch, yaw [rad] or by a quaternion x, y, z, w.
 
     Raises:
-        ValueError: If there are others.
+        ValueError: If there are not 3, 6 or 7 finite numbers, or the quaternion is 0.
     """
     if len(numbers) not in (3, 6, 7) or not all(map(math.isfinite, numbers)):
         raise ValueError(f"expected 3, 6 or 7 finite numbers, got {list(numbers)}")
@@ -112,10 +119,10 @@ PoseNumbers = Annotated[Pose, BeforeValidator(_pose)]
 
 
 class ElementConfig(ConfigModel):
-    """An element with fields.
+    """Base class of the models of XML elements.
 
     Attributes:
-        IGNORED: Fields of EXOTica that have no effect here.
+        IGNORED: Names of EXOTica's fields that are accepted but have no effect here.
     """
 
     IGNORED: ClassVar[frozenset[str]] = frozenset(("Debug",))
@@ -123,21 +130,26 @@ class ElementConfig(ConfigModel):
 
 
 def element_of(model: type[Element], record: XmlRecord, file: str) -> Element:
-    """Returns the element of a record.
+    """Validates a record with the model of its element, and returns the model's instance.
+
+    Args:
+        model: Class of the element.
+        record: The record, as read from XML.
+        file: Path of the XML file, for messages and relative paths.
 
     Raises:
-        ConfigError: If a field is wrong; keys are relative to the element.
+        ConfigError: If a field is invalid; the keys in the error are relative to the element.
     """
     fields = {key: value for key, value in record.fields.items() if key not in model.IGNORED}
     return model.parse(fields, file)
 
 
 def list_of(models: Callable[[], Mapping[str, type[ElementConfig]]], kind: str) -> BeforeValidator:
-    """Returns the validator of a field that has records in it.
+    """Makes the validator of a field that contains a list of elements.
 
     Args:
-        models: Returns the models by tag; a record of another tag is rejected by its name.
-        kind: Noun for one of the records, in messages.
+        models: Function that returns the allowed models by tag. Elements with other tags are rejected.
+        kind: Noun for one of the elements, in messages.
     """
 
     def check(value: Any, info: ValidationInfo) -> Any:
@@ -168,7 +180,7 @@ def _refuse(kind: str, value: Any) -> Any:
 
 
 class MapFrame(ElementConfig):
-    """A frame of a task map: `Link` with its offset, in `Base` with its own."""
+    """A frame of a task map: the frame `Link` with `LinkOffset`, relative to the frame `Base` with `BaseOffset`."""
 
     Link: Text
     LinkOffset: PoseNumbers = Pose()
@@ -186,7 +198,7 @@ class LinkConfig(ElementConfig):
 
 
 class SceneConfig(ElementConfig):
-    """The robot and the frames around it; collisions are not checked."""
+    """The robot, and additional frames; collisions are not checked."""
 
     IGNORED = frozenset(
         (
@@ -207,7 +219,7 @@ class SceneConfig(ElementConfig):
 
 
 class CostConfig(ElementConfig):
-    """Weight of a task map in the costs, and its goal."""
+    """Weights `Rho` and goal of a task map in the costs."""
 
     Task: Text
     Rho: Numbers = ()
@@ -215,7 +227,7 @@ class CostConfig(ElementConfig):
 
 
 class SolverConfig(ElementConfig):
-    """The solver `IKSolver`."""
+    """The element `IKSolver`; only its number of iterations has an effect here."""
 
     IGNORED = frozenset(
         (

@@ -1,4 +1,4 @@
-"""The task maps of EXOTica that the table of tasks can express."""
+"""EXOTica's task maps, as far as tasks of the solver `tasks` can express them."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ XYZ, TURNS = ("x", "y", "z"), ("rx", "ry", "rz")
 
 
 class Situation(NamedTuple):
-    """State of a problem that the goals of tasks depend on.
+    """Parts of a problem that the goals of tasks depend on.
 
     Attributes:
         scene: The scene.
-        frames: Frames of the scene that the problem attaches elsewhere.
-        start: Start of the joints of the group [rad or m].
-        previous: Previous solutions, newest last.
+        frames: Frames of the scene that the problem attaches to another parent, by name.
+        start: Start positions of the group's joints, by name [rad or m].
+        previous: Previous solutions, the newest last.
     """
 
     scene: ExoticaScene
@@ -37,13 +37,13 @@ class Situation(NamedTuple):
 
 
 class MapTask(NamedTuple):
-    """A task that expresses a map, or a part of it.
+    """A task of the solver `tasks` that expresses a task map, or a part of a task map.
 
     Attributes:
         options: Options of the task, without name and weight.
-        rho: Its weight.
-        goal: Returns the goal of the task, from the numbers of the map's goal; None: it has none.
-        on_link: The frame that the task concerns, if any.
+        rho: EXOTica's weight of the task.
+        goal: Function that computes the task's goal from the numbers of the map's goal; None for a task without goal.
+        on_link: Frame that the task moves; None for tasks that do not concern a frame.
     """
 
     options: dict[str, Any]
@@ -53,10 +53,10 @@ class MapTask(NamedTuple):
 
 
 class TaskMap(ElementConfig):
-    """A task map: a function of the configuration, with a goal for its values.
+    """Base class of task maps. A task map computes values from the configuration, and has a goal for these values.
 
     Attributes:
-        is_about_links: Whether it concerns links; then success requires it.
+        is_about_links: Whether the map concerns links or the centre of mass. Such maps may be required for success.
     """
 
     is_about_links: ClassVar[bool] = False
@@ -64,24 +64,29 @@ class TaskMap(ElementConfig):
 
     @classmethod
     def kind(cls) -> str:
-        """Returns its name in EXOTica."""
+        """Returns the name of the map's type in EXOTica."""
         return cls.__name__.removesuffix("Map")
 
     @abstractmethod
     def size(self, scene: ExoticaScene) -> int:
-        """Returns the number of values of its goal."""
+        """Returns how many numbers the map's goal has."""
 
     @abstractmethod
     def parts(self, scene: ExoticaScene, rho: Sequence[float]) -> Iterator[MapTask]:
-        """Yields the tasks that express it; `rho` has the weights of its values."""
+        """Yields the tasks that together express the map.
+
+        Args:
+            scene: The scene.
+            rho: Weights of the map's values, see `weights`.
+        """
 
     def weights(self, scene: ExoticaScene) -> int:
-        """Returns the number of its weights."""
+        """Returns how many weights the map has."""
         return self.size(scene)
 
 
 def _groups(names: Sequence[str], rho: Sequence[float]) -> dict[float, list[str]]:
-    """Groups names by weight; names of weight 0 are left out."""
+    """Groups names by their weight in `rho`, and leaves out names with weight 0."""
     found: dict[float, list[str]] = {}
     for name, weight in zip(names, rho):
         if weight:
@@ -93,7 +98,7 @@ Frames = Annotated[tuple[MapFrame, ...], list_of(lambda: {"Frame": MapFrame}, "f
 
 
 class LinkMap(TaskMap):
-    """A map about poses of links in other frames."""
+    """Base class of the maps about positions, orientations or poses of links in other frames."""
 
     is_about_links = True
     axes: ClassVar[tuple[str, ...]]
@@ -101,17 +106,17 @@ class LinkMap(TaskMap):
 
     @property
     def notation(self) -> str | None:
-        """Notation of rotations in its goal; None: it has no rotations."""
+        """Notation of the rotations in the map's goal; None for a goal without rotations."""
         return None
 
     @property
     def positions(self) -> int:
-        """Count of coordinates in its goal."""
+        """Number of position coordinates of one frame in the map's goal."""
         return sum(axis in XYZ for axis in self.axes)
 
     @property
     def stride(self) -> int:
-        """Count of numbers of one frame."""
+        """Number of all numbers of one frame in the map's goal."""
         return self.positions + (NOTATIONS[self.notation][0] if self.notation else 0)
 
     def size(self, scene: ExoticaScene) -> int:
@@ -130,7 +135,7 @@ class LinkMap(TaskMap):
             on_link = OnLink(link, offset @ frame.LinkOffset)
             if len(set(own)) == 1:
                 groups = [(own[0], list(self.axes))] if own[0] else []
-            else:  # positions and rotations apart: the former are along the axes of the base
+            else:  # separate tasks for positions and rotations, since positions are along the axes of the base
                 split = [axes for axes in (XYZ, TURNS) if set(axes) & set(self.axes)]
                 weight = dict(zip(self.axes, own))
                 groups = [
@@ -161,7 +166,7 @@ class EffPositionMap(LinkMap):
 
 
 class EffPositionXYMap(LinkMap):
-    """Position of a link in the plane."""
+    """Position of a link along x and y."""
 
     axes = ("x", "y")
 
@@ -189,7 +194,7 @@ def _refuse_goal(values: Sequence[float], situation: Situation) -> None:
 
 
 class LookAtMap(TaskMap):
-    """The z axis of a link (`Base`) points at a frame (`Link`)."""
+    """Direction of a frame's z axis: `Base` is the frame on a moving link, `Link` is the frame to point at."""
 
     is_about_links = True
     EndEffector: Frames
@@ -237,7 +242,7 @@ class JointPoseMap(TaskMap):
     JointRef: Numbers = ()
 
     def joints(self, scene: ExoticaScene) -> tuple[str, ...]:
-        """Returns its joints."""
+        """Returns the names of the joints that the map concerns."""
         if not self.JointMap:
             return scene.joints
         if not all(index in range(len(scene.joints)) for index in self.JointMap):
@@ -266,13 +271,14 @@ class JointPoseMap(TaskMap):
         return goal
 
     def reference(self, joints: Sequence[str], situation: Situation) -> JointPositions:
-        """Returns the positions that its numbers are relative to [rad or m]."""
+        """Returns the positions by joint to which the numbers of the map's goal are added [rad or m]."""
         return dict(zip(joints, self.JointRef or (0.0,) * len(joints)))
 
 
 class _BackwardDifference(JointPoseMap):
     factors: ClassVar[tuple[float, ...]]
-    """Factors on the previous solutions, the newest first, for the positions that have no difference."""
+    """Factors of the previous solutions, the newest first. The sum of the products is the position at which the
+    difference is 0."""
     JointMap: Annotated[Numbers, Field(max_length=0)] = ()
     JointRef: Annotated[Numbers, Field(max_length=0)] = ()
     StartState: Numbers = ()
@@ -292,25 +298,25 @@ class _BackwardDifference(JointPoseMap):
 
 
 class JointVelocityBackwardDifferenceMap(_BackwardDifference):
-    """Difference from the previous solution."""
+    """First backward difference: joint positions minus the previous solution."""
 
     factors = (1.0,)
 
 
 class JointAccelerationBackwardDifferenceMap(_BackwardDifference):
-    """Second difference, of the last two solutions and this one."""
+    """Second backward difference of the joint positions and the last two solutions."""
 
     factors = (2.0, -1.0)
 
 
 class JointJerkBackwardDifferenceMap(_BackwardDifference):
-    """Third difference, of the last three solutions and this one."""
+    """Third backward difference of the joint positions and the last three solutions."""
 
     factors = (3.0, -3.0, 1.0)
 
 
 class JointLimitMap(TaskMap):
-    """Distance of joints beyond their limits, or beyond a share of them."""
+    """Distance of joints beyond their limits; `SafePercentage` is the fraction by which the ranges are narrowed."""
 
     SafePercentage: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.0
 
@@ -345,4 +351,4 @@ MAPS: Mapping[str, type[TaskMap]] = {
         JointLimitMap,
     )
 }
-"""The maps by their names in XML."""
+"""All task maps by their tags in XML."""

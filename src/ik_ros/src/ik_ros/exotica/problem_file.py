@@ -1,4 +1,4 @@
-"""EXOTica's XML files of one problem and its solver."""
+"""Reads EXOTica's XML files, which contain a problem and its solver."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ Element = TypeVar("Element", bound=ElementConfig)
 
 
 class UnconstrainedEndPoseProblem(ElementConfig):
-    """Costs of one configuration; `W`, which only guides EXOTica's steps, has no effect here."""
+    """A problem that minimises costs of one configuration.
+
+    The field `W` only weights the steps of EXOTica's own solver, and has no effect here.
+    """
 
     IGNORED = frozenset(("Debug", "StartTime", "DerivativeOrder", "W", "NominalState"))
     PlanningScene: Annotated[
@@ -32,7 +35,7 @@ class UnconstrainedEndPoseProblem(ElementConfig):
 
 
 class BoundedEndPoseProblem(UnconstrainedEndPoseProblem):
-    """The same within bounds; those of the URDF always hold."""
+    """An `UnconstrainedEndPoseProblem` with joint bounds, in addition to the URDF's joint limits."""
 
     IGNORED = frozenset(("Debug", "StartTime", "DerivativeOrder", "W"))
     LowerBound: Numbers = ()
@@ -45,11 +48,11 @@ PROBLEMS: dict[str, type[UnconstrainedEndPoseProblem]] = {
 
 
 class ProblemFile(NamedTuple):
-    """Content of a file.
+    """Content of an XML file.
 
     Attributes:
-        problem: Its problem.
-        solver: Its solver, if it has one.
+        problem: The first problem in the file.
+        solver: The first solver in the file; None for a file without solver.
     """
 
     problem: UnconstrainedEndPoseProblem
@@ -57,10 +60,11 @@ class ProblemFile(NamedTuple):
 
 
 def read_problem(path: str) -> ProblemFile:
-    """Returns the problem of a file and its solver; of several problems and solvers, the first ones, as EXOTica does.
+    """Reads the first problem and the first solver in a file, as EXOTica does.
 
     Raises:
-        ConfigError: If it cannot be read, or has what cannot be expressed; it names file and element.
+        ConfigError: If the file cannot be read, or contains an element that the tasks cannot express. The error names
+            file and element.
     """
     records = read_records(path)
     solvers = [record for record in records if record.kind.endswith("Solver")]

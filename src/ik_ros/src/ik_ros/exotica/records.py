@@ -1,4 +1,4 @@
-"""XML of EXOTica as plain records; no part of it is expanded or fetched."""
+"""Reads EXOTica's XML into plain records, without expanding entities or loading other files."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ MAX_ELEMENTS = 10_000
 
 
 class XmlRecord(NamedTuple):
-    """An element that has fields.
+    """An XML element with fields.
 
     Attributes:
-        kind: Its tag, such as `EffFrame`.
-        fields: Its attributes, and the elements in it: the text of each, or the records in it.
+        kind: Tag of the element, such as `EffFrame`.
+        fields: Value of each XML attribute and of each child element, by name. The value of a child element is its
+            text, or the list of its own child elements.
     """
 
     kind: str
@@ -36,10 +37,10 @@ class _Element:
 
 
 def read_records(path: str) -> list[XmlRecord]:
-    """Returns the records below the top element of a file.
+    """Reads the elements directly below the top element of a file.
 
     Raises:
-        ConfigError: If it cannot be read, is too large or nested too deeply, is no XML, or has a DOCTYPE.
+        ConfigError: If the file cannot be read, is too large or nested too deeply, is not XML, or has a DOCTYPE.
     """
     try:
         return [_record(element, element.tag) for element in _parse(read_file(path, MAX_BYTES)).children]
@@ -53,7 +54,7 @@ def read_records(path: str) -> list[XmlRecord]:
 
 
 def _parse(content: bytes) -> _Element:
-    """Returns the top element."""
+    """Parses XML, and returns the top element."""
     document = _Element("", {})
     open_elements, count = [document], 0
 

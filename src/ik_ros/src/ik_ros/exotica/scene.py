@@ -1,4 +1,4 @@
-"""The scene of an EXOTica problem: the robot's joints, and frames on it and around it."""
+"""The scene of an EXOTica problem: the robot, its joint group, and additional frames."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,11 +16,11 @@ from .elements import SceneConfig
 
 
 class OnLink(NamedTuple):
-    """A frame that moves with a link of the robot.
+    """A frame that is attached to a moving link of the robot.
 
     Attributes:
-        link: The link.
-        pose: Its pose in the link.
+        link: Name of the link.
+        pose: Pose of the frame in the link.
     """
 
     link: str
@@ -29,7 +29,7 @@ class OnLink(NamedTuple):
 
 @contextmanager
 def errors_of(key: str) -> Iterator[None]:
-    """Converts a `ValueError` or an unknown name to a `KeyedError` of a key."""
+    """Converts a `ValueError` or `UnknownNameError` to a `KeyedError` for the key `key`."""
     try:
         yield
     except KeyedError:
@@ -39,17 +39,17 @@ def errors_of(key: str) -> Iterator[None]:
 
 
 class ExoticaScene:
-    """The robot of a problem, the joints of its group, and the frames of the scene.
+    """The robot of a problem, the joints of its joint group, and the additional frames of the scene.
 
     Args:
-        config: The scene as the XML has it.
+        config: The scene, as read from XML.
 
     Attributes:
         robot: The robot.
-        joints: The n joints of the group.
+        joints: Names of the n moving joints in the group.
 
     Raises:
-        KeyedError: If something does not fit the robot.
+        KeyedError: If a field does not fit the robot; the error names the field.
         ConfigError: If URDF or SRDF cannot be read.
     """
 
@@ -72,15 +72,18 @@ class ExoticaScene:
                 self.place(name)
 
     def place(self, name: str, frames: Mapping[str, AttachedFrame] | None = None) -> OnLink | Pose:
-        """Returns the location of a frame: on a moving link, or fixed as a pose in the robot's root.
+        """Finds out whether a frame is fixed or moves with a link of the robot.
 
         Args:
-            name: A link of the robot, a frame of the scene, or empty for the root.
-            frames: Frames of the scene that have been attached elsewhere.
+            name: Name of a link, or of a frame of the scene; empty for the root.
+            frames: Frames of the scene that are attached to another parent than in the XML, by name.
+
+        Returns:
+            The moving link and the frame's pose in the link; for a fixed frame, the frame's pose in the robot's root.
 
         Raises:
-            UnknownNameError: If there is no such frame.
-            ValueError: If frames are attached in a circle.
+            UnknownNameError: If the frame, or a frame that it is attached to, does not exist.
+            ValueError: If frames are attached to each other in a loop.
         """
         attached = {**self._attached, **(frames or {})}
         pose, seen = Pose(), set()
@@ -99,11 +102,11 @@ class ExoticaScene:
         return self.robot.pose([0.0] * len(self.robot.joint_names), name) @ pose
 
     def fixed(self, name: str, frames: Mapping[str, AttachedFrame] | None = None) -> Pose:
-        """Returns the pose of a frame in the robot's root.
+        """Returns the pose of a fixed frame in the robot's root; see `place`.
 
         Raises:
-            UnknownNameError: If there is no such frame.
-            ValueError: If joints move it.
+            UnknownNameError: If the frame does not exist.
+            ValueError: If joints move the frame.
         """
         place = self.place(name, frames)
         if isinstance(place, OnLink):
@@ -111,11 +114,11 @@ class ExoticaScene:
         return place
 
     def moving(self, name: str) -> OnLink:
-        """Returns the link that a frame moves with.
+        """Returns the link that a frame moves with, and the frame's pose in the link; see `place`.
 
         Raises:
-            UnknownNameError: If there is no such frame.
-            ValueError: If no joint moves it.
+            UnknownNameError: If the frame does not exist.
+            ValueError: If the frame is fixed.
         """
         place = self.place(name)
         if not isinstance(place, OnLink):
@@ -123,11 +126,14 @@ class ExoticaScene:
         return place
 
     def check_attached(self, frames: Mapping[str, AttachedFrame]) -> None:
-        """Checks frames of a problem.
+        """Checks the frames that a problem attaches to another parent.
+
+        Args:
+            frames: The frames by name.
 
         Raises:
-            UnknownNameError: If the scene lacks one of them, or the object that it is attached to.
-            ValueError: If joints would move one; frames on the robot are those of the XML.
+            UnknownNameError: If the scene does not have a frame, or the parent of a frame.
+            ValueError: If a frame moves with the robot, in the XML or with the new parent.
         """
         for name in frames:
             if name not in self._attached:
@@ -137,7 +143,7 @@ class ExoticaScene:
 
 
 def _world_names(srdf: Element, file: str) -> set[str]:
-    """Returns the SRDF's names of the frame in which the root is fixed."""
+    """Returns the parent frames of the SRDF's virtual joints, which are names for the fixed frame of the root."""
     names = set()
     for joint in srdf.iter("virtual_joint"):
         if joint.get("type") != "fixed":
@@ -148,7 +154,14 @@ def _world_names(srdf: Element, file: str) -> set[str]:
 
 
 def _joints_of_group(srdf: Element, name: str, robot: RobotModel, inside: tuple[str, ...] = ()) -> set[str]:
-    """Returns the joints of a group, fixed ones included."""
+    """Returns the names of all joints of a group in the SRDF, fixed joints included.
+
+    Args:
+        srdf: Top element of the SRDF.
+        name: Name of the group.
+        robot: The robot.
+        inside: Names of the groups that contain this group, to detect loops.
+    """
     groups = {group.get("name", ""): group for group in srdf.findall("group")}
     if name not in groups:
         raise UnknownNameError("group of the SRDF", name, groups)

@@ -1,4 +1,4 @@
-"""EXOTica's problems and service, compatible with clients of the release, and `ik_setup_node.py exotica`."""
+"""EXOTica's messages and services, compatible with clients of the original package, and `ik_setup_node.py exotica`."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from ik_ros.solvers.exotica import ExoticaSolver
 
 INFO = "exotica_info"
-"""Service of the solver's node."""
+"""Name of the service with which the solver node describes its task maps."""
 
 
 def problem_in_exotica(message: EXOTicaProblem) -> IKProblem:
-    """Returns the problem in a message of the release's.
+    """Converts a message of the original package to a problem.
 
     Raises:
-        ValueError: If a number is not finite or out of its range, or lengths differ; it names the field.
+        ValueError: If a number is not finite or out of range, or lengths differ; the error names the field.
     """
     names, goals = message.task_map_names, message.task_map_goals
     if len(names) != len(goals):
@@ -57,7 +57,7 @@ def _pose_in(sync: EXOTicaSyncTf) -> Pose:
 
 
 def serve_info(solver: ExoticaSolver) -> None:
-    """Serves `exotica_info`: the names, types and sizes of task maps, and the joints."""
+    """Offers the service `exotica_info`, which returns names, types and sizes of the task maps, and the joint names."""
     names = list(solver.maps)
     response = EXOTicaInfoResponse(
         xml_filename=solver.config.xml_filename,
@@ -72,13 +72,13 @@ def serve_info(solver: ExoticaSolver) -> None:
 
 
 class SyncedFrame(NamedTuple):
-    """A frame of the scene that follows TF.
+    """A frame of the scene whose pose is read from TF.
 
     Attributes:
-        tf_parent: TF frame that its pose is in.
-        tf_child: TF frame that it follows.
-        exo_parent: Frame of the scene that it is attached to; empty for the root.
-        exo_child: The frame.
+        tf_parent: TF frame in which the pose is expressed.
+        tf_child: TF frame whose pose is read.
+        exo_parent: Frame of the scene that corresponds to `tf_parent`; empty for the root.
+        exo_child: Frame of the scene that gets the pose.
     """
 
     tf_parent: str
@@ -88,10 +88,10 @@ class SyncedFrame(NamedTuple):
 
 
 def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
-    """Returns the frames described by lines of four names; `''` is the empty name.
+    """Parses lines of four names, in the order of the attributes of `SyncedFrame`; `''` stands for the empty name.
 
     Raises:
-        ConfigError: If a line has more or fewer names.
+        ConfigError: If a line does not have four names.
     """
     frames = []
     for line in lines:
@@ -104,13 +104,13 @@ def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
 
 
 class ExoticaSetup:
-    """Publishes problems for the solver `exotica` as in the authors' release: goals of task maps, and frames.
+    """Publishes problems for the solver `exotica`, with goals of task maps and frames, as in the original package.
 
-    It waits for the solver's node before it begins, to learn its task maps.
+    First waits for the solver node, which describes its task maps.
 
     Raises:
-        ConfigError: If a parameter is wrong.
-        rospy.ROSInterruptException: If ROS shuts down while it waits.
+        ConfigError: If a parameter is invalid.
+        rospy.ROSInterruptException: If ROS shuts down during the wait.
     """
 
     def __init__(self) -> None:
@@ -150,7 +150,7 @@ class ExoticaSetup:
 
 
 def _info() -> EXOTicaInfoResponse:
-    """Waits for the solver's node and returns its task maps."""
+    """Waits for the solver node, and returns the description of its task maps."""
     service = rospy.ServiceProxy(INFO, EXOTicaInfo)
     rospy.loginfo("waiting for %s", service.resolved_name)
     service.wait_for_service()

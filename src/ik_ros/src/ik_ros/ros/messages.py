@@ -1,4 +1,4 @@
-"""Problems and solutions as messages."""
+"""Converts problems, joint positions, poses and trajectories to and from ROS messages."""
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Transform, Vector3
@@ -16,10 +16,10 @@ from robot_model.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:
-    """Returns the problem in a message, with its poses unchanged.
+    """Converts a message to a problem, without transforming its poses to another frame.
 
     Raises:
-        ValueError: If a number is not finite or out of its range, or lengths differ; it names the field.
+        ValueError: If a number is not finite or out of range, or lengths differ; the error names the field.
     """
     return IKProblem(
         target=pose_in(message.target) if message.has_target else None,
@@ -36,7 +36,7 @@ def problem_in(message: IKProblemMessage) -> IKProblem:
 
 
 def problem_in_trac_ik(message: TracIKProblem) -> IKProblem:
-    """Returns the problem in a message of the release's.
+    """Converts a `TracIKProblem`, a message of the original package, to a problem.
 
     Raises:
         ValueError: As for `problem_in`.
@@ -50,7 +50,7 @@ def problem_in_trac_ik(message: TracIKProblem) -> IKProblem:
 
 
 def problem_message(problem: IKProblem, header: Header) -> IKProblemMessage:
-    """Returns a problem as a message."""
+    """Converts a problem to a message."""
     message = IKProblemMessage(header=header, has_target=problem.target is not None, seed=problem.seed)
     if problem.target is not None:
         message.target = pose_message(problem.target)
@@ -66,10 +66,14 @@ def problem_message(problem: IKProblem, header: Header) -> IKProblemMessage:
 
 
 def positions_in(what: str, message: JointState) -> JointPositions:
-    """Returns positions by joint; none if the message has none.
+    """Converts a joint state to positions by joint; empty for an empty message.
+
+    Args:
+        what: Name of the field, for error messages.
+        message: The joint state.
 
     Raises:
-        ValueError: If lengths differ, a joint is named twice or a value is not finite; it names `what`.
+        ValueError: If lengths differ, names are missing or repeated, or a value is not finite.
     """
     try:
         values = JointValues.of(message.name, message.position)
@@ -81,12 +85,15 @@ def positions_in(what: str, message: JointState) -> JointPositions:
 
 
 def positions_message(positions: JointPositions) -> JointState:
-    """Returns positions by joint as a message."""
+    """Converts positions by joint to a joint state."""
     return JointState(name=list(positions), position=list(positions.values()))
 
 
 def trajectory_message(joint_names: tuple[str, ...], trajectory: SampledTrajectory | None) -> JointTrajectory:
-    """Returns a trajectory as a message, which starts on arrival; without a trajectory, it is empty."""
+    """Converts a trajectory to a message with stamp 0, which means that the motion starts when the message arrives.
+
+    Without a trajectory, the message is empty.
+    """
     if trajectory is None:
         return JointTrajectory()
     points = zip(trajectory.times_s, trajectory.positions, trajectory.velocities)
@@ -102,19 +109,19 @@ def trajectory_message(joint_names: tuple[str, ...], trajectory: SampledTrajecto
 
 
 def pose_in(message: PoseMessage) -> Pose:
-    """Returns the pose in a message; its numbers are not checked."""
+    """Converts a pose message to a pose, without checking the numbers."""
     p, q = message.position, message.orientation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
 def transform_in(message: Transform) -> Pose:
-    """Returns the pose in a transform; its numbers are not checked."""
+    """Converts a transform message to a pose, without checking the numbers."""
     p, q = message.translation, message.rotation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """Returns a pose as a message."""
+    """Converts a pose to a message."""
     return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
 
 

@@ -1,4 +1,4 @@
-"""`ik_setup_node.py SOLVER`: TF, joint states, tolerances and goals in, problems of inverse kinematics out."""
+"""`ik_setup_node.py SOLVER`: publishes inverse kinematics problems from TF, joint states, tolerances and goals."""
 
 import time
 from functools import partial
@@ -27,20 +27,20 @@ from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import FreshTf
 
 START_PATIENCE_S = 2.0
-"""Time without a start after which the node reports that problems wait for one [s]."""
+"""Time without a start position after which the node warns that it waits for one [s]."""
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
-"""Keys of `~config` that are not fields of the robot's problems."""
+"""Keys of `~config` that are not fields of the message `CalculateInverseKinematicsProblem`."""
 
 
 class SetupNode:
-    """Publishes a problem at a rate, while it is switched on and there is a target.
+    """Publishes problems at a fixed rate while switched on, if start and target are available.
 
     Args:
-        name: Name of the solver; it is in the names of topics and services.
+        name: Name of the solver, which is part of the names of topics and services.
 
     Raises:
-        ConfigError: If a parameter is wrong.
+        ConfigError: If a parameter is invalid.
     """
 
     def __init__(self, name: str) -> None:
@@ -109,13 +109,14 @@ def _fields(tolerances: dict[str, float]) -> dict[str, Any]:
 
 
 class RobotIKSetup:
-    """`pybullet` with `~config`: publishes problems as the topic `rpbi/NAME/ik` takes them; no solver node is needed.
+    """Publishes problems for the simulated robot's own inverse kinematics (`pybullet` with the parameter `~config`).
 
-    It waits for the robot before it begins, to learn the order of its joints.
+    The messages are of the type that the robot's topic `rpbi/NAME/ik` expects, so a solver node is not needed. First
+    waits for the robot, which knows the order of its joints.
 
     Raises:
-        ConfigError: If `~config` or a parameter is wrong.
-        rospy.ROSInterruptException: If ROS shuts down while it waits.
+        ConfigError: If `~config` or a parameter is invalid.
+        rospy.ROSInterruptException: If ROS shuts down during the wait.
     """
 
     def __init__(self) -> None:
@@ -154,7 +155,7 @@ class RobotIKSetup:
 
 
 def _joints_of(robot: str) -> tuple[str, ...]:
-    """Waits for a robot and returns the joints that a motor can move."""
+    """Waits for a robot, and returns the names of the joints that a motor can move."""
     service = rospy.ServiceProxy(f"rpbi/{robot}/robot_info", RobotInfo)
     rospy.loginfo("waiting for %s", service.resolved_name)
     service.wait_for_service()

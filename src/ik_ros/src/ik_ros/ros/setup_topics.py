@@ -1,4 +1,4 @@
-"""Topics of setup nodes: the parts of a problem in, problems out, and a watchdog for the solver."""
+"""Topics of setup nodes: receives start and previous solutions, publishes problems, and watches the solver node."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from .messages import positions_in
 
 QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
-"""Names of solvers in the authors' release."""
+"""Topics of the start position; the solvers of the original package have different names for this topic."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 LOOK_HZ = 1.0
 SILENT_AFTER_S = 5.0
-"""Longest time without a solution while problems are published [s]; beyond it, the solver is reported."""
+"""Time without a solution, while problems are published, after which the solver is reported as stopped [s]."""
 
 
 class ProblemInputs:
-    """Start and previous solutions of the next problem, received by topics.
+    """Receives start and previous solutions of the next problem from topics.
 
     Args:
-        topics: Prefix of the topics.
-        max_previous: Number of previous solutions that are kept.
-        start: Start until one is received; None if the problem waits for it.
+        topics: Prefix of the topic names.
+        max_previous: Largest number of previous solutions that are kept.
+        start: Start positions until a message is received; None if problems have to wait for a message.
 
     Attributes:
-        lock: Held while a message changes the next problem.
-        start: Positions by joint [rad or m].
-        previous: The same of previous solutions, the newest last.
+        lock: Lock that is held while a message is processed.
+        start: Start positions by joint [rad or m]; None before the first message.
+        previous: Previous solutions as positions by joint [rad or m], the newest last.
     """
 
     def __init__(self, topics: str, max_previous: int, start: JointPositions | None) -> None:
@@ -50,14 +50,20 @@ class ProblemInputs:
         self._topics, self._warn = topics, ThrottledWarning()
 
     def subscribe(self) -> None:
-        """Receives starts and previous solutions from now on."""
+        """Subscribes to the topics of start and previous solutions."""
         for topic in START_TOPICS:
             self.listen(topic, JointState, partial(self._on_start, topic))
         for topic in PREVIOUS_TOPICS:
             self.listen(topic, JointState, partial(self._on_previous, topic))
 
     def listen(self, topic: str, message_type: type, on_message: Callable[[rospy.Message], None]) -> None:
-        """Calls a function with each message of a topic below the prefix; its ValueError is logged."""
+        """Subscribes to a topic.
+
+        Args:
+            topic: Name of the topic, below the prefix.
+            message_type: Type of the messages.
+            on_message: Function that is called with each message. If it raises a ValueError, a warning is logged.
+        """
         full_name = f"{self._topics}/{topic}"
 
         def checked(message: rospy.Message) -> None:
@@ -84,16 +90,16 @@ def publish_problems(
     problem: Callable[[], rospy.Message | None],
     has_solver_node: bool = True,
 ) -> None:
-    """Publishes problems on the topic `ik` while switched on.
+    """Starts to publish problems on the topic `ik` at a fixed rate, while switched on by the service `toggle`.
 
     Args:
-        topics: Prefix of the service `toggle`, which switches it.
-        message_type: Type of the problems.
-        hz: The rate, in wall time [Hz].
-        start_on_init: Whether it is on from the start.
-        problem: Returns the next one; without one it returns None, or raises an `InterfaceError` or `ValueError` with
-            the reason.
-        has_solver_node: Whether to watch for answers of a solver node on `ik/solution`.
+        topics: Prefix of the name of the service `toggle`.
+        message_type: Type of the problem messages.
+        hz: Rate, in wall time [Hz].
+        start_on_init: Whether publishing is switched on initially.
+        problem: Function that returns the next problem. If a problem is not available, it returns None, or raises an
+            `InterfaceError` or `ValueError` with the reason, which is logged.
+        has_solver_node: Whether to expect answers of a solver node on `ik/solution`, see `SolverWatch`.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -118,7 +124,7 @@ def publish_problems(
 
 
 class SolverWatch:
-    """Reports a solver that has ended or does not answer, by a warning and in /diagnostics.
+    """Reports if the solver node has ended or does not answer: logs a warning, and publishes on /diagnostics.
 
     Args:
         problems: Publisher of the problems.
@@ -136,7 +142,7 @@ class SolverWatch:
         WallTimer(LOOK_HZ, self._look)
 
     def note_problem(self) -> None:
-        """Notes that a problem was published."""
+        """Tells the watch that a problem was published, so that it expects a solution."""
         with self._lock:
             if self._asked_s is None:
                 self._asked_s = time.monotonic()

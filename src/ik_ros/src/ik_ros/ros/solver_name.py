@@ -1,4 +1,4 @@
-"""The name of a solver in ROS: the argument of its nodes, and part of their names and topics."""
+"""Use of a solver's name in ROS: as the argument of its nodes, and as part of node, topic and service names."""
 
 import sys
 from collections.abc import Callable
@@ -11,21 +11,26 @@ from ik_ros.solvers import SOLVERS
 
 
 def topics_of(kind: str, name: str) -> str:
-    """Returns the prefix of the topics and services of a solver's node, `setup` or `solver`."""
+    """Returns the prefix of topic and service names for a node of a solver.
+
+    Args:
+        kind: Kind of the node, `setup` or `solver`.
+        name: Name of the solver.
+    """
     return f"ik/{kind}/{name.replace(':', '/').replace('.', '/')}"
 
 
 def trust_only_what_was_named() -> None:
-    """Restricts imports to the solver and the tasks that the node was started with."""
+    """Forbids imports of further plug-ins: only those that the node's options name at the start can be used."""
     trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import only plug-ins that their options name at the start")
 
 
 def run_for_solver(kind: str, make: Callable[[str], object]) -> None:
-    """Runs a node whose command line names the solver; without a name, it ends the program with 2.
+    """Runs a node for the solver that is named on the command line; without a name, exits with status 2.
 
     Args:
-        kind: `setup` or `solver`.
-        make: Makes the node for the solver of a name.
+        kind: Kind of the node, `setup` or `solver`.
+        make: Function that makes the node for the solver's name.
     """
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 1:

@@ -1,4 +1,4 @@
-"""`ik_solver_node.py SOLVER`: problems of inverse kinematics in, joint targets out."""
+"""`ik_solver_node.py SOLVER`: receives inverse kinematics problems, and publishes joint targets."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProbl
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
 }
-"""Message types of the topic `ik` of every solver, and their readers."""
+"""Message types that every solver accepts on the topic `ik`: message class, and function that converts a message."""
 
 
 class SolverNode:
-    """Solves problems from the topic while switched on, and from its service at any time.
+    """Solves problems from the topic `ik` while switched on, and problems from service calls at any time.
 
     Args:
         name: Name of the solver, or `module:Class`.
 
     Raises:
-        ConfigError: If a parameter is wrong.
-        MissingDependency: If a library is not installed.
+        ConfigError: If a parameter is invalid.
+        MissingDependency: If the solver needs a library that is not installed.
     """
 
     def __init__(self, name: str) -> None:
@@ -107,7 +107,7 @@ class SolverNode:
 
     def _listen(self) -> None:
         self._stream = self._new_stream()
-        # only the newest problem counts
+        # queue_size=1: older problems are dropped
         self._subscriber = rospy.Subscriber(
             "ik", rospy.AnyMsg, self._on_message, callback_args=self._stream, queue_size=1, tcp_nodelay=True
         )
@@ -129,7 +129,7 @@ class SolverNode:
             with self._solving:
                 if self._continuity is not None:
                     if not self._is_received:
-                        stream.restart()  # the robot has not moved: the first received target starts there
+                        stream.restart()  # nobody has received targets, so the robot has not moved
                     self._is_received = any(each.get_num_connections() for each in (self._target, self._solution))
                 problem = self._base.with_poses_in_it(read(message), header.frame_id)
                 solution = stream.solve(problem, header.stamp.to_sec())
@@ -141,7 +141,7 @@ class SolverNode:
             if not solution.success:
                 self._warn("ik/solution", solution.message)
         with self._publishing:
-            if stream is self._stream:  # may have been switched off meanwhile
+            if stream is self._stream:  # unless switched off in the meantime
                 self._publish(solution, target, header.stamp)
 
     def _publish(self, solution: IKSolution, target: Sequence[float] | None, stamp: rospy.Time) -> None:
@@ -182,7 +182,12 @@ class SolverNode:
         return EXOTicaResponse(*_in_short(self._solve_alone(problem_in_exotica, request.problem)))
 
     def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
-        """Returns the solver's answer to one problem, independent of the problems on the topic."""
+        """Solves one problem, independently of the problems on the topic, and returns the answer.
+
+        Args:
+            read: Function that converts the message to a problem.
+            message: The message with the problem.
+        """
         try:
             problem = read(message)
             with self._solving:
@@ -192,12 +197,12 @@ class SolverNode:
 
 
 def _in_short(solution: IKSolution) -> tuple[bool, str, JointState]:
-    """Returns an answer in the three fields of the authors' services."""
+    """Converts an answer to the three response fields of the services `TracIK` and `EXOTica`."""
     return solution.success, solution.message, JointState(name=solution.joint_names, position=solution.positions)
 
 
 def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:
-    """Returns the node's own private parameters, and all others."""
+    """Reads the private parameters; returns the parameters of the node itself, and the options of the solver."""
     given = rospy.get_param("~", {})
     own = {key: value for key, value in given.items() if key in SolverNodeParameters.model_fields}
     options = {key: value for key, value in given.items() if key not in own}

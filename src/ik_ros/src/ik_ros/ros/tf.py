@@ -1,4 +1,4 @@
-"""TF with a limited age, and the frame of a solver's poses."""
+"""Reads transforms that are not too old, and transforms poses to a solver's base frame."""
 
 import dataclasses
 import time
@@ -15,13 +15,14 @@ from .messages import transform_in
 
 
 class FreshTf:
-    """The pose of one frame in another while TF is up to date.
+    """Reads the pose of a TF frame in another frame, and rejects it if it is too old.
 
-    Age is measured in wall time, so TF of a stopped simulation is stale, too. Static transforms never are.
+    The age is the wall time since the transform's stamp last changed. So the transforms of a paused simulation become
+    too old as well. Static transforms are never too old.
 
     Args:
-        parent: The frame that poses are in.
-        child: The frame.
+        parent: Name of the frame in which the pose is expressed.
+        child: Name of the frame whose pose is read.
         timeout_s: Largest age of a pose [s].
     """
 
@@ -36,7 +37,7 @@ class FreshTf:
         """Returns the newest pose.
 
         Raises:
-            InterfaceError: If there is none, or it is too old.
+            InterfaceError: If TF does not have the transform, or the transform is too old.
         """
         try:
             message = self._buffer.lookup_transform(self._parent, self._child, rospy.Time(0))
@@ -52,10 +53,10 @@ class FreshTf:
 
 
 class BaseFrame:
-    """Transforms poses from other TF frames to a solver's base.
+    """Transforms the poses of problems to a solver's base frame.
 
     Args:
-        frame_id: TF frame of the base; if empty, poses are not transformed.
+        frame_id: TF frame of the solver's base; if empty, poses are not transformed.
     """
 
     def __init__(self, frame_id: str) -> None:
@@ -65,10 +66,14 @@ class BaseFrame:
             self._listener = TfListener(self._buffer)
 
     def with_poses_in_it(self, problem: IKProblem, frame_id: str) -> IKProblem:
-        """Returns a problem with its poses transformed from a TF frame to the base; an empty `frame_id` is the base.
+        """Returns the problem with target and waypoints transformed to the base.
+
+        Args:
+            problem: The problem.
+            frame_id: TF frame in which the problem's poses are expressed; empty for the base.
 
         Raises:
-            InterfaceError: If TF has no transform between the two frames.
+            InterfaceError: If TF does not have the transform between the two frames.
         """
         frame_id = frame_id.strip("/")
         if not self._frame_id or frame_id in ("", self._frame_id):

@@ -1,4 +1,4 @@
-"""`tf_to_floatarray_node.py`: a transform as bare numbers, for instance as the goal of a task."""
+"""`tf_to_floatarray_node.py`: publishes a transform as an array of numbers, for example as the goal of a task."""
 
 import rospy
 from std_msgs.msg import Float64MultiArray
@@ -16,10 +16,10 @@ QUEUE_SIZE = 10
 
 
 class TfToFloatArrayNode:
-    """Publishes a transform on the topic `transform` as long as TF has it.
+    """Publishes a transform on the topic `transform` at a fixed rate, while TF has a recent transform.
 
     Raises:
-        ConfigError: If a parameter is wrong.
+        ConfigError: If a parameter is invalid.
     """
 
     def __init__(self) -> None:

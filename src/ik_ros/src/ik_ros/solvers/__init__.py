@@ -1,4 +1,4 @@
-"""The solvers; a new one is a class in a file of its own and a line here."""
+"""The table of solvers. To add a solver, write a class in a file of its own, and add a line here."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from ik_ros.solver import Solver
@@ -16,4 +16,5 @@ SOLVERS: PluginTable[Solver] = PluginTable(
         "trajectory": "ik_ros.solvers.trajectory:TrajectorySolver",
     },
 )
-"""All solvers; each is imported when it is looked up, so a missing library matters to its own solver only."""
+"""All solvers by name. A solver's module is imported when the solver is looked up, so a missing library only affects
+the solvers that need the library."""

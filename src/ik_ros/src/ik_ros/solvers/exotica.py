@@ -1,4 +1,4 @@
-"""Problems in EXOTica's XML, solved by the tasks of the solver `tasks`."""
+"""The solver `exotica`: solves problems in EXOTica's XML with the solver `tasks`."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ MAX_TASKS = 200
 
 
 class ExoticaConfig(ConfigModel):
-    """Options of this solver.
+    """Options of the solver `exotica`.
 
     Attributes:
         xml_filename: EXOTica's XML file, with one problem and its solver; `{package}/path` is resolved.
-        use_scipy_solver: Whether costs are weighted by Rho, as EXOTica's solver by SciPy does, and not by its square;
-            the file needs no solver then.
-        scipy_solver_method: Accepted; the method is that of the solver `tasks`.
-        tolerance_m: Largest error of a link that counts as met [m].
-        tolerance_rad: The same for rotations [rad].
+        use_scipy_solver: Whether the weight of a cost is Rho, as in EXOTica's SciPy solver, instead of the square of
+            Rho. If true, the file does not need to contain a solver.
+        scipy_solver_method: Accepted for compatibility, without effect.
+        tolerance_m: Largest position error of a link up to which a goal counts as met [m].
+        tolerance_rad: Largest rotation error of a link up to which a goal counts as met [rad].
     """
 
     xml_filename: ExistingFile
@@ -45,11 +45,11 @@ class ExoticaConfig(ConfigModel):
 
 
 class _Cost(NamedTuple):
-    """A task map with a cost, and the tasks that express it.
+    """The cost of a task map.
 
     Attributes:
-        goal: Its goal when problems have none.
-        parts: Its tasks by name.
+        goal: Default goal of the map, for problems without a goal for the map.
+        parts: The tasks that express the map, by name.
     """
 
     goal: tuple[float, ...]
@@ -60,12 +60,12 @@ class ExoticaSolver(Solver):
     """Solves an EXOTica problem: its XML is read, and its task maps become tasks of the solver `tasks`.
 
     Attributes:
-        config: Its options.
-        maps: All task maps by name, including those without a cost.
-        scene: The robot and the frames.
+        config: The options.
+        maps: All task maps by name, including task maps without a cost.
+        scene: The robot and the additional frames.
 
     Raises:
-        ConfigError: If the XML has an element that cannot be expressed; the error names file and element.
+        ConfigError: If the tasks cannot express an element of the XML; the error names file and element.
     """
 
     Config = ExoticaConfig
@@ -97,15 +97,16 @@ class ExoticaSolver(Solver):
         self.velocity_limits = self._solver.velocity_limits
 
     def map_size(self, name: str) -> int:
-        """Returns the count of numbers in the goal of a map."""
+        """Returns how many numbers the goal of a task map has."""
         return self.maps[name].size(self.scene)
 
     def solve(self, problem: IKProblem) -> IKSolution:
         """Searches for joint positions that minimise the costs.
 
         Raises:
-            ValueError: If a goal or a frame makes no sense, or there is a target and not exactly one EffFrame.
-            UnknownNameError: If the problem names a joint, map or frame that is not known.
+            ValueError: If a goal or frame is invalid, or the problem has a target that does not belong to a unique
+                task, see `_main_task`.
+            UnknownNameError: If the problem names an unknown joint, task map or frame.
         """
         for name in problem.goals:
             if name not in self.maps:
@@ -130,7 +131,12 @@ class ExoticaSolver(Solver):
         return self._solver.solve(dataclasses.replace(problem, goals=goals, previous=(), frames={}))
 
     def _costs_of(self, tasks: Sequence[CostConfig], key: str) -> Iterator[tuple[str, _Cost]]:
-        """Yields the maps that have costs."""
+        """Yields name and cost of each task map that has a cost.
+
+        Args:
+            tasks: The costs in the XML.
+            key: Path of the costs in the XML, for messages.
+        """
         seen = set()
         for task in tasks:
             name = task.Task
@@ -155,7 +161,7 @@ class ExoticaSolver(Solver):
             yield name, _Cost(task.Goal or (0.0,) * size, dict(zip(names, parts)))
 
     def _formulation(self, problem: Any) -> dict[str, Any]:
-        """Returns the options of the solver `tasks`."""
+        """Converts the EXOTica problem to options of the solver `tasks`."""
         joints = self.scene.joints
         rhos = [part.rho for cost in self._costs.values() for part in cost.parts.values() if part.rho]
         if not rhos:
@@ -207,7 +213,11 @@ class ExoticaSolver(Solver):
         return rho if self.config.use_scipy_solver else rho**2  # IKSolver minimises the square of Rho times the error
 
     def _main_task(self) -> str | None:
-        """Returns the task to which targets apply: that of the only EffFrame, or of the only map about one link."""
+        """Returns the name of the task that gets the target of a problem, or None.
+
+        This is the task of the only EffFrame map. Without an EffFrame map, it is the task of the only map about a link.
+        If the map consists of several tasks, there is no such task.
+        """
         links = [name for name in self._costs if isinstance(self.maps[name], LinkMap)]
         whole = [name for name in links if isinstance(self.maps[name], EffFrameMap)] or links
         return whole[0] if len(whole) == 1 and list(self._costs[whole[0]].parts) == whole else None

@@ -1,4 +1,4 @@
-"""Several solutions instead of one: elbow up, elbow down, the wrist flipped; the best first."""
+"""The solver `global`: returns several solutions, such as elbow up, elbow down or wrist flipped, the best first."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,17 +15,17 @@ from .kdl import KdlConfig, KdlSolver
 
 
 class GlobalConfig(KdlConfig):
-    """Options of `global`.
+    """Options of the solver `global`.
 
     Attributes:
-        restarts: Number of random starts after the given one, also when a solution is found. Fewer where starts are
-            slow or useless: 15 with tolerances or mimic joints, 3 beyond reach. The search also ends after 10 starts
-            that miss the target even without limits.
-        rank_by: Order of solutions: `distance_to_start`, the distance of all joints from the start [rad or m, root of
-            the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a limit is from the middle,
-            as a part of half its range.
-        distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
-        most: Largest number of returned solutions, including the best one.
+        restarts: Number of random starts after the given start, even if a solution is found before. The number is
+            reduced to 15 with tolerances or mimic joints, and to 3 for targets beyond reach. The search also ends if
+            the first 10 starts miss the target even without joint limits.
+        rank_by: Quantity by which solutions are sorted. `distance_to_start` is the Euclidean distance of the joint
+            positions from the start. `middle_of_limits` is the distance of a joint from the middle of its limits,
+            divided by half its range, for the joint with the largest value.
+        distinct: Two solutions count as distinct if a joint differs by more than this value [rad or m].
+        most: Largest number of returned solutions, including the best solution.
     """
 
     restarts: Count = 100
@@ -37,7 +37,7 @@ class GlobalConfig(KdlConfig):
 class GlobalSolver(KdlSolver):
     """Runs `kdl` from random starts and returns the distinct solutions.
 
-    Redundant robots have a continuum of solutions, of which it returns `distinct` samples.
+    Redundant robots have infinitely many solutions. The solver returns some of them that differ by at least `distinct`.
     """
 
     Config = GlobalConfig
@@ -51,7 +51,7 @@ class GlobalSolver(KdlSolver):
         }[config.rank_by]
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns distinct solutions, or else the best positions found; see `ChainSolver`."""
+        """Returns distinct solutions; without a solution, the best positions found. See `ChainSolver.find`."""
         found = [(self.residual(goal, q).size, q) for q in self.candidates(problem, goal, start, self._restarts)]
         solutions = sorted((self._cost(q, start), q) for size, q in found if size <= 1.0)
         if not solutions:
@@ -64,7 +64,10 @@ class GlobalSolver(KdlSolver):
         return kept
 
     def _off_middle(self, q: Sequence[float], start: Sequence[float]) -> float:
-        """Returns how far the joint nearest to a limit is from the middle of its limits, 1 at a limit."""
+        """Returns the largest distance of a joint from the middle of its limits, relative to half its range.
+
+        The value is 1 if a joint is at a limit.
+        """
         return max(
             2.0 * abs(position - middle) / (upper - lower) if upper > lower else 0.0
             for position, middle, lower, upper in zip(q, self.limits.middle, self.lower, self.upper)

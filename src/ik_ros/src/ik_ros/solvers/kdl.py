@@ -1,4 +1,4 @@
-"""The default solver: the Orocos Kinematics and Dynamics Library with restarts, limits and tolerances."""
+"""The default solver `kdl`: the Orocos Kinematics and Dynamics Library with restarts, joint limits and tolerances."""
 
 import math
 import random
@@ -14,28 +14,28 @@ from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem
 
 ITERATIONS = 60
-"""Most iterations from one start; if there is a solution, about 20 suffice."""
+"""Largest number of iterations from one start. For reachable targets, about 20 suffice."""
 THRESHOLD = 1e-5
-"""Residual at which KDL stops [m]; it counts a radian as 0.01 m."""
+"""Error at which KDL stops [m]; KDL counts 1 rad as 0.01 m."""
 RESTARTS_BEYOND_REACH = 3
-"""Number of further starts if the target is beyond reach, where only the nearest position can be found."""
+"""Number of random starts if the target is beyond reach, so that only the nearest positions can be found."""
 GIVE_UP_AFTER = 10
-"""Number of starts that miss the target even without limits after which the search ends.
+"""The search ends if this number of starts all miss the target, even without joint limits.
 
-Of 100 starts for a target within reach, 85 reach it with an arm of 6 joints, and at least 96 with one of 7.
+For reachable targets, 85 of 100 starts succeed with an arm of 6 joints, and at least 96 with an arm of 7 joints.
 """
 MAX_DESCENTS = 15
-"""Most random starts of our own descent, which takes ten times longer than KDL and ends within limits half of the
-time."""
+"""Largest number of random starts for `levenberg_marquardt`. It takes ten times longer than KDL, and about half of its
+descents reach the target within the limits."""
 NEAR_M, NEAR_RAD = 0.3, 0.8
-"""Distance from its target below which the tip keeps its posture [m]."""
+"""Distances [m and rad] between tip and target below which a solution is searched near the start posture first."""
 
 
 class KdlConfig(ChainConfig):
-    """Options of `kdl`.
+    """Options of the solver `kdl`.
 
     Attributes:
-        restarts: Number of random starts after the given one.
+        restarts: Largest number of random starts after the given start.
     """
 
     restarts: Count = 50
@@ -44,9 +44,9 @@ class KdlConfig(ChainConfig):
 class KdlSolver(ChainSolver):
     """KDL's Levenberg-Marquardt, extended by limits and tolerances.
 
-    It searches from the start for the nearest solution. If that is outside limits, random starts follow; if the start
-    is near the target, our own descent within limits is tried first. With tolerances or mimic joints, only our own
-    descent is used.
+    KDL first searches from the start. If the result is outside the limits, KDL searches from random starts. If the
+    start is near the target, the descent `levenberg_marquardt`, which respects limits, is tried before the random
+    starts. With tolerances or mimic joints, only this descent is used.
     """
 
     Config = KdlConfig
@@ -60,7 +60,7 @@ class KdlSolver(ChainSolver):
         self._to = PyKDL.JntArray(len(self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns the first solution, or else the best positions found; see `ChainSolver`."""
+        """Returns the first solution; without a solution, the best positions found. See `ChainSolver.find`."""
         best, least = start, math.inf
         for q in self.candidates(problem, goal, start, self._restarts):
             size = self.residual(goal, q).size
@@ -71,7 +71,14 @@ class KdlSolver(ChainSolver):
         return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Yields the result of each start, within limits: first of the given start, then of random ones [rad or m]."""
+        """Searches from the given start and from random starts, and yields each result within the limits [rad or m].
+
+        Args:
+            problem: The problem.
+            goal: The problem's target with tolerances.
+            start: The given start, n positions within the limits [rad or m].
+            restarts: Largest number of random starts.
+        """
         if not (goal.is_point and self.chain.is_plain):
             for first in self._starts(problem, start, min(restarts, MAX_DESCENTS)):
                 yield levenberg_marquardt(self.chain, goal, self.limits, first)
@@ -89,12 +96,21 @@ class KdlSolver(ChainSolver):
                 return
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Yields the given start, and then random ones."""
+        """Yields the given start, and then random starts."""
         most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
         return self.limits.starts(start, most, partial(random.Random, problem.seed))
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
-        """Returns KDL's result from `first`, brought into limits, and whether it reached the goal before that."""
+        """Searches with KDL, without limits, and then moves the result into the limits.
+
+        Args:
+            goal: The goal.
+            first: n positions where KDL starts [rad or m].
+            near: n positions to which equivalent angles should be near [rad or m].
+
+        Returns:
+            n positions within the limits [rad or m], and whether KDL reached the goal without limits.
+        """
         for i, position in enumerate(first):
             self._from[i] = position
         status = self._kdl.CartToJnt(self._from, goal.frame, self._to)

@@ -1,4 +1,4 @@
-"""PyBullet's inverse kinematics as in the simulator's robots, with restarts, limits and a residual."""
+"""The solver `pybullet`: PyBullet's inverse kinematics as for simulated robots, with restarts and joint limits."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from rpbi.kinematics.problem import PybulletProblem
 
 
 class PybulletConfig(ChainConfig):
-    """Options of `pybullet`; those with PyBullet's names have the same meaning as in `PybulletProblem`.
+    """Options of the solver `pybullet`, with the names and meanings of the fields of `PybulletProblem`.
 
-    Lists have one value for each joint of the chain.
+    Each list has one value for each joint of the chain.
     """
 
     lowerLimits: ListOf[float] = ()
@@ -42,18 +42,18 @@ class PybulletConfig(ChainConfig):
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options passed to PyBullet with each problem."""
+        """The options that are passed to PyBullet with each problem."""
         return self.model_dump(exclude=set(ChainConfig.model_fields))
 
 
 class PybulletSolver(ChainSolver):
     """The simulator's own solver, see docs/ik.md; for targets with or without an orientation.
 
-    Its random starts are the same for all seeds.
+    The random starts are the same for all seeds.
 
     Raises:
-        ConfigError: If a joint of the chain mimics another; it names the joint.
-        ValueError: If limits leave a joint no position.
+        ConfigError: If the chain has mimic joints; the error names them.
+        ValueError: If the limits in the options and in the URDF exclude each other.
     """
 
     Config = PybulletConfig
@@ -68,10 +68,10 @@ class PybulletSolver(ChainSolver):
         self.use_limits(question.narrowed(self._kinematics.limits, self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns the first solution, or else the best positions found; see `ChainSolver`.
+        """Returns the first solution; without a solution, the best positions found. See `ChainSolver.find`.
 
         Raises:
-            ValueError: If the problem has tolerances above the tolerance of success, other than any orientation.
+            ValueError: If a tolerance of the problem is too large for this solver. Free orientations are allowed.
         """
         refuse_boxes(problem, "pybullet", goal.any_orientation)
         assert problem.target is not None

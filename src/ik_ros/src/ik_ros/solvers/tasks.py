@@ -1,4 +1,4 @@
-"""The user's own problem formulation: weighted costs and hard constraints, solved by quadratic programs in sequence."""
+"""The solver `tasks`: minimises weighted costs subject to constraints, by sequential quadratic programming."""
 
 import random
 import threading
@@ -24,25 +24,26 @@ from ik_ros.tasks.gauss_newton import Candidate, GaussNewton, Iterate
 from ik_ros.tasks.robot import from_base, to_se3
 
 AIM = 0.1
-"""Share of the tolerances that the search aims at, so that solutions are safely within them."""
+"""Fraction of the tolerances at which the search ends, so that solutions are safely within the tolerances."""
 PATIENCE, PATIENCE_OF_MANY = 5, 25
-"""Number of iterations in which the violation of requirements has to halve, otherwise the search restarts: for one
-task, and for several, which may conflict at first."""
+"""Number of iterations within which the largest violation has to halve; otherwise the search restarts. The first number
+applies to a single task, the second to several tasks, which may conflict at first."""
 SETTLED = 1e-2
-"""Relative decrease of the costs in `PATIENCE` iterations below which they count as minimal."""
+"""Costs that decrease by less than this fraction within `PATIENCE` iterations count as minimal."""
 STANDSTILL = 1e-6
-"""Step at which the search ends [rad or m]."""
+"""The search from one start ends at steps smaller than this [rad or m]."""
 NEAR_RANGE = 0.5
-"""Standard deviation of random starts of a robot with a floating base, every other time [rad or m]."""
+"""Standard deviation of random starts around the given start [rad or m]. With a floating base, every other random start
+is drawn this way; all other random starts are drawn uniformly within the limits."""
 
 
 class TasksSolver(Solver):
     """Finds joint positions that minimise costs subject to constraints, all chosen by the user.
 
-    Thread-safe by a lock.
+    A lock makes the solver thread-safe.
 
     Attributes:
-        tasks: The tasks, with their robot.
+        tasks: The robot and the tasks.
     """
 
     Config = Formulation
@@ -69,9 +70,9 @@ class TasksSolver(Solver):
         """Searches for joint positions that satisfy the formulation.
 
         Raises:
-            ValueError: If a goal is missing or invalid, if a target has no task, or if a previous solution lacks a
-                joint that a task needs.
-            UnknownNameError: If the problem names a joint or task that is not known.
+            ValueError: If a goal is missing or invalid, if the problem has a target but the formulation has no main
+                task, or if a previous solution lacks a joint that a task needs.
+            UnknownNameError: If the problem names an unknown joint or task.
         """
         with self._lock:
             start = self._start(problem)
@@ -89,13 +90,13 @@ class TasksSolver(Solver):
         )
 
     def _start(self, problem: IKProblem) -> np.ndarray:
-        """Returns the configuration where the search starts, within limits."""
+        """Returns the configuration where the search starts, moved into the joint limits."""
         robot = self.tasks.robot
         q = robot.configuration({**self._config.start, **problem.start})
         return robot.with_positions(q, self._start_limits.wrap_to_limits(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
-        """Prepares all tasks for the problem."""
+        """Prepares all tasks and the Gauss-Newton search for a problem that starts at the configuration `start`."""
         for solution in problem.previous:
             self.tasks.robot.moving(solution)
         for name in problem.goals:
@@ -119,7 +120,7 @@ class TasksSolver(Solver):
         self._gauss_newton.begin()
 
     def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
-        """Returns the result of the first start that leads to a solution, or else the best of all."""
+        """Searches from several starts until a solution is found; returns the best candidate."""
         candidates = []
         for first in self._starts(problem, start):
             candidates.append(self._from(self._on_anchor(first)))
@@ -140,7 +141,10 @@ class TasksSolver(Solver):
             yield robot.with_positions(start, positions)
 
     def _on_anchor(self, q: np.ndarray) -> np.ndarray:
-        """Returns a configuration whose floating base puts the first constrained link at its target."""
+        """Moves a floating base such that the first link with a constrained pose is at its goal.
+
+        Without such a constraint, the base gets the pose in the options. A fixed base does not change.
+        """
         robot, anchor = self.tasks.robot, self.tasks.anchor
         if not robot.is_floating:
             return q
@@ -151,7 +155,7 @@ class TasksSolver(Solver):
         return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
 
     def _from(self, first: np.ndarray) -> Candidate:
-        """Returns the best candidate found from one start."""
+        """Searches from one start, and returns the best candidate."""
         candidates: list[Candidate] = []
         merits: list[float] = []
         for tried in self._gauss_newton(first):
@@ -159,7 +163,7 @@ class TasksSolver(Solver):
             merits.append(tried.merit)
             if self._is_at_its_end(candidates, merits, tried.step):
                 break
-        best = min(range(len(candidates)), key=lambda i: (candidates[i].rank, merits[i], -i))  # the last of equal ones
+        best = min(range(len(candidates)), key=lambda i: (candidates[i].rank, merits[i], -i))  # the last of equals
         return candidates[best]
 
     def _is_at_its_end(self, candidates: Sequence[Candidate], merits: Sequence[float], step: float) -> bool:

@@ -1,4 +1,4 @@
-"""TRAC-IK: a race of two solvers, one with limits from the start, one with restarts (Beeson and Ames, 2015)."""
+"""The solver `trac_ik`: TRAC-IK runs two methods in parallel, and takes the faster one (Beeson and Ames 2015)."""
 
 import math
 import random
@@ -26,14 +26,15 @@ _ENDS = set(ChainConfig.model_fields)
 
 
 class TracIkConfig(ChainConfig):
-    """Options of `trac_ik`.
+    """Options of the solver `trac_ik`.
 
     Attributes:
-        timeout: Longest search from one start [s]; solve types other than `Speed` always use all of it.
-        epsilon: Largest error of a solution [m, rad].
-        solve_type: `Speed` returns the first solution, `Distance` the one nearest to the start, `Manip1` and `Manip2`
-            the one with the largest product and the best ratio of the Jacobian's singular values.
-        restarts: Number of random starts after the given one; each has the whole timeout.
+        timeout: Longest search from one start [s]. Solve types other than `Speed` always use the whole time.
+        epsilon: Largest error of a solution [m and rad].
+        solve_type: Which solution is returned. `Speed`: the first. `Distance`: the nearest to the start. `Manip1`: the
+            one with the largest product of the Jacobian's singular values. `Manip2`: the one with the best ratio of the
+            Jacobian's singular values.
+        restarts: Number of random starts after the given start. Each start has its own timeout.
     """
 
     timeout: Annotated[float, Field(gt=0, le=60), Unit("s")] = 0.005
@@ -45,11 +46,11 @@ class TracIkConfig(ChainConfig):
 class TracIkSolver(ChainSolver):
     """The TRAC-IK library in the package `pytracik`, which omits Cartesian tolerances.
 
-    Targets with tolerances are solved by the search of `kdl` instead. The solver is not deterministic: two threads
-    race, and the result depends on timing.
+    Problems with tolerances are solved by the solver `kdl` instead. The result is not deterministic, since it depends
+    on the timing of two threads.
 
     Raises:
-        ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.
+        ConfigError: If the chain has a mimic joint, or a prismatic joint without limits; the error names the joint.
     """
 
     Config = TracIkConfig
@@ -69,7 +70,7 @@ class TracIkSolver(ChainSolver):
         self._trac_ik = pytracik.TRAC_IK(*ends, self.description.urdf, config.timeout, config.epsilon, solve_type)
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns TRAC-IK's solution, if it finds one; see `ChainSolver`."""
+        """Returns TRAC-IK's solution, or an empty list if TRAC-IK does not find a solution. See `ChainSolver.find`."""
         if large_tolerances(problem):
             return self._with_tolerances.find(problem, goal, start)
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())

@@ -1,4 +1,4 @@
-"""A whole joint trajectory through waypoints: smooth, within limits, clear of obstacles."""
+"""The solver `trajectory`: finds a smooth joint trajectory through waypoints, within limits and clear of obstacles."""
 
 from __future__ import annotations
 
@@ -33,33 +33,34 @@ from ik_ros.chain.symbolic import link_frames, sphere_distances
 from ik_ros.chain.trajectory_program import Program, Spline
 
 MAX_INTERVALS = 128
-"""Largest number of intervals of a spline; waypoints closer together than two intervals can hardly all be passed."""
+"""Largest number of intervals of a spline. If waypoints are less than two intervals apart, a spline can hardly pass
+through all of them."""
 MAX_WAYPOINTS = MAX_INTERVALS // 2
-"""Largest number of waypoints; more are refused, whatever their times."""
+"""Largest number of waypoints of a problem."""
 MAX_SAMPLES = 100_000
 KEPT_PROGRAMS = 4
-"""Number of compiled programs that are kept, one for each number of waypoints; the least recently used one is
-dropped."""
+"""Largest number of compiled programs in the cache. Each combination of intervals and waypoints needs its own program.
+"""
 CHECKS = 10
-"""Number of places in each interval at which the result is checked."""
+"""Number of samples in each interval at which the result is checked."""
 AIM = 0.01
-"""Share of the tolerance at waypoints that the program may use; the smoothest motion uses all of it."""
+"""Fraction of the default tolerances that the program may use at waypoints. The smoothest motion uses all it may."""
 SPARE = 1e-6
-"""Relative margin of speeds and accelerations, for rounding."""
+"""Relative margin of speed and acceleration limits, for rounding errors."""
 
 
 class TrajectoryConfig(KdlConfig):
-    """Options of `trajectory`.
+    """Options of the solver `trajectory`.
 
     Attributes:
-        duration_s: Time to the target, for problems with a target and no waypoints [s].
+        duration_s: Duration of the motion for problems that have a target but no waypoints [s].
         intervals: Smallest number of polynomials of each joint's spline.
-        sample_s: Time between the positions of the answer [s].
-        velocity_limits: Largest speed of joints [rad/s or m/s]; joints that are left out have that of the URDF.
-        acceleration_limits: Largest acceleration of joints [rad/s^2 or m/s^2].
-        shapes: Spheres on links, and obstacles in the base.
-        clearance: Smallest distance of all spheres from all obstacles [m].
-        attempts: Number of further attempts, with other positions at the waypoints.
+        sample_s: Time between two samples of the returned trajectory [s].
+        velocity_limits: Largest speed by joint [rad/s or m/s]; the URDF's limits apply to other joints.
+        acceleration_limits: Largest acceleration by joint [rad/s^2 or m/s^2]; other joints are not limited.
+        shapes: Spheres on links, and obstacles fixed in the base.
+        clearance: Smallest distance between spheres and obstacles [m].
+        attempts: Largest number of attempts; each attempt has different joint positions at the waypoints.
     """
 
     duration_s: Seconds = 2.0
@@ -91,7 +92,7 @@ class TrajectoryConfig(KdlConfig):
 class TrajectorySolver(KdlSolver):
     """Finds the smoothest motion from rest to rest that passes waypoints in time.
 
-    KDL finds positions for the waypoints; a nonlinear program then shapes a spline for each joint.
+    First, KDL finds joint positions at the waypoints. Then a nonlinear program computes a spline for each joint.
     """
 
     Config = TrajectoryConfig
@@ -110,11 +111,12 @@ class TrajectorySolver(KdlSolver):
         self._distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Searches for a trajectory through the waypoints; without waypoints, a trajectory to the target.
+        """Searches for a trajectory through the problem's waypoints, or to the target if there are no waypoints.
 
         Raises:
-            ValueError: If there is neither, or the waypoints do not follow each other in time or are too many.
-            UnknownNameError: If the robot has no joint of a name in `start`.
+            ValueError: If the problem has neither waypoints nor a target, has too many waypoints, or has waypoints
+                whose times do not increase.
+            UnknownNameError: If `problem.start` names a joint that the robot does not have.
         """
         waypoints = self._waypoints(problem)
         with self._lock:
@@ -134,7 +136,7 @@ class TrajectorySolver(KdlSolver):
         return answers[-1] if answers[-1].success else answers[0]
 
     def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
-        """Returns the checked waypoints of a problem."""
+        """Returns the waypoints of a problem, or its target as the only waypoint, after checking their times."""
         waypoints = problem.waypoints
         if not waypoints:
             if problem.target is None:
@@ -154,7 +156,17 @@ class TrajectorySolver(KdlSolver):
     def _postures(
         self, problem: IKProblem, waypoints: Sequence[Waypoint], start: Sequence[float], attempt: int
     ) -> tuple[list[Sequence[float]], IKSolution | None]:
-        """Returns joint positions at the waypoints, each near the previous ones; or the reason why there are none."""
+        """Finds joint positions at the start and at each waypoint, each near the positions before.
+
+        Args:
+            problem: The problem.
+            waypoints: The waypoints.
+            start: n start positions [rad or m].
+            attempt: Number of the attempt. From 1 on, the search begins at random positions.
+
+        Returns:
+            The joint positions, and None. If a waypoint has no solution, the second value is the failed answer.
+        """
         postures: list[Sequence[float]] = [start]
         if attempt:
             postures[0] = self.limits.random(random.Random(f"{problem.seed} {attempt}"), start)
@@ -175,7 +187,15 @@ class TrajectorySolver(KdlSolver):
         start: Sequence[float],
         postures: Sequence[Sequence[float]],
     ) -> IKSolution:
-        """Returns the trajectory through positions at the waypoints, or the requirement that it violates."""
+        """Computes the trajectory; returns an answer with the trajectory, or with the violated requirements.
+
+        Args:
+            problem: The problem.
+            waypoints: The waypoints.
+            goals: Target and tolerances of each waypoint.
+            start: n start positions [rad or m].
+            postures: Joint positions at the start and at the waypoints, as the initial guess.
+        """
         times_s = np.array([0.0, *(waypoint.time_s for waypoint in waypoints)])
         duration_s = float(times_s[-1])
         with self._program_lock:
@@ -221,7 +241,7 @@ class TrajectorySolver(KdlSolver):
         )
 
     def _program(self, times_s: np.ndarray) -> Program:
-        """Returns the program whose splines are fine enough for the waypoints."""
+        """Returns a program whose splines have enough intervals for the times of start and waypoints [s]."""
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MAX_INTERVALS:
@@ -229,11 +249,15 @@ class TrajectorySolver(KdlSolver):
         return self._compiled(intervals, len(times_s) - 1)
 
     def _nearest_m(self, q: np.ndarray) -> float:
-        """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
+        """Returns the smallest distance between a sphere and an obstacle in k configurations, k x n; inf without
+        spheres or obstacles [m]."""
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Returns the first speed or acceleration that exceeds its limit, checked on a fine grid."""
+        """Checks speeds and accelerations on a fine grid.
+
+        Returns a message for the largest violation of a speed limit, and for that of an acceleration limit.
+        """
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
@@ -255,7 +279,7 @@ class TrajectorySolver(KdlSolver):
 
 
 def _flat(waypoint: Waypoint) -> np.ndarray:
-    """Returns the rotation (by columns) and position of a waypoint, 12 numbers."""
+    """Returns a waypoint's pose as 12 numbers: the rotation matrix, column by column, and the position [m]."""
     position, quat_xyzw = waypoint.pose
     return np.concatenate((Rotation.from_quat(quat_xyzw).as_matrix().T.ravel(), position))
 

@@ -1,4 +1,4 @@
-"""The tasks of the solver `tasks`; a new one is a class in a file of its own and a line here."""
+"""The table of tasks for the solver `tasks`. To add a task, write a class in a file of its own, and add a line here."""
 
 from __future__ import annotations
 
@@ -27,4 +27,4 @@ TASKS: PluginTable[Task] = PluginTable(
         "distance": "ik_ros.tasks.distance:Distance",
     },
 )
-"""All types of tasks; each is imported when it is looked up, since they need Pinocchio."""
+"""All types of tasks by name. A task's module is imported when the task is looked up, since tasks need Pinocchio."""

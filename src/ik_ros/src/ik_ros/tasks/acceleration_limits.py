@@ -1,4 +1,4 @@
-"""Largest accelerations of joints from one solution to the next."""
+"""The task `acceleration_limits`: limits joint accelerations between successive solutions."""
 
 from collections.abc import Sequence
 
@@ -14,11 +14,11 @@ from .task import TaskConfig
 
 
 class AccelerationLimitsConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `acceleration_limits`.
 
     Attributes:
-        dt_s: Time between solutions [s].
-        limits: Largest acceleration of joints [rad/s^2 or m/s^2].
+        dt_s: Time between two successive solutions [s].
+        limits: Largest acceleration by joint name [rad/s^2 or m/s^2].
     """
 
     dt_s: Seconds

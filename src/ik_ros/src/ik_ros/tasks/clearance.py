@@ -1,4 +1,4 @@
-"""Distances between simple shapes, by hpp-fcl."""
+"""Distances between simple shapes, computed with hpp-fcl."""
 
 from typing import Any, NamedTuple
 
@@ -8,16 +8,16 @@ import numpy as np
 from ik_ros.shape import RoundedCore
 
 CROSSING_M = 1e-9
-"""Distance between two lines below which they have no direction [m]."""
+"""Distance between two cores up to which they count as intersecting, so that the direction is undefined [m]."""
 
 
 class RobotShape(NamedTuple):
-    """A shape at a link, or in the base.
+    """A shape that is attached to a link, or fixed in the base.
 
     Attributes:
-        core: The shape.
-        link_id: Pinocchio's index of its link; None: it is fixed in the base.
-        placement: Its pose in the link or base, a `pinocchio.SE3`.
+        core: Size of the shape, as a core and a radius.
+        link_id: Pinocchio's index of the link; None for a shape that is fixed in the base.
+        placement: Pose of the shape in the link, or in the base, as a `pinocchio.SE3`.
     """
 
     core: RoundedCore
@@ -29,10 +29,10 @@ class Clearance(NamedTuple):
     """Distance between two shapes.
 
     Attributes:
-        distance: Distance between the surfaces [m]; negative if they penetrate.
-        direction: Unit vector from the first to the second, in the base.
-        first: Nearest point of the first shape, fixed to that shape, in the base [m].
-        second: The same for the second shape.
+        distance: Distance between the surfaces; negative if the shapes penetrate each other [m].
+        direction: Unit vector from the first shape to the second, in the base.
+        first: Point of the first shape's core that is nearest to the second core, in the base [m].
+        second: Point of the second shape's core that is nearest to the first core, in the base [m].
     """
 
     distance: float
@@ -42,9 +42,16 @@ class Clearance(NamedTuple):
 
 
 def clearance(first: RoundedCore, place: Any, second: RoundedCore, other: Any) -> Clearance:
-    """Returns the distance of two shapes with their places in the base, each a `pinocchio.SE3`.
+    """Measures the distance between two shapes.
 
-    It is measured between cores, since hpp-fcl returns no direction for round shapes that penetrate.
+    The cores are measured, and the radii subtracted, since hpp-fcl returns no direction for round shapes that penetrate
+    each other.
+
+    Args:
+        first: The first shape.
+        place: Pose of the first shape in the base, a `pinocchio.SE3`.
+        second: The second shape.
+        other: Pose of the second shape in the base, a `pinocchio.SE3`.
     """
     result = hppfcl.DistanceResult()
     places = (hppfcl.Transform3f(each.rotation, each.translation) for each in (place, other))
@@ -59,5 +66,5 @@ def clearance(first: RoundedCore, place: Any, second: RoundedCore, other: Any) -
 
 
 def _core(core: RoundedCore) -> Any:
-    """Returns a box, or a line or point as a capsule of radius 0."""
+    """Converts a core to an hpp-fcl shape: a box, or a capsule of radius 0 for a line or point."""
     return hppfcl.Box(2.0 * core.half) if core.is_box else hppfcl.Capsule(0.0, 2.0 * core.half[2])

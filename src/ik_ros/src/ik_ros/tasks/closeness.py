@@ -1,4 +1,4 @@
-"""Staying near the previous solution."""
+"""The task `closeness`: keeps joints near the previous solution."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Position of the centre of mass."""
+"""The task `com`: moves the robot's centre of mass to a position."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -13,11 +13,11 @@ from .task import Linearization, Task, TaskConfig
 
 
 class ComConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `com`.
 
     Attributes:
-        goal: Its target, x, y, z in the base [m]; None: from each problem.
-        axes: Axes of the base that count.
+        goal: Target position x, y, z of the centre of mass in the base [m]. None: taken from each problem.
+        axes: Axes of the base along which the position has to match.
     """
 
     goal: Position | None = None

@@ -1,4 +1,4 @@
-"""Balance: the centre of mass stays over the support polygon."""
+"""The task `com_in_support`: keeps the centre of mass over the support polygon, for balance."""
 
 from collections.abc import Iterable, Sequence
 
@@ -12,11 +12,12 @@ from .task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class ComInSupportConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `com_in_support`.
 
     Attributes:
-        support: Contact points with the ground by link, in the link's frame [m], such as the corners of both soles.
-        margin: Smallest distance of the centre of mass from the edges of their polygon [m].
+        support: Contact points with the ground, such as the corners of both soles: for each link name, positions in the
+            link's frame [m].
+        margin: Smallest distance from the centre of mass to the edges of the support polygon [m].
     """
 
     support: dict[str, ListOf[Position]] = Field(min_length=1)
@@ -26,8 +27,8 @@ class ComInSupportConfig(TaskConfig):
 class ComInSupport(Task):
     """Keeps the centre of mass over the support polygon, seen along the z axis of the base, which is upright.
 
-    The polygon is the convex hull of the present contact points. Its motion is left out of the Jacobian, since standing
-    feet are held by constraints of their own.
+    The polygon is the convex hull of the present contact points. The Jacobian ignores the motion of the contact points,
+    since other constraints should hold the standing feet.
     """
 
     Config = ComInSupportConfig
@@ -41,7 +42,7 @@ class ComInSupport(Task):
             raise KeyedError("support", "expected 3 points at least")
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: distance of the centre of mass outside of each edge; negative inside [m]."""
+        """Returns the distance from each edge of the polygon to the centre of mass, negative inside [m]; see `Task`."""
         com, jacobian = self.robot.com(q)
         corners = self.polygon()
         edges = np.roll(corners, -1, axis=0) - corners
@@ -53,15 +54,15 @@ class ComInSupport(Task):
         return Linearization(values, outward @ jacobian[:2], np.full(len(values), -np.inf), upper)
 
     def polygon(self) -> np.ndarray:
-        """Returns the corners of the support polygon in the base, k x 2, counter-clockwise [m]."""
+        """Returns the k corners x, y of the support polygon in the base, counter-clockwise, k x 2 [m]."""
         points = [self.robot.frame(link).act(point) for link, points in self._contacts for point in points]
         return np.array(_hull((float(x), float(y)) for x, y, _ in points))
 
 
 def _hull(points: Iterable[tuple[float, float]]) -> Sequence[tuple[float, float]]:
-    """Returns the convex hull of points, counter-clockwise.
+    """Returns the corners of the convex hull of points, counter-clockwise.
 
-    After Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9(5),
+    Source: Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9(5),
     1979.
     """
     ordered = sorted(set(points))

@@ -1,4 +1,4 @@
-"""Distance between links, and between links and obstacles."""
+"""The task `distance`: keeps links away from each other and from obstacles."""
 
 from typing import Any
 
@@ -12,15 +12,15 @@ from .robot import PinocchioRobot
 from .task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAR_M = 0.3
-"""Pairs are considered up to this much beyond the required distance [m]."""
+"""Pairs that are further apart than the required distance plus this value are ignored [m]."""
 
 
 class DistanceConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `distance`.
 
     Attributes:
-        pairs: Names of two shapes each.
-        at_least: Smallest distance between them [m].
+        pairs: Pairs of shapes, each given by two names.
+        at_least: Smallest allowed distance between the two shapes of each pair [m].
     """
 
     pairs: ListOf[ListOf[Text]] = Field(min_length=1)
@@ -47,7 +47,7 @@ class Distance(Task):
             self._pairs.append((first, second))
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: the distance of each pair that is near [m]."""
+        """Returns the distance between the shapes of each pair, without pairs that are far apart [m]; see `Task`."""
         values, rows = [], []
         for first, second in self._pairs:
             found = clearance(first.core, self._place(first), second.core, self._place(second))
@@ -63,7 +63,13 @@ class Distance(Task):
         return shape.placement if shape.link_id is None else self.robot.frame(shape.link_id) * shape.placement
 
     def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Returns the derivative of a point of a shape along a direction by the free components."""
+        """Returns the derivative of a point's coordinate along a direction by the m free components, shape (m,).
+
+        Args:
+            shape: The shape that the point is fixed to.
+            point: Position of the point in the base [m].
+            direction: Unit vector in the base.
+        """
         if shape.link_id is None:
             return np.zeros(len(self.robot.free))
         frame = self.robot.frame(shape.link_id)

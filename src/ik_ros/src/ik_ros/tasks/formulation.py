@@ -1,4 +1,4 @@
-"""A user's problem formulation: the robot, the costs and the constraints."""
+"""The user's formulation of an inverse kinematics problem: robot, costs and constraints."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .robot import PinocchioRobot
 from .task import Task, TaskConfig, keyed_errors
 
 WORLD = "world"
-"""Default frame of poses for a floating base."""
+"""Default name of the frame in which poses are expressed, for a robot with a floating base."""
 
 
 def _of_its_type(value: Any, info: ValidationInfo) -> Any:
-    """Returns the options of a task, validated by the model of its type."""
+    """Validates the options of a task with the pydantic model that belongs to the task's type."""
     if not isinstance(value, Mapping):
         raise ValueError("expected a mapping with name, type and the options of the task")
     kind = value.get("type")
@@ -41,13 +41,13 @@ AnyTask = Annotated[TaskConfig, BeforeValidator(_of_its_type)]
 
 
 class FrameOnLinkConfig(ConfigModel):
-    """A frame at a link, such as the tip of a tool.
+    """A frame that is attached to a link, such as the tip of a tool.
 
     Attributes:
-        name: Its name in tasks.
-        link: The link.
-        position: Position in the link [m].
-        orientation: Orientation in it, quaternion x, y, z, w.
+        name: Name of the frame, which tasks use like a link name.
+        link: Name of the link.
+        position: Position of the frame in the link [m].
+        orientation: Orientation of the frame in the link, quaternion x, y, z, w.
     """
 
     name: Text
@@ -60,22 +60,24 @@ class Formulation(ConfigModel):
     """Options of the solver `tasks`.
 
     Attributes:
-        urdf_filename: The robot; `{package}/path` and `package://` are resolved.
-        floating_base: Whether the root of the robot is free, as that of a robot on legs is.
-        base_frame: Frame of poses: a link, by default the root; with a floating base any name.
-        base_position: Position of a floating root at the start of the search [m]; only without a constraint of type
-            `frame_pose`, the first of which determines it.
-        base_orientation: Orientation of the floating root at the start, quaternion x, y, z, w.
-        joints: The joints to find positions for; by default all that move. The others keep their start positions.
-        start: Default start of joints that a problem's start leaves out [rad or m]; else the middle of their limits.
-        frames: Frames at links; tasks can use their names like those of links.
-        shapes: Shapes of links and obstacles in tasks of type `distance`.
-        costs: Tasks to minimise.
+        urdf_filename: The robot's URDF; `{package}/path` and `package://` are resolved.
+        floating_base: Whether the robot's root is free to move, as for legged robots.
+        base_frame: Frame in which poses are expressed: a link, by default the root. With a floating base, the name of
+            the world frame.
+        base_position: Position of a floating root at the start of the search [m]. Has no effect if there is a
+            constraint on the pose of a link: then the first such constraint determines the start.
+        base_orientation: Orientation of a floating root at the start of the search, quaternion x, y, z, w.
+        joints: Joints to find positions for; by default all moving joints. Other joints keep their start positions.
+        start: Start position by joint [rad or m], for joints that a problem's start leaves out. Joints that are not
+            listed here are at the middle of their limits at the start.
+        frames: Frames attached to links; tasks can use frame names like link names.
+        shapes: Shapes of links and obstacles, for tasks of type `distance`.
+        costs: Tasks whose errors are minimised.
         constraints: Tasks that have to be satisfied.
-        main_task: Name of the task that uses the target of problems; None: the only task about the pose or position of
-            a link.
-        restarts: Number of random starts after the given one.
-        iterations: Most iterations from one start.
+        main_task: Name of the task that takes the target of a problem as its goal. None: the only task about the pose,
+            position or orientation of a link.
+        restarts: Number of random starts after the given start.
+        iterations: Largest number of iterations from one start.
     """
 
     urdf_filename: ExistingFile
@@ -111,16 +113,16 @@ class Formulation(ConfigModel):
 
     @property
     def base_start(self) -> Pose:
-        """Pose of a floating root at the start of the search."""
+        """Pose of a floating root at the start of the search, in the base frame."""
         return Pose(self.base_position, self.base_orientation)
 
 
 class Part(NamedTuple):
-    """One task of a formulation.
+    """A task of a formulation, as a cost or as a constraint.
 
     Attributes:
         task: The task.
-        is_hard: Whether it is a constraint.
+        is_hard: Whether the task is a constraint.
     """
 
     task: Task
@@ -128,21 +130,21 @@ class Part(NamedTuple):
 
     @property
     def is_required(self) -> bool:
-        """Whether success requires it."""
+        """Whether a solution counts as successful only if the task is met."""
         return self.is_hard or self.task.config.required
 
 
 class TaskSet:
-    """A formulation, with its robot.
+    """The robot and the tasks of a formulation.
 
     Attributes:
         robot: The robot.
-        base_frame: Frame of poses.
-        parts: Its tasks by name; the costs first.
-        main: The task that uses targets, if any.
+        base_frame: Name of the frame in which poses are expressed.
+        parts: All tasks by name, the costs first.
+        main: Name of the task that takes the target of a problem as its goal; None if there is no such task.
 
     Raises:
-        KeyedError: If something does not fit the robot; it names the key.
+        KeyedError: If an option does not fit the robot; the error names the key.
     """
 
     def __init__(self, formulation: Formulation) -> None:
@@ -162,7 +164,7 @@ class TaskSet:
 
     @property
     def anchor(self) -> FrameTask | None:
-        """The first constraint on the pose of a link, which places a floating base."""
+        """The first constraint on all axes of a link's pose, or None. It determines the start of a floating base."""
         poses = (part.task for part in self.parts.values() if part.is_hard and isinstance(part.task, FrameTask))
         return next((task for task in poses if task.is_complete), None)
 

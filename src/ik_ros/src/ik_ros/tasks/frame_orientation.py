@@ -1,4 +1,4 @@
-"""The orientation of a link."""
+"""The task `frame_orientation`: turns a link to an orientation."""
 
 from collections.abc import Sequence
 

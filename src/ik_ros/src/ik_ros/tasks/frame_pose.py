@@ -1,4 +1,4 @@
-"""The pose of a link."""
+"""The task `frame_pose`: moves a link to a pose."""
 
 from .frame_task import FrameTask
 

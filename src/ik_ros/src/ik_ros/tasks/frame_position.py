@@ -1,4 +1,4 @@
-"""The position of a link."""
+"""The task `frame_position`: moves a link to a position."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ class FramePosition(FrameTask):
     goal_words = "a position (x, y, z)"
 
     def pose_of(self, values: Sequence[float]) -> Pose:
-        """See `FrameTask`; the axes of the goal are those of the base."""
+        """Returns the goal as a pose whose axes are parallel to the axes of the base, see `FrameTask`."""
         if len(values) != 3:
             raise ValueError(f"expected {self.goal_words}, got {list(values)}")
         x, y, z = values

@@ -1,4 +1,4 @@
-"""Tasks about the pose of a link."""
+"""Base class of the tasks about the pose, position or orientation of a link."""
 
 import math
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class FrameTaskConfig(TaskConfig):
-    """Options of tasks about a link.
+    """Options of the tasks `frame_pose`, `frame_position` and `frame_orientation`.
 
     Attributes:
-        frame: The link.
-        goal: Pose to reach, in the base frame. None: taken from each problem.
-        axes: Axes of the goal that count: `x`, `y`, `z` for translation along them, `rx`, `ry`, `rz` for rotation about
-            them.
+        frame: Name of the link.
+        goal: Pose, position or orientation to reach, in the base frame. None: taken from each problem.
+        axes: Axes of the goal frame along or about which the link has to match the goal: `x`, `y`, `z` for translation,
+            `rx`, `ry`, `rz` for rotation.
     """
 
     frame: Text
@@ -35,17 +35,17 @@ class FrameTaskConfig(TaskConfig):
 
 
 class FrameTask(Task):
-    """Moves a link to a pose, along and about some or all axes of the goal.
+    """Moves a link to a pose, along and about some or all axes of the goal frame.
 
     Attributes:
         link_id: Pinocchio's index of the link.
-        goal: Target pose, a `pinocchio.SE3`.
-        is_complete: Whether all axes count.
+        goal: Target pose of the link in the base, a `pinocchio.SE3`.
+        is_complete: Whether the options select all six axes.
     """
 
     Config = FrameTaskConfig
     available: ClassVar[tuple[str, ...]] = AXES
-    """Axes that may be chosen."""
+    """Axes that the option `axes` may contain."""
     goal_words: ClassVar[str] = "a pose (x, y, z, qx, qy, qz, qw)"
 
     def __init__(self, config: FrameTaskConfig, robot: PinocchioRobot) -> None:
@@ -62,10 +62,10 @@ class FrameTask(Task):
         self._set_goal(self._default or Pose())
 
     def pose_of(self, values: Sequence[float]) -> Pose:
-        """Returns the goal given by numbers.
+        """Converts the numbers of a goal to a pose.
 
         Raises:
-            ValueError: If there are more or fewer than expected.
+            ValueError: If there are too many or too few numbers, or the quaternion is 0.
         """
         if len(values) != 7 or math.hypot(*values[3:]) < 1e-6:
             raise ValueError(f"expected {self.goal_words}, got {list(values)}")
@@ -79,12 +79,15 @@ class FrameTask(Task):
         self._set_goal(pose)
 
     def aim(self, problem: IKProblem) -> None:
-        """Sets the goal and tolerances to the target of a problem."""
+        """Sets goal and tolerances to the target and the tolerances of a problem, if it has a target."""
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: 3 distances along and the rotation vector about the axes of the goal, for the selected axes."""
+        """Returns the position error [m] and the rotation vector [rad] of the link in the goal frame, see `Task`.
+
+        Only the components of the selected axes are returned.
+        """
         off = self.goal.actInv(self.robot.frame(self.link_id))
         rotation = off.rotation
         jacobian = self.robot.jacobian(self.link_id)

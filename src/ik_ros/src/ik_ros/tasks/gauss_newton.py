@@ -1,4 +1,4 @@
-"""Gauss-Newton steps from one configuration to a better one, by quadratic programs."""
+"""Gauss-Newton search for a configuration, with one quadratic program per step."""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -16,13 +16,13 @@ from .task import Linearization
 
 
 class Candidate(NamedTuple):
-    """A configuration.
+    """A configuration with its errors.
 
     Attributes:
         q: The configuration.
-        residuals: Error of each required task.
-        size: The largest residual as a multiple of its tolerance.
-        hard_size: The same of constraints alone.
+        residuals: Error of each required task, by task name.
+        size: Largest error of a required task, as a multiple of the task's tolerance.
+        hard_size: Largest error of a constraint, as a multiple of the constraint's tolerance.
     """
 
     q: np.ndarray
@@ -32,38 +32,38 @@ class Candidate(NamedTuple):
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Key by which results are compared: constraints first; all results within tolerances are equal."""
+        """Sort key, smaller is better: compares constraints first. Errors within the tolerances count as equal."""
         return max(self.hard_size, 1.0), max(self.size, 1.0)
 
 
 LARGEST_STEP = 1.0
 """Largest motion of a joint, or of the base along or about an axis, in one step [rad or m]."""
 DAMPING = 1e-3
-"""Damping of steps as a share of the squared residual."""
+"""Factor of the squared errors in the damping of a step."""
 LEAST_DAMPING = 1e-6
-"""Smallest damping of steps."""
+"""Constant part of the damping of a step."""
 FIRST_DAMPING, TIGHTENING, EASING = 1e-4, 10.0, 0.2
-"""Damping after a failed step: its smallest value, its growth with each failure, and its decrease after a success."""
+"""Additional damping after failed steps: value after the first failure, factor at each failure, factor at a success."""
 HARD = 1e4
-"""Weight of constraints in the merit of a step."""
+"""Weight of constraints in the merit of a configuration."""
 MEMORY = 2
-"""Number of previous steps; a step has to be better than the worst of them, otherwise a shorter one is tried."""
+"""Number of recent merits. A step is accepted if it is not worse than the worst of these merits."""
 SLACK = 1e-6
-"""Penalty for violating a constraint in favour of costs or conflicting constraints."""
+"""DAQP's parameter `rho_soft`, the penalty for violating a soft constraint."""
 SOFT = 8
-"""DAQP's number for a soft constraint (`sense` in its documentation)."""
+"""DAQP's flag for a soft constraint (`sense` in DAQP's documentation)."""
 UNBOUNDED = 1e30
 
 
 class Iterate(NamedTuple):
-    """An intermediate configuration.
+    """An intermediate configuration of the search.
 
     Attributes:
         q: The configuration.
-        rows: Linearisation of each task there.
-        beyond: Violation of its bounds by each.
-        merit: The sum of the weighted squares of the violations.
-        step: Largest motion of a joint, or of the base, from the last better one [rad or m].
+        rows: Linearisation of each task at q.
+        beyond: For each task, by how much its values violate their bounds.
+        merit: Weighted sum of the squared violations; smaller is better.
+        step: Largest motion of a joint, or of the base, since the last accepted configuration [rad or m].
     """
 
     q: np.ndarray
@@ -74,14 +74,19 @@ class Iterate(NamedTuple):
 
 
 class GaussNewton:
-    """Minimises the costs such that the constraints hold, by Gauss-Newton steps.
+    """Minimises the costs subject to the constraints, with Gauss-Newton steps.
 
-    Each step minimises the weighted squares of the linearised costs plus a damping, subject to the linearised
-    constraints and the joint limits. Constraints are soft with a large penalty, so there always is a step.
+    Each step minimises the weighted squares of the linearised costs plus a damping term, subject to the linearised
+    constraints and the joint limits. Constraints are soft, with a large penalty, so that conflicting constraints do not
+    prevent a step.
+
+    Args:
+        robot: The robot.
+        parts: The costs and constraints.
 
     Attributes:
-        lower: n lower limits of the joints [rad or m].
-        upper: n upper limits.
+        lower: Lower limits of the n joints for the present problem [rad or m].
+        upper: Upper limits of the n joints for the present problem [rad or m].
     """
 
     def __init__(self, robot: PinocchioRobot, parts: Sequence[Part]) -> None:
@@ -95,9 +100,9 @@ class GaussNewton:
         self.begin()
 
     def begin(self) -> None:
-        """Sets the bounds of the tasks for a new problem.
+        """Computes the joint limits for a new problem, after the tasks have begun it.
 
-        Constraints on joints alone narrow the limits, so they are satisfied exactly.
+        Constraints on joint positions narrow the limits, so that each step satisfies these constraints exactly.
         """
         self.lower, self.upper = self._robot.lower.copy(), self._robot.upper.copy()
         for part in self._parts:
@@ -108,8 +113,10 @@ class GaussNewton:
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 
     def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
-        """Yields each configuration of the search from q, also worse ones; joints beyond their limits start at the
-        limit."""
+        """Searches from the configuration q, clipped to the joint limits.
+
+        Yields each tried configuration, even if it is worse than the configurations before.
+        """
         q = self._robot.moved(q, np.zeros(self._count), self.lower, self.upper)
         damping, merits = 0.0, deque([np.inf], MEMORY)
         here = tried = self._at(q, np.inf)
@@ -133,7 +140,7 @@ class GaussNewton:
         return Iterate(q, rows, beyond, merit, step)
 
     def _step(self, here: Iterate, damping: float) -> np.ndarray | None:
-        """Returns the step, None if there is none."""
+        """Computes the next step of the free components, shape (m,); returns None if the quadratic program fails."""
         hessian = np.zeros((self._count, self._count))
         gradient = np.zeros(self._count)
         off = 0.0

@@ -1,4 +1,4 @@
-"""Limits of joints, narrower than those of the URDF."""
+"""The task `joint_limits`: limits joint positions to ranges that are narrower than the URDF's limits."""
 
 from pydantic import Field
 
@@ -10,11 +10,11 @@ from .task import TaskConfig, keyed_errors
 
 
 class JointLimitsConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `joint_limits`.
 
     Attributes:
-        limits: Lower and upper limit of joints [rad or m].
-        margin: Smallest distance from the URDF's limits, for all joints [rad or m].
+        limits: Lower and upper limit by joint name [rad or m].
+        margin: Smallest distance of all joints from the URDF's limits [rad or m].
     """
 
     limits: dict[str, ListOf[float]] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Tasks about positions of joints."""
+"""Base class of the tasks about joint positions."""
 
 import math
 from collections.abc import Sequence
@@ -14,15 +14,17 @@ from .task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class JointTask(Task):
-    """Keeps positions of some joints within bounds.
+    """Keeps the positions of k joints within bounds.
 
     Args:
+        config: Options of the task.
+        robot: The robot.
         joints: Names of the k joints.
-        key: The option that names them, for messages.
+        key: Key of the option that names the joints, for messages.
 
     Attributes:
-        indices: Indices of the k joints among those of the robot.
-        bounds: k lower and k upper bounds [rad or m]; infinite at first.
+        indices: Indices of the k joints in the robot's `joint_names`.
+        bounds: k lower and k upper bounds [rad or m]; initially infinite.
     """
 
     def __init__(self, config: TaskConfig, robot: PinocchioRobot, joints: Sequence[str], key: str) -> None:
@@ -33,20 +35,29 @@ class JointTask(Task):
         self.keep_near(None, 0.0)
 
     def keep_near(self, middle: np.ndarray | None, distance: np.ndarray | float) -> None:
-        """Sets bounds a distance away from k positions [rad or m]; without positions, the joints are free."""
+        """Sets the bounds to `middle - distance` and `middle + distance` [rad or m].
+
+        Args:
+            middle: k positions; None for infinite bounds.
+            distance: k distances, or one distance for all joints.
+        """
         if middle is None:
             middle, distance = np.zeros(len(self.indices)), np.inf
         self.bounds = middle - distance, middle + distance
 
     def bring_to(self, goal: np.ndarray) -> None:
-        """Sets k positions as bounds [rad or m]."""
+        """Sets lower and upper bounds to the same k positions [rad or m]."""
         self.bounds = goal, goal
 
     def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
-        """Returns k positions of each of a problem's newest previous solutions [rad or m], the newest last.
+        """Returns the k joint positions of a problem's last previous solutions, the newest last [rad or m].
+
+        Args:
+            problem: The problem.
+            most: Largest number of solutions to return.
 
         Raises:
-            KeyedError: If one of them lacks one of the k joints; it names both.
+            KeyedError: If a solution lacks a joint; the error names the solution and the joint.
         """
         names = [self.robot.joint_names[i] for i in self.indices]
         solutions = list(enumerate(problem.previous))[-most:]

@@ -1,4 +1,4 @@
-"""Direction of an axis of a link."""
+"""The task `look_at`: turns an axis of a link towards a point."""
 
 import math
 from collections.abc import Sequence
@@ -14,17 +14,17 @@ from .robot import PinocchioRobot
 from .task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAREST_M = 1e-6
-"""Distance below which there is no direction [m]."""
+"""Distance from the link to the goal below which the direction is undefined [m]."""
 ZERO = np.zeros(2)
 
 
 class LookAtConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `look_at`.
 
     Attributes:
-        frame: The link.
-        axis: The axis to point at the goal, in the link's frame; any length but 0.
-        goal: The point, x, y, z in the base [m]; None: from each problem.
+        frame: Name of the link.
+        axis: Axis that is to point at the goal, in the link's frame; any length but 0.
+        goal: Position x, y, z of the point in the base [m]. None: taken from each problem.
     """
 
     frame: Text
@@ -61,8 +61,8 @@ class LookAt(Task):
         self._goal = np.array(point)
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: the angle to the point, as two components across the axis [rad]."""
-        point = self.robot.frame(self._link_id).actInv(self._goal)  # in the link
+        """Returns the angle between axis and point as two components perpendicular to the axis [rad]; see `Task`."""
+        point = self.robot.frame(self._link_id).actInv(self._goal)  # in the link's frame
         jacobian = self.robot.jacobian(self._link_id)
         change = pin.skew(point) @ jacobian[3:] - jacobian[:3]
         across, ahead = self._across @ point, float(self._axis @ point)

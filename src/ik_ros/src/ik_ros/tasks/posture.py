@@ -1,4 +1,4 @@
-"""A preferred posture."""
+"""The task `posture`: moves joints to given positions."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ from .task import TaskConfig
 
 
 class PostureConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `posture`.
 
     Attributes:
-        goal: Position of each joint that counts [rad or m].
+        goal: Position to reach by joint name [rad or m]; other joints are free.
     """
 
     goal: dict[str, float] = Field(min_length=1)

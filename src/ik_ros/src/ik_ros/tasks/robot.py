@@ -1,4 +1,4 @@
-"""A robot in Pinocchio."""
+"""A robot whose kinematics are computed by Pinocchio."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
@@ -18,12 +18,12 @@ from .clearance import RobotShape
 
 
 def to_se3(pose: Pose) -> Any:
-    """Returns a pose as a `pinocchio.SE3`."""
+    """Converts a pose to a `pinocchio.SE3`."""
     return pin.XYZQUATToSE3(np.array((*pose.position, *pose.quat_xyzw)))
 
 
 def from_base(q: np.ndarray) -> Pose:
-    """Returns the pose of a floating root in a configuration."""
+    """Returns the pose of a floating root, which is the first 7 numbers of a configuration q."""
     x, y, z, qx, qy, qz, qw = q[:7].tolist()
     return Pose((x, y, z), (qx, qy, qz, qw))
 
@@ -35,31 +35,32 @@ FREE = 6
 class PinocchioRobot:
     """Joints, limits and kinematics of one robot, a tree of links whose root may float.
 
-    A configuration q has one number for each joint. With a floating root, 7 numbers come first: x, y, z [m] and a
-    quaternion x, y, z, w. A velocity has one number for each joint, after 6 for a floating root.
+    A configuration q has one position for each moving joint [rad or m]. For a floating root, 7 numbers precede them:
+    x, y, z [m] and a quaternion x, y, z, w. A velocity has one number for each moving joint, preceded by 6 numbers for
+    a floating root.
 
     Args:
-        urdf_path: The robot's description; the meshes it names need not be there.
+        urdf_path: Path of the URDF; its meshes need not exist.
         floating: Whether the root floats.
-        joints: The n joints to find positions for; by default all that move.
-        base: The link that poses are expressed in; None: the root, or the world if the root floats.
+        joints: Names of the n joints to find positions for; by default all moving joints.
+        base: Link in whose frame poses are expressed. None: the root, or the world if the root floats.
 
     Attributes:
         model: Pinocchio's model.
-        data: Pinocchio's working memory, set by `update`.
-        joint_names: The n joints.
-        lower: Their n lower limits [rad or m], -inf where there is none.
-        upper: Their n upper limits [rad or m], inf where there is none.
-        limits: The same limits as an object, which can clip positions.
-        is_revolute: Which of the n joints turn.
-        max_velocity: Their n largest speeds [rad/s or m/s], inf where the URDF has none.
-        free: Indices in a velocity of the m free components: m - n of the root, and the n joints.
-        all_joints: All joints that move.
-        links: All links.
+        data: Pinocchio's data for the configuration set by `update`.
+        joint_names: Names of the n joints.
+        lower: Lower limits of the n joints [rad or m]; -inf for joints without a lower limit.
+        upper: Upper limits of the n joints [rad or m]; inf for joints without an upper limit.
+        limits: The same limits as a `Limits` object.
+        is_revolute: For each of the n joints, whether it is revolute or continuous.
+        max_velocity: Largest speeds of the n joints [rad/s or m/s]; inf for joints without a speed limit.
+        free: Indices of the m free components in a velocity: 6 of a floating root, then the n joints.
+        all_joints: Names of all moving joints.
+        links: Names of all links and added frames.
 
     Raises:
-        ConfigError: If the description cannot be read, or has joints of more than one axis.
-        UnknownNameError: If a joint or the base is not known.
+        ConfigError: If the URDF cannot be read, or has joints with more than one axis.
+        UnknownNameError: If a joint or the base does not exist.
     """
 
     def __init__(
@@ -79,7 +80,7 @@ class PinocchioRobot:
             raise ConfigError([Problem(urdf_path, "", f"Pinocchio cannot load it: {error}")]) from None
         self.data = self.model.createData()
         self.is_floating = floating
-        base_joints = 2 if floating else 1  # the world, and the root's own
+        base_joints = 2 if floating else 1  # Pinocchio's joint of the world, and the floating root's joint
         self.all_joints = tuple(self.model.names)[base_joints:]
         self._still = frozenset(types) - frozenset(self.all_joints)
         frames = (frame.name for frame in self.model.frames if frame.type == pin.BODY)
@@ -101,39 +102,44 @@ class PinocchioRobot:
         """Returns Pinocchio's index of a joint.
 
         Raises:
-            UnknownNameError: If there is no such joint that moves.
+            UnknownNameError: If no moving joint has this name.
         """
         return int(self.model.getJointId(_known("joint", name, self.all_joints)))
 
     def moving(self, names: Iterable[str]) -> list[str]:
-        """Returns the given joints that move by themselves, without fixed and mimic joints.
+        """Filters joint names: leaves out the names of fixed joints and mimic joints.
 
         Raises:
-            UnknownNameError: If there is no such joint.
+            UnknownNameError: If a joint does not exist.
         """
         return [_known("joint", name, self.all_joints) for name in names if name not in self._still]
 
     def index(self, name: str) -> int:
-        """Returns the index of a joint among the n.
+        """Returns the index of a joint in `joint_names`.
 
         Raises:
-            UnknownNameError: If it is none of them.
+            UnknownNameError: If `joint_names` does not contain the joint.
         """
         return self.joint_names.index(_known("joint", name, self.joint_names))
 
     def link_id(self, name: str) -> int:
-        """Returns Pinocchio's index of a link.
+        """Returns Pinocchio's index of a link or added frame.
 
         Raises:
-            UnknownNameError: If there is no such link.
+            UnknownNameError: If the link does not exist.
         """
         return int(self.model.getFrameId(_known("link", name, self.links), pin.BODY))
 
     def add_frame(self, name: str, link: str, pose: Pose) -> None:
-        """Adds a frame at a link; tasks can use its name like that of a link.
+        """Adds a frame that is attached to a link; tasks can use the frame's name like a link name.
+
+        Args:
+            name: Name of the frame.
+            link: Name of the link.
+            pose: Pose of the frame in the link.
 
         Raises:
-            UnknownNameError: If the link is not known.
+            UnknownNameError: If the link does not exist.
         """
         link_id = self.link_id(link)
         frame = self.model.frames[link_id]
@@ -143,29 +149,34 @@ class PinocchioRobot:
         self.links += (name,)
 
     def add_shape(self, config: ShapeConfig) -> None:
-        """Adds a shape.
+        """Adds a shape that is attached to a link, or fixed in the base.
 
         Raises:
-            UnknownNameError: If its link is not known.
+            UnknownNameError: If the link does not exist.
         """
         link_id = None if config.link is None else self.link_id(config.link)
         self._shapes[config.name] = RobotShape(config.core, link_id, to_se3(config.pose))
 
     def shape(self, name: str) -> RobotShape:
-        """Returns one of the shapes.
+        """Returns an added shape by its name.
 
         Raises:
-            UnknownNameError: If there is no such shape.
+            UnknownNameError: If no shape has this name.
         """
         return self._shapes[_known("shape", name, self._shapes)]
 
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
-        """Returns the configuration with some joints at given positions, and the others in the middle of their limits.
+        """Makes a configuration from joint positions.
 
-        Joints that do not move, which joint states may include, are ignored.
+        Those of the n joints that `positions` leaves out are at the middle of their limits. All other joints that
+        `positions` leaves out are at 0.
+
+        Args:
+            positions: Positions by joint name [rad or m]. Fixed and mimic joints, which joint states may include, are
+                ignored.
 
         Raises:
-            UnknownNameError: If a joint is not known.
+            UnknownNameError: If a joint does not exist.
         """
         q = pin.neutral(self.model)
         q[self._in_q] = self.limits.middle
@@ -174,24 +185,30 @@ class PinocchioRobot:
         return q
 
     def positions(self, q: np.ndarray) -> np.ndarray:
-        """Returns the positions of the n joints [rad or m]."""
+        """Returns the positions of the n joints in a configuration [rad or m]."""
         return q[self._in_q]
 
     def with_positions(self, q: np.ndarray, positions: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Returns a configuration with the n joints at other positions [rad or m]."""
+        """Returns a copy of a configuration with new positions of the n joints [rad or m]."""
         changed = q.copy()
         changed[self._in_q] = positions
         return changed
 
     def with_base(self, q: np.ndarray, pose: Any) -> np.ndarray:
-        """Returns a configuration with a floating root at another pose, a `pinocchio.SE3`."""
+        """Returns a copy of a configuration with a new pose of the floating root, a `pinocchio.SE3`."""
         changed = q.copy()
         changed[:7] = pin.SE3ToXYZQUAT(pose)
         return changed
 
     def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Returns the configuration after a step of the free components, within n lower and n upper limits [rad or
-        m]."""
+        """Returns the configuration after a step, with the n joints clipped to limits.
+
+        Args:
+            q: The configuration before the step.
+            step: Motion of the m free components, shape (m,) [rad or m].
+            lower: Lower limits of the n joints [rad or m].
+            upper: Upper limits of the n joints [rad or m].
+        """
         if not self.is_floating:
             positions = q[self._in_q] + step
         else:
@@ -202,19 +219,23 @@ class PinocchioRobot:
         return self.with_positions(q, np.minimum(np.maximum(positions, lower), upper))
 
     def update(self, q: np.ndarray) -> None:
-        """Sets the configuration for the methods below."""
+        """Sets the configuration for which `frame` and `jacobian` return results."""
         pin.computeJointJacobians(self.model, self.data, q)
 
     def frame(self, link_id: int) -> Any:
-        """Returns the pose of a link, a `pinocchio.SE3`."""
+        """Returns the pose of a link in the base, a `pinocchio.SE3`, in the configuration set by `update`."""
         return pin.updateFramePlacement(self.model, self.data, link_id)
 
     def jacobian(self, link_id: int) -> np.ndarray:
-        """Returns the Jacobian of a link in its own frame for the free components, 6 x m: linear above angular."""
+        """Returns the Jacobian of a link's velocity, in the axes of the link, by the m free components, 6 x m.
+
+        The first three rows are linear, the last three angular. The configuration is the one set by `update`.
+        """
         return self._of_free(pin.getFrameJacobian(self.model, self.data, link_id, pin.LOCAL))
 
     def com(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the centre of mass [m], and its Jacobian for the free components, 3 x m."""
+        """Returns the position of the centre of mass in the base, shape (3,) [m], and its Jacobian by the m free
+        components, 3 x m."""
         jacobian = self._of_free(pin.jacobianCenterOfMass(self.model, self.data, q))
         com, moving, still = self.data.com[0].copy(), self.data.mass[0], self.model.inertias[0]
         if still.mass:  # Pinocchio omits the mass of fixed links
@@ -223,7 +244,11 @@ class PinocchioRobot:
         return com, jacobian
 
     def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
-        """Returns the Jacobian of the positions of some of the n joints: a 1 in each row."""
+        """Returns the Jacobian of selected joint positions by the m free components, k x m, with a single 1 per row.
+
+        Args:
+            indices: Indices of the k joints in `joint_names`.
+        """
         first = len(self.free) - len(self.joint_names)
         return np.eye(len(self.free))[[first + i for i in indices]]
 
@@ -232,7 +257,7 @@ class PinocchioRobot:
 
 
 def _known(kind: str, name: str, names: Collection[str]) -> str:
-    """Returns a name; raises `UnknownNameError` if it is none of these."""
+    """Checks that `names` contains `name`, and returns it; raises an `UnknownNameError` otherwise."""
     if name not in names:
         raise UnknownNameError(kind, name, names)
     return name

@@ -1,4 +1,4 @@
-"""The interface of tasks."""
+"""Base class of the tasks of the solver `tasks`."""
 
 import math
 from abc import ABC, abstractmethod
@@ -17,15 +17,15 @@ from .robot import PinocchioRobot
 
 
 class TaskConfig(ConfigModel):
-    """Options of every task.
+    """Options that every task has.
 
     Attributes:
-        name: Its name in problems and messages.
-        type: A name of the table, or `their_package.module:Class`.
-        weight: Factor on its square, for a cost.
-        required: For a cost, whether success requires it.
-        tolerance_m: Largest error at which it counts as met [m].
-        tolerance_rad: The same for angles [rad], and for positions of joints [rad or m].
+        name: Name of the task in problems and messages.
+        type: Type of the task: a name in the table of tasks, or `their_package.module:Class`.
+        weight: For a cost, factor of the squared error.
+        required: For a cost, whether a solution counts as successful only if the task is met.
+        tolerance_m: Largest position error at which the task counts as met [m].
+        tolerance_rad: Largest error of angles [rad], or of joint positions [rad or m], at which the task counts as met.
     """
 
     name: Text
@@ -38,7 +38,7 @@ class TaskConfig(ConfigModel):
 
 @contextmanager
 def keyed_errors(key: str) -> Iterator[None]:
-    """Converts errors of unknown names and wrong values to a `KeyedError` of an option, or of keys inside it."""
+    """Converts errors about names or values to a `KeyedError` for the option `key`, or for a key inside the option."""
     try:
         yield
     except KeyedError as error:
@@ -48,13 +48,14 @@ def keyed_errors(key: str) -> Iterator[None]:
 
 
 class Linearization(NamedTuple):
-    """k task values with bounds, linearised at one configuration.
+    """The k values of a task and their bounds, linearised at one configuration.
 
     Attributes:
         values: k task values [m or rad].
-        jacobian: Their derivatives by the free components, k x m.
-        lower: k lower bounds, -inf where there is none.
-        upper: k upper bounds, inf where there is none; the same array as `lower` if all bounds are equal.
+        jacobian: Derivatives of the values by the m free components, k x m.
+        lower: k lower bounds; -inf for values without a lower bound.
+        upper: k upper bounds; inf for values without an upper bound. The same array object as `lower` if the task
+            prescribes exact values.
     """
 
     values: np.ndarray
@@ -64,11 +65,11 @@ class Linearization(NamedTuple):
 
     @property
     def is_exact(self) -> bool:
-        """Whether it has exact values instead of ranges."""
+        """Whether the task prescribes exact values instead of ranges."""
         return self.lower is self.upper
 
     def beyond(self) -> np.ndarray:
-        """Returns the violation of the bounds, k numbers."""
+        """Returns by how much each value is above its upper bound (positive) or below its lower bound (negative)."""
         if self.is_exact:
             return self.values - self.lower
         return self.values - np.minimum(np.maximum(self.values, self.lower), self.upper)
@@ -77,15 +78,15 @@ class Linearization(NamedTuple):
 class Task(ABC):
     """A requirement on a configuration: a cost to minimise, or a constraint to satisfy.
 
-    The options of a subclass are its `Config`, in YAML. One thread at a time calls `begin`, and then `rows` for each
-    candidate configuration.
+    A subclass declares its YAML options in `Config`. One thread at a time calls `begin` for a problem, and then `rows`
+    for each candidate configuration.
 
     Args:
-        config: Its options.
-        robot: The robot; `rows` is called with the configuration set.
+        config: The options.
+        robot: The robot. Before each call of `rows`, the robot's `update` has set the configuration.
 
     Raises:
-        KeyedError: If an option does not fit the robot; it names the key.
+        KeyedError: If an option does not fit the robot; the error names the key.
     """
 
     Config: ClassVar[type[TaskConfig]] = TaskConfig
@@ -99,24 +100,24 @@ class Task(ABC):
 
         Args:
             problem: The problem.
-            goal: Goal of this task; None: that of the formulation.
+            goal: The problem's goal for this task. None: the goal in the task's options applies.
             q: The configuration where the search starts.
 
         Raises:
-            ValueError: If the goal makes no sense, or there is none.
-            KeyedError: If another field of the problem does not fit; it names the field.
+            ValueError: If the goal is invalid or missing.
+            KeyedError: If another field of the problem is invalid; the error names the field.
         """
         if goal is not None:
             raise ValueError("this task has no goal")
 
     @abstractmethod
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns the linearised task at one configuration."""
+        """Returns the values of the task, their derivatives and their bounds at a configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """Returns the residual for k violations of the bounds [m or rad]; by default all are lengths."""
+        """Converts the k violations of the bounds [m or rad] to a residual; by default, all violations are lengths."""
         return Residual(math.hypot(*beyond.tolist()), 0.0)
 
     def size(self, residual: Residual) -> float:
-        """Returns a residual as a multiple of the tolerances: up to 1, the task is met."""
+        """Returns a residual as a multiple of the task's tolerances; up to 1, the task counts as met."""
         return max(residual.position_m / self.config.tolerance_m, residual.orientation_rad / self.config.tolerance_rad)

@@ -1,4 +1,4 @@
-"""Largest speeds of joints from one solution to the next."""
+"""The task `velocity_limits`: limits joint velocities between successive solutions."""
 
 from collections.abc import Sequence
 
@@ -14,12 +14,13 @@ from .task import TaskConfig
 
 
 class VelocityLimitsConfig(TaskConfig):
-    """Options of this task.
+    """Options of the task `velocity_limits`.
 
     Attributes:
-        dt_s: Time from the previous solution to this one [s].
-        limits: Largest speed of joints [rad/s or m/s]; without any, all joints have those of the URDF.
-        factor: Factor on the speeds.
+        dt_s: Time between two successive solutions [s].
+        limits: Largest speed by joint name [rad/s or m/s]; other joints are free. By default the URDF's speed limits
+            apply to all joints.
+        factor: Factor of all speed limits.
     """
 
     dt_s: Seconds
