@@ -1,8 +1,8 @@
 """Reads the records of a ROS bag of format 2.0, without ROS and without executing definitions.
 
-`rosbag` generates a Python class for every message definition in a bag, which executes code hidden in a definition. It
-needs quadratic time for long headers, and follows an index however often it lists the same messages. Here each record
-is read once, in time and memory proportional to the file.
+`rosbag` generates a Python class for every message definition in a bag, which executes code hidden in a definition.
+`rosbag` also needs quadratic time for long headers, and reads a message as often as the index lists the message. This
+module reads each record once, in time and memory proportional to the file.
 """
 
 import bz2
@@ -31,7 +31,7 @@ Fields = dict[bytes, bytes]
 
 
 class Connection(NamedTuple):
-    """One publisher of a topic, with type and definition of its messages."""
+    """One publisher of a topic, with type, MD5 sum and definition of the messages."""
 
     topic: str
     datatype: str
@@ -44,9 +44,9 @@ class Chunk(NamedTuple):
 
     Attributes:
         compression: `none`, `bz2` or `lz4`.
-        size: Uncompressed size according to its header [bytes].
-        start: Offset of its data in the file.
-        compressed_size: Size of its data [bytes].
+        size: Uncompressed size according to the chunk's header [bytes].
+        start: Offset of the chunk's data in the file [bytes].
+        compressed_size: Size of the chunk's data in the file [bytes].
     """
 
     compression: str
@@ -59,17 +59,17 @@ class BagFile:
     """An open bag.
 
     Args:
-        file: The file, at its beginning.
+        file: The bag, opened in binary mode.
 
     Attributes:
-        connections: Connections by their numbers.
-        chunks: The chunks.
-        counts: Messages of each connection.
+        connections: Connections, indexed by number.
+        chunks: The chunks, in the order of the index.
+        counts: Number of messages of each connection, indexed by the connection's number.
 
     Raises:
-        NotABagError: If it does not begin like a bag.
-        ValueError, struct.error, KeyError: If it has no index, or a broken one; a LimitError if it has too many
-            connections.
+        NotABagError: If the file does not begin like a bag, or is encrypted.
+        LimitError: If the bag has too many connections.
+        ValueError, struct.error, KeyError: If the bag's index is missing or broken.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -109,16 +109,18 @@ class BagFile:
         return sum(each.size for each in self.chunks)
 
     def clock_of(self, connections: Collection[int]) -> ClockStep:
-        """Returns the largest step back in the recording times of some connections, in the order of the file."""
+        """Returns the largest backward step of the recording times of given connections, in the order of the file."""
         index = self._index_of(connections)
         index = index[np.lexsort((index["offset"], index["chunk"]))]
         return set_back(index["time_ns"] / 1e9)
 
     def messages(self, connections: Collection[int]) -> Iterator[tuple[int, bytes, int]]:
-        """Yields the connection's number, the serialised message and the time of recording [ns], in the order of time.
+        """Yields the messages of given connections in the order of recording time.
+
+        Each item is the connection's number, the serialised message, and the recording time [ns].
 
         Raises:
-            ValueError, struct.error, KeyError, OSError, EOFError: If it is damaged.
+            ValueError, struct.error, KeyError, OSError, EOFError: If the bag is damaged.
         """
         index = self._index_of(connections)
         index = index[np.argsort(index["time_ns"], kind="stable")]
@@ -140,7 +142,7 @@ class BagFile:
         return data
 
     def _sized(self, most: int) -> bytes:
-        """Reads a block of bytes that follows its size."""
+        """Reads a size, and then a block of bytes of this size; raises a ValueError if the size exceeds `most`."""
         (size,) = _UINT32.unpack(self._read(4))
         if size > most:
             raise ValueError(f"expected a header of at most {most} bytes, got {size}")
@@ -159,7 +161,7 @@ class BagFile:
         return _uint32(header, b"conn"), Connection(header[b"topic"].decode(), *texts)
 
     def _chunk_info(self) -> tuple[int, int]:
-        """Reads the offset of a chunk and its number of connections."""
+        """Reads a record about a chunk; returns the chunk's offset in the file and its number of connections."""
         header = self._record_header(_CHUNK_INFO)
         (size,) = _UINT32.unpack(self._read(4))
         count = _uint32(header, b"count")
@@ -181,7 +183,7 @@ class BagFile:
         return Chunk(compression, size, start, compressed_size)
 
     def _index_record(self, chunk: int) -> int:
-        """Reads the offsets of one connection's messages in a chunk; returns their number."""
+        """Reads the index of one connection's messages in a chunk, and returns the number of these messages."""
         header = self._record_header(_INDEX)
         count = _uint32(header, b"count")
         (size,) = _UINT32.unpack(self._read(4))
@@ -195,7 +197,7 @@ class BagFile:
         return count
 
     def _unfold(self, chunk: Chunk) -> bytes:
-        """Returns the uncompressed data of a chunk, at most the size in its header."""
+        """Returns the uncompressed data of a chunk; raises a ValueError if they exceed the size in the header."""
         self._file.seek(chunk.start)
         data = self._read(chunk.compressed_size)
         if chunk.compression == "none":
@@ -212,7 +214,7 @@ class BagFile:
 
 
 class NotABagError(ValueError):
-    """A file is no bag of this format, or is encrypted."""
+    """A file is not a bag of format 2.0, or is encrypted."""
 
 
 def _unfold_lz4(data: bytes, size: int) -> bytes:
@@ -226,7 +228,7 @@ def _unfold_lz4(data: bytes, size: int) -> bytes:
 
 
 def _fields(header: bytes) -> Fields:
-    """Returns the values of a header by their names."""
+    """Returns the values of a record header, indexed by field name."""
     fields, at = {}, 0
     while at < len(header):
         (size,) = _UINT32.unpack_from(header, at)
@@ -244,7 +246,11 @@ def _uint32(fields: Fields, name: bytes) -> int:
 
 
 def _message(data: bytes, offset: int) -> tuple[int, bytes, int]:
-    """Reads the message at an offset in a chunk; `rosbag` may have put the record of its connection before it."""
+    """Reads the message at an offset in a chunk, and skips a record of the message's connection in front of it.
+
+    Returns:
+        The connection's number, the serialised message, and the recording time [ns].
+    """
     while True:
         (size,) = _UINT32.unpack_from(data, offset)
         fields = _fields(data[offset + 4 : offset + 4 + size])

@@ -1,4 +1,4 @@
-"""Reads bags: serialised messages, and pandas tables of them. Errors say in plain words why a file cannot be read."""
+"""Reads bags as serialised messages or as pandas tables. Error messages explain why a file cannot be read."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .times import ClockStep, to_seconds
 
 _ACTIVE_SUFFIX = ".active"
 MAX_UNPACKED_BYTES = 2**30
-"""Size to which any bag may be unpacked [bytes]; larger ones are limited by `MAX_COMPRESSION`."""
+"""Unpacked size that every bag may have [bytes]; bags that unpack to more are limited by `MAX_COMPRESSION`."""
 MAX_COMPRESSION = 255
-"""Largest compression ratio of bags above `MAX_UNPACKED_BYTES`; LZ4, used by recorders, reaches no more."""
+"""Largest compression ratio of bags above `MAX_UNPACKED_BYTES`; LZ4, which recorders use, cannot exceed it."""
 
 
 class BagMessage(NamedTuple):
-    """A serialised message of a bag, and its recording time [ns], in ROS time."""
+    """A serialised message of a bag, and the ROS time at which the message was recorded [ns]."""
 
     topic: str
     type: MessageType
@@ -37,25 +37,27 @@ class BagMessage(NamedTuple):
 
     @property
     def record_time_s(self) -> float:
-        """Time at which it was recorded [s]."""
+        """ROS time at which the message was recorded [s]."""
         return float(to_seconds(self.record_time_ns))
 
 
 class BagReader:
-    """An open bag of any compression, as a context that closes it; needs no master and no message packages.
+    """Reads a bag with any compression, without a ROS master or message packages.
+
+    Used as a context manager, which closes the bag.
 
     Args:
-        path: The file.
-        any_size: Whether it may exceed `MAX_UNPACKED_BYTES` and `MAX_COMPRESSION`, and the limits on time and cells.
+        path: The bag.
+        any_size: Whether the bag may exceed `MAX_UNPACKED_BYTES` and `MAX_COMPRESSION`, and the limits of `Budget`.
 
     Attributes:
-        types: The message types of each topic, in the order of their names; nearly always one a topic.
-        md5sums: Their md5 sums.
-        counts: Number of messages of each topic.
-        budget: Limits of time and cells of tables.
+        types: Message types, indexed by topic and sorted by topic; nearly always one type per topic.
+        md5sums: MD5 sums of the message types, indexed by topic.
+        counts: Number of messages, indexed by topic.
+        budget: Limits of processor time and table cells.
 
     Raises:
-        BagError: If there is no such file, it is no complete bag, or it is larger than it may be.
+        BagError: If the file does not exist, is not a complete bag, or exceeds a limit.
     """
 
     def __init__(self, path: str | Path, any_size: bool = False) -> None:
@@ -83,11 +85,11 @@ class BagReader:
         self._file.close()
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Yields the messages of some topics in the order in which they were recorded.
+        """Yields the messages of given topics in the order of recording.
 
         Raises:
-            BagError: If the bag is damaged at a message, or needs too much time; the time of the caller between
-                messages counts.
+            BagError: If the bag is damaged at a message, or reading needs too much processor time. The time that the
+                caller's thread spends between messages counts, too.
         """
         chosen = {number: each for number, each in self._types.items() if each[0] in topics}
         left = self._bag.unfolded_bytes
@@ -108,7 +110,7 @@ class BagReader:
             yield BagMessage(topic, message_type, raw, record_time_ns)
 
     def clock_of(self, topic: str) -> ClockStep:
-        """Returns the largest step back in the recording times of a topic, in the order of the file."""
+        """Returns the largest backward step of a topic's recording times, in the order of the file."""
         return self._bag.clock_of([number for number, each in self._types.items() if each[0] == topic])
 
     def _open(self) -> BagFile:
@@ -153,7 +155,7 @@ class BagReader:
             self.counts[topic] = self.counts.get(topic, 0) + self._bag.counts[number]
 
     def _refuse_bombs(self) -> None:
-        """Raises a BagError if its unpacked size is above the limit."""
+        """Raises a BagError if the unpacked size of the bag exceeds the limit."""
         unfolded, size = self._bag.unfolded_bytes, self.path.stat().st_size
         if unfolded > max(MAX_UNPACKED_BYTES, MAX_COMPRESSION * size):
             message = (
@@ -169,7 +171,7 @@ class BagReader:
 
 
 def _words(error: Exception) -> str:
-    """Returns the text of an error in one short line."""
+    """Returns the message of an error, shortened to one line."""
     return shortened(" ".join(str(error).split())) or type(error).__name__
 
 
@@ -185,34 +187,34 @@ def bag_to_dataframes(
     progress: bool = False,
     nanoseconds: bool = False,
 ) -> dict[str, pd.DataFrame]:
-    """Reads a bag into pandas tables, one a topic.
+    """Reads a bag into pandas tables, one per topic.
 
-    The index `time` is the stamp of the message's header in seconds of ROS time (float64, as `stamp.to_sec()`
-    gives it), or the time of recording where a message has no header or its stamp is 0. Tables of one bag
-    share this clock, so they can be joined by it. Rows are in the order of `time`; the column `record_time`
-    [s] keeps when each was recorded. A warning names topics whose clock was set back by more than 1 s.
+    The index `time` is the stamp of the message's header in ROS time [s], float64 as from `stamp.to_sec()`. If a
+    message has no header, or its stamp is 0, `time` is the recording time. All tables of a bag share this clock, so
+    they can be joined on `time`. Rows are sorted by `time`; the column `record_time` is the recording time [s]. A
+    warning names topics whose clock was set back by more than 1 s.
 
-    The other columns are the fields, named by their path: `pose/position/x`, `data/0`, `header/frame_id`.
-    Those of joint states are `position/JOINT`, `velocity/JOINT` and `effort/JOINT`, by name. A value that a
-    message does not have is NaN, or None for text. Transforms (`/tf`) have a row each, with `parent` and
-    `child`; diagnostics have a row a status, with `values/KEY`. `time` and `duration` fields are in seconds.
+    The other columns are the fields of the message, named by path: `pose/position/x`, `data/0`, `header/frame_id`.
+    Columns of joint states contain the joint name: `position/JOINT`, `velocity/JOINT`, `effort/JOINT`. A value that
+    a message lacks is NaN, or None for text. Each transform of `/tf` is a row with the columns `parent` and `child`.
+    Each status of diagnostics is a row with columns `values/KEY`. `time` and `duration` fields are in seconds.
 
     Args:
-        path: A `.bag` file, of any compression. No master and no message packages are needed.
-        topics: Names of topics, or one name; by default all but those with binary data, such as images.
-        images: Whether to include these by default. Their data are columns of `bytes`.
-        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size, and take more time and memory
-            than `rpbi_data.bags.limits` says.
+        path: A `.bag` file with any compression. A ROS master and message packages are not needed.
+        topics: Topics to read: names, or one name. By default all topics except those with binary data, like images.
+        images: Whether the default includes topics with binary data, which become columns of `bytes`.
+        any_size: Whether the bag may unpack to more than 1 GiB and 255 times its size, and may exceed the limits of
+            time and cells in `rpbi_data.bags.limits`.
         progress: Whether to show a progress bar.
-        nanoseconds: Whether the index is an integer [ns], in which wall time is exact, too.
+        nanoseconds: Whether the index is int64 [ns] instead, which represents wall time exactly.
 
     Returns:
-        Tables by topic, sorted by name.
+        Tables, indexed by topic and sorted by topic.
 
     Raises:
-        BagError: If there is no such file, it is no complete bag, it unfolds to more than it may, or a topic has more
-            than `rpbi_data.bags.limits` says.
-        UnknownNameError: If the bag does not have a topic that was named.
+        BagError: If the file does not exist, is not a complete bag, unpacks to too many bytes, or exceeds a limit in
+            `rpbi_data.bags.limits`.
+        UnknownNameError: If the bag lacks one of the given topics.
     """
     with BagReader(path, any_size) as bag:
         chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
@@ -228,23 +230,23 @@ def bag_to_dataframe(
     *,
     any_size: bool = False,
 ) -> pd.DataFrame:
-    """Reads a bag into one table with a row a message, as `rosbag_pandas` does.
+    """Reads a bag into one table with a row for each message, like the package `rosbag_pandas`.
 
     Args:
         path: A `.bag` file.
-        include: Topics to read: a list of names, or a regular expression that the whole name matches; by default all
+        include: Topics to read: a list of names, or a regular expression for the whole name. By default all topics
             without binary data.
         exclude: Topics to leave out, in the same form.
         any_size: See `bag_to_dataframes`.
 
     Returns:
-        Columns `TOPIC/FIELD`, such as `/joint_states/position/0`, NaN or None in the rows of other topics. The index
-        `time` is the time of recording in seconds, ascending. Stamps are in `TOPIC/header/stamp` [s].
+        A table with columns `TOPIC/FIELD`, such as `/joint_states/position/0`; they are NaN or None in rows of other
+        topics. The index `time` is the recording time [s], ascending. Stamps are in `TOPIC/header/stamp` [s].
 
     Raises:
         BagError: See `bag_to_dataframes`.
-        UnknownNameError: If the bag does not have a topic that was named.
-        ValueError: If a regular expression cannot be read.
+        UnknownNameError: If the bag lacks one of the listed topics.
+        ValueError: If a regular expression is invalid.
     """
     with BagReader(path, any_size) as bag:
         topics = _choose(bag, _named(bag, include), images=False)
@@ -257,7 +259,7 @@ def bag_to_dataframe(
 
 
 def _named(bag: BagReader, topics: str | Iterable[str] | None) -> list[str] | None:
-    """Returns the topics that a regular expression or a list names."""
+    """Returns the topics that match a regular expression or are in a list; None for None."""
     if topics is None:
         return None
     if not isinstance(topics, str):
@@ -270,14 +272,14 @@ def _named(bag: BagReader, topics: str | Iterable[str] | None) -> list[str] | No
 
 
 def _by_record_time(table: pd.DataFrame, bag: BagReader, topic: str) -> pd.DataFrame:
-    """Returns a table by time of recording, with its topic in the names of its columns."""
+    """Returns a table indexed by recording time, whose column names begin with the topic."""
     if any(each.has_header for each in bag.types[topic]):
         table.insert(1, STAMP, table.index)
     return table.set_index(RECORD_TIME).rename_axis(INDEX).add_prefix(f"{topic}/")
 
 
 def _read(bag: BagReader, builders: dict[str, TableBuilder], progress: bool = False) -> dict[str, pd.DataFrame]:
-    """Reads topics into their tables; empties `builders`."""
+    """Reads the topics of `builders` into tables; removes each builder when its table is complete."""
     chosen = list(builders)
     total = sum(bag.counts[topic] for topic in chosen)
     bar = tqdm(bag.messages(chosen), total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
@@ -296,7 +298,7 @@ def _read(bag: BagReader, builders: dict[str, TableBuilder], progress: bool = Fa
 
 
 def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[str]:
-    """Returns the topics to read, sorted and each once."""
+    """Returns the topics to read, sorted and without duplicates."""
     if topics is not None:
         chosen = sorted(set(topics))
         for topic in chosen:

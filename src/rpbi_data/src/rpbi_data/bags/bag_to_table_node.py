@@ -20,7 +20,10 @@ _NAME = "bag_to_table"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command, by default with the arguments of the process.
+    """Runs the command.
+
+    Args:
+        argv: Command-line arguments; by default the arguments of the process.
 
     Returns:
         The exit code: 0, or 1 with one line on stderr that states the error.
@@ -50,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _log_to_stderr(level: int) -> None:
-    """Shows the log of this package; the root logger would include that of rospy."""
+    """Prints the log of this package to stderr. The root logger is not used, since it includes the log of rospy."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter(f"{_NAME}: %(message)s"))
     log = logging.getLogger("rpbi_data")
@@ -59,7 +62,7 @@ def _log_to_stderr(level: int) -> None:
 
 
 def _convert(arguments: argparse.Namespace) -> pd.DataFrame:
-    """Reads the bag, writes the files and returns what was written, one row a file."""
+    """Reads the bag, writes a file for each topic, and returns a table with one row per file."""
     bag: Path = arguments.bag
     progress = not arguments.quiet
     tables = bag_to_dataframes(
@@ -79,7 +82,7 @@ def _convert(arguments: argparse.Namespace) -> pd.DataFrame:
 
 
 def _text(written: pd.DataFrame) -> str:
-    """Returns what was written as a table, texts to the left."""
+    """Formats the table of written files as text, with left-aligned names."""
     widths = {name: written[name].astype(str).str.len().max() for name in ("topic", "file")}
     left = {name: f"{{!s:<{width}}}".format for name, width in widths.items()}
     return str(written.to_string(index=False, justify="left", formatters=left))

@@ -1,7 +1,7 @@
-"""Writes topics to a bag; `Recorder` starts it as a process of its own.
+"""Program that writes topics to a bag; `Recorder` starts it as a separate process.
 
-All messages that arrive are kept until they are written. `rosbag record` keeps 100 of each topic, and loses messages
-when it gets no processor time for a while.
+All received messages are kept until they are written. In contrast, `rosbag record` keeps 100 messages per topic, and
+loses messages when it gets no processor time for a while.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from .recorded_topics import NOT_RECORDING
 
 _POLL_S = 0.1
 _FLUSH_S = 0.2
-"""Time between two writes of the open chunk, which a recorder that is killed would lose [s]."""
+"""Time between two writes of buffered messages to the disk [s]; a killed recorder loses the buffered messages."""
 _CLOCK = "/clock"
 _HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
 
 
 class _Arrival(NamedTuple):
-    """A received message; its time is zero before the first /clock."""
+    """A received message and its time of arrival in ROS time; the time is zero before the first /clock message."""
 
     topic: str
     time: genpy.Time
@@ -43,13 +43,14 @@ class _Arrival(NamedTuple):
 
 
 class BagWriter:
-    """Writes topics to a bag until `end`, compressed by LZ4; the bag is `NAME.bag.active` until it is closed.
+    """Writes topics to a bag with LZ4 compression, until `end` is called.
 
-    It keeps the time itself, in a node with `disable_rostime`: rospy would subscribe to /clock before the bag is there.
+    The bag is called `NAME.bag.active` until it is closed. The node has to be started with `disable_rostime`. This
+    class reads /clock itself, since rospy would subscribe to /clock before the bag exists.
 
     Args:
-        path: The bag.
-        min_space_mb: Free space of the disk below which it ends [MB].
+        path: Path of the bag.
+        min_space_mb: Free disk space below which the recording ends [MB].
     """
 
     def __init__(self, path: Path, min_space_mb: float) -> None:
@@ -63,17 +64,17 @@ class BagWriter:
     def end(self) -> None:
         """Makes `run` write the received messages, close the bag, and return.
 
-        Signal handlers may call it: it takes no lock. `SimpleQueue.get` of Python 3.11 may wait for ever if a signal
-        interrupts it shortly before its timeout, so it is sent an item.
+        Signal handlers may call this method, since it does not take a lock. It puts an item into the queue, because
+        `SimpleQueue.get` of Python 3.11 may block forever if a signal interrupts it shortly before its timeout.
         """
         self._is_ended = True
         self._arrivals.put(None)
 
     def run(self, topics: Sequence[str]) -> None:
-        """Writes topics until `end`.
+        """Subscribes to topics, and writes their messages until `end` is called.
 
         Raises:
-            OSError: If the bag cannot be written, or there is too little space.
+            OSError: If the bag cannot be written, or the free disk space is too small.
         """
         self._require_space()
         self._is_time_simulated = bool(rospy.get_param("/use_sim_time", False))
@@ -93,7 +94,7 @@ class BagWriter:
 
     def _write_all(self, bag: rosbag.Bag) -> None:
         flushed_s = time.monotonic()
-        untimed: list[_Arrival] = []  # received before the first /clock: they get the time of the next message
+        untimed: list[_Arrival] = []  # received before the first /clock: written with the time of the next message
         while not (self._is_ended and self._arrivals.empty()):
             try:
                 arrival = self._arrivals.get(timeout=_POLL_S)
@@ -113,7 +114,7 @@ class BagWriter:
             self._write(bag, each, self._now())
 
     def _write(self, bag: rosbag.Bag, arrival: _Arrival, at: genpy.Time) -> None:
-        """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
+        """Writes a message; in the bag, each pair of publisher and type has a separate connection."""
         header = arrival.message._connection_header
         key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
         known = bag._topic_connections  # by default, Bag.write has one connection per topic
@@ -131,7 +132,7 @@ class BagWriter:
         self._connections[key] = known[arrival.topic]
 
     def _now(self) -> genpy.Time:
-        """Returns ROS time; it is zero before the first /clock."""
+        """Returns ROS time; with simulated time, it is zero before the first /clock message."""
         return self._simulated_time if self._is_time_simulated else rospy.Time.from_sec(time.time())
 
     def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:
@@ -150,7 +151,11 @@ class BagWriter:
 
 
 def main(words: Sequence[str]) -> int:
-    """Records until SIGTERM or SIGINT; returns the exit code, 1 if the bag cannot be written."""
+    """Records until SIGTERM or SIGINT. Returns the exit code: 0, or 1 if the bag cannot be written.
+
+    Args:
+        words: Command-line arguments: node name, path of the bag, minimum free space [MB], and topics.
+    """
     parser = argparse.ArgumentParser()
     parser.add_argument("node")
     parser.add_argument("path", type=Path)
@@ -160,7 +165,7 @@ def main(words: Sequence[str]) -> int:
     writer = BagWriter(options.path, options.min_space_mb)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: writer.end())
-    allow_large_integers()  # of bytes received, about which the recorder asks
+    allow_large_integers()  # counts of received bytes, which the recorder queries, may be large
     rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True, disable_rostime=True)
     try:
         writer.run(options.topics)

@@ -1,4 +1,4 @@
-"""Connections of nodes to a subscriber, and their message counts, by the nodes' own XML-RPC interface."""
+"""Queries connections between nodes, and their message counts, through the nodes' XML-RPC interfaces."""
 
 from __future__ import annotations
 
@@ -17,11 +17,15 @@ _OUTBOUND = "o"
 
 
 def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
-    """Returns the topics that a node has not subscribed to at the master, and the publishers that do not send to it
-    yet.
+    """Returns the topics to which a node has not subscribed yet, and the publishers that do not send to the node yet.
 
-    When it has subscribed to all, the publishers are asked, since only they know whether a subscriber is connected. A
-    registered publisher that has ended is not counted; one that does not answer is, as `"/publisher (/topic)"`.
+    Subscriptions are read from the master. When the node has subscribed to all topics, the publishers are queried: only
+    they know whether a subscriber is connected. A publisher is listed as `"/publisher (/topic)"`, also if it does
+    not answer. A registered publisher whose process has ended is not listed.
+
+    Args:
+        node: Full name of the subscribing node.
+        topics: Full names of the topics.
 
     Raises:
         OSError: If the master cannot be reached.
@@ -39,7 +43,7 @@ def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], lis
     silent = []
     for publisher, published in wanted.items():
         try:
-            uri = master.lookupNode(publisher)  # an error here is of the master
+            uri = master.lookupNode(publisher)  # here, an error means that the master cannot be reached
         except rosgraph.MasterError:  # it has just ended
             continue
         try:
@@ -51,9 +55,9 @@ def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], lis
 
 
 def count_sent(node: str, topics: Collection[str]) -> dict[str, int]:
-    """Returns the number of messages that publishers of some topics have sent to a node, by topic.
+    """Returns how many messages publishers of given topics have sent to a node, indexed by topic.
 
-    Publishers that do not answer are left out, and so are all if the master does not answer.
+    Publishers that do not answer are left out. If the master does not answer, the result is empty.
     """
     counts: dict[str, int] = {}
     try:
@@ -69,7 +73,7 @@ def count_sent(node: str, topics: Collection[str]) -> dict[str, int]:
 
 
 def count_received(node: str) -> dict[str, int] | None:
-    """Returns the number of messages by topic that a node of rospy has received; None if it does not answer."""
+    """Returns how many messages a rospy node has received, indexed by topic; None if the node does not answer."""
     try:
         uri = rosgraph.Master(_CALLER).lookupNode(node)
         _, subscribers, _ = _node(uri).getBusStats(_CALLER)[2]
@@ -79,7 +83,7 @@ def count_received(node: str) -> dict[str, int] | None:
 
 
 def _topics_sent(uri: str, node: str) -> set[str]:
-    """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
+    """Returns the topics that the node at `uri` sends to `node`; empty if the node at `uri` does not answer."""
     try:
         _, _, connections = _node(uri).getBusInfo(_CALLER)
     except ConnectionRefusedError:
@@ -91,7 +95,7 @@ def _topics_sent(uri: str, node: str) -> set[str]:
 
 
 def _count_sent_by(uri: str, node: str) -> dict[str, int]:
-    """Returns the number of messages by topic that the node at `uri` has sent to `node`; none if it does not answer."""
+    """Returns how many messages the node at `uri` has sent to `node`, indexed by topic; empty without an answer."""
     other_end = _node(uri)
     try:
         connections = other_end.getBusInfo(_CALLER)[2]

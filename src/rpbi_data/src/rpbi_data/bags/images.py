@@ -1,4 +1,4 @@
-"""Images in bags: decoded without ROS, and as arrays, files and video."""
+"""Decodes images of bags without ROS, and writes them as image files or as a video."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class _Encoding(NamedTuple):
     """Layout of a pixel.
 
     Attributes:
-        dtype: Type of a channel.
-        channels: Channels in the order in which they are returned: RGB, RGBA, or one.
+        dtype: NumPy type of a channel.
+        channels: Index, in the message, of each returned channel: red, green, blue (and alpha), or a single channel.
     """
 
     dtype: str
@@ -44,18 +44,18 @@ ENCODINGS = {
     "rgb8": _Encoding("u1", (0, 1, 2)), "bgr8": _Encoding("u1", (2, 1, 0)), "8UC3": _Encoding("u1", (0, 1, 2)),
     "rgba8": _Encoding("u1", (0, 1, 2, 3)), "bgra8": _Encoding("u1", (2, 1, 0, 3)),
 }  # fmt: skip
-"""Encodings of `sensor_msgs/Image` by name; others are refused."""
+"""Supported encodings of `sensor_msgs/Image`, indexed by name."""
 
 
 def decode_image(message_type: MessageType, raw: bytes) -> Array:
     """Returns the pixels of a serialised `sensor_msgs/Image` or `sensor_msgs/CompressedImage`.
 
     Returns:
-        Shape (height, width), or (height, width, 3 or 4) with the channels red, green, blue, alpha; the type is that
-        of the encoding, in the byte order of this machine.
+        Pixels of the shape (height, width), or (height, width, 3 or 4) with the channels red, green, blue, alpha. The
+        number type is the type of the encoding, in native byte order.
 
     Raises:
-        ValueError: If it is another type, its sizes disagree, or its encoding is unknown.
+        ValueError: If the message has another type, its sizes contradict each other, or its encoding is unknown.
     """
     if message_type.name not in (RAW_TYPE, COMPRESSED_TYPE):
         raise ValueError(f"expected {RAW_TYPE} or {COMPRESSED_TYPE}, got {message_type.name}")
@@ -100,7 +100,7 @@ def _decompress(data: bytes) -> Array:
 def bag_to_images(
     path: str | Path, topic: str, *, any_size: bool = False
 ) -> Generator[tuple[float, Array], None, None]:
-    """Yields the images of a topic one by one, in the order in which they were recorded.
+    """Yields the images of a topic in the order of recording.
 
     Args:
         path: A `.bag` file.
@@ -108,10 +108,10 @@ def bag_to_images(
         any_size: See `bag_to_dataframes`.
 
     Yields:
-        The stamp [s], and the pixels as `rpbi_data.bags.images.decode_image` returns them.
+        The stamp [s] and the pixels of each image, as from `rpbi_data.bags.images.decode_image`.
 
     Raises:
-        BagError: If the bag cannot be read, or an image of it.
+        BagError: If the bag, or an image in the bag, cannot be read.
         UnknownNameError: If the bag does not have the topic.
     """
     with BagReader(path, any_size) as bag:
@@ -128,7 +128,7 @@ def bag_to_images(
 def write_images(path: str | Path, topic: str, folder: str | Path, *, any_size: bool = False) -> list[Path]:
     """Writes the images of a topic as `000000.png`, `000001.png` ..., and their stamps [s] as `times.csv`.
 
-    Images of floats, such as depths [m], become `.npy` files, which keep every bit. `times.csv` comes last.
+    Floating-point images, such as depths [m], are written as `.npy` files without loss. `times.csv` is written last.
 
     Raises:
         BagError, UnknownNameError: See `bag_to_images`.
@@ -156,13 +156,13 @@ def write_images(path: str | Path, topic: str, folder: str | Path, *, any_size: 
 def write_video(
     path: str | Path, topic: str, video: str | Path, *, hz: float | None = None, any_size: bool = False
 ) -> int:
-    """Writes the 8-bit images of a topic as an H.264 video; each frame shows the newest image at its time.
+    """Writes the 8-bit images of a topic as an H.264 video; each frame shows the newest image at the frame's time.
 
     Args:
         path: A `.bag` file.
         topic: See `bag_to_images`.
-        video: The file to write, such as `camera.mp4`; there is none if this fails.
-        hz: Frames a second; by default the mean rate of the topic.
+        video: Path of the video, such as `camera.mp4`; not written if an error occurs.
+        hz: Frames per second; by default the mean rate of the topic.
         any_size: See `bag_to_dataframes`.
 
     Returns:
@@ -211,7 +211,7 @@ def _encode(path: Path, topic: str, images: Iterator[tuple[float, Array]], hz: f
             newest = pixels
         encoder.stdin.write(newest.tobytes())
     except BrokenPipeError:
-        pass  # its own words follow
+        pass  # the message of ffmpeg is read below
     except BaseException:
         encoder.kill()
         encoder.wait()

@@ -1,4 +1,4 @@
-"""Errors of bags, and limits on the resources that a bag may use while it is read, against hostile bags."""
+"""Errors about bags, and limits on time and memory for reading a bag, which protect against hostile bags."""
 
 from __future__ import annotations
 
@@ -29,48 +29,51 @@ class RecordingError(BagError):
 
 
 MAX_DEFINITION_BYTES = 2**20
-"""Bytes of the definition of one message type, with those of the types it uses; a longer one is refused."""
+"""Largest size of the definition of a message type, including the definitions of the types in it [bytes]."""
 MAX_ALL_DEFINITIONS_BYTES = 2**24
-"""Bytes of all different definitions of a bag."""
+"""Largest total size of all different definitions in a bag [bytes]."""
 MAX_DEPTH = 50
-"""Levels of types within types."""
+"""Largest depth of nested message types."""
 MAX_CONNECTIONS = 20_000
-"""Pairs of a topic and one of its publishers."""
+"""Largest number of connections in a bag: pairs of a topic and one of the topic's publishers."""
 MAX_TOPICS = 1_000
-"""Topics that have messages; each becomes a file."""
+"""Largest number of topics with messages; each topic may become a file."""
 MAX_VALUES = 1_000_000
-"""Largest number of values of one message; a cloud of a 640x480 camera is below it. Arrays count by element unless
-stored as a whole.
+"""Largest number of values in one message; a point cloud of a 640x480 camera has fewer. Each element of an array
+counts, unless the array is stored as a whole.
 """
 MAX_NAME_BYTES = 1_000
-"""Bytes of the name of a column. fastparquet writes beyond its memory at 65,535."""
+"""Largest size of a column's name [bytes]. At 65,535 bytes, fastparquet writes beyond its buffer."""
 MAX_COLUMNS = 20_000
-"""Columns of one table."""
+"""Largest number of columns of a table."""
 MAX_CELLS = 200_000_000
-"""Cells of all tables of a bag, 8 bytes each and twice that while tables are made; 2 h of a 7-axis arm at 1 kHz."""
+"""Largest number of cells in all tables of a bag, enough for 2 h of a 7-axis arm at 1 kHz.
+
+A cell needs 8 bytes, and twice as much while a table is made.
+"""
 BASE_TIME_S = 30.0
-"""Processor time for any bag."""
+"""Processor time that is allowed for every bag [s]."""
 TIME_PER_MB_S = 2.0
-"""Processor time per MB of the compressed file; ordinary bags need less than a tenth of it."""
+"""Additional processor time for each MB of the compressed file [s]; ordinary bags need less than a tenth of this."""
 
 
 class LimitError(ValueError):
-    """A size is above its limit; readers add the bag and the topic."""
+    """A size exceeds its limit. Readers of bags add the bag and the topic to the message."""
 
     @classmethod
     def over(cls, limit: str, got: str) -> LimitError:
-        """Returns the error for a limit with its unit, such as `1,000 bytes`, and the actual size."""
+        """Returns an error that names the limit with its unit, such as `1,000 bytes`, and the actual size."""
         return cls(f"expected at most {limit}, got {got}")
 
 
 class Budget:
-    """Budget of processor time of this thread and of table cells for one bag.
+    """Limits the processor time of this thread, and the number of table cells, for reading one bag.
 
     Args:
-        path: The bag, for errors.
-        file_bytes: Size of its file.
+        path: The bag, for error messages.
+        file_bytes: Size of the bag's file [bytes].
         unlimited: Whether to disable the limits.
-        clock: Returns the processor time [s].
+        clock: Returns the processor time of this thread [s].
     """
 
     def __init__(
@@ -83,12 +86,12 @@ class Budget:
         self._all_cells = 0
 
     def check_time(self, topic: str) -> None:
-        """Raises a BagError if the time is used up while a topic is read."""
+        """Raises a BagError if the processor time is used up; `topic` is the topic that is being read."""
         if not self._unlimited and self._clock() > self._end_s:
             self._refuse(topic, f"{self._time_s:.0f} s of processor time", "a bag that needs more")
 
     def set_cells(self, topic: str, rows: int, columns: int) -> None:
-        """Counts the table of a topic, in place of its former size; raises a BagError if there are too many cells."""
+        """Sets the size of a topic's table; raises a BagError if all tables together have too many cells."""
         self._all_cells += rows * columns - self._cells.get(topic, 0)
         self._cells[topic] = rows * columns
         if not self._unlimited and self._all_cells > MAX_CELLS:

@@ -1,9 +1,10 @@
-"""Message types, read from the definition that every bag carries, and the location of each value in a message.
+"""Parses message definitions, which every bag contains, and finds the location of each value in a message.
 
-No generated class is needed. In serialised messages of one type whose strings and arrays have the same lengths, all
-values have the same offsets, so that thousands of messages can be read like one array. Serialisation is ROS 1's:
-little-endian values without padding; strings and variable-length arrays are preceded by their length as uint32; `time`
-and `duration` are two 32-bit integers.
+Generated message classes are not needed. If the strings and arrays of two messages of one type have the same lengths,
+all values have the same offsets. Thousands of messages can therefore be read like one array.
+
+Messages are serialised as in ROS 1: little-endian values without padding. Strings and variable-length arrays are
+preceded by their length as uint32. `time` and `duration` are two 32-bit integers.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ PRIMITIVE_TYPES = frozenset(
     "bool byte char int8 int16 int32 int64 uint8 uint16 uint32 uint64 float32 float64 string time duration".split()
 )
 _HEADER = (("seq", "uint32", SCALAR), ("stamp", "time", SCALAR), ("frame_id", "string", SCALAR))
-_SEPARATOR = "=" * 80  # between a definition and those of the types it uses
+_SEPARATOR = "=" * 80  # between the definitions of a type and of the types in it
 _FIELD = re.compile(r"([a-zA-Z][\w/]*)(?:\[(\d{0,10})\])?\s+([a-zA-Z]\w*)", re.ASCII)
 
 
@@ -36,9 +37,9 @@ class Field(NamedTuple):
     """One field of a message.
 
     Attributes:
-        name: Its name.
-        type: The name of a primitive type (`float64`, `string`, `time`, ...), or a message type.
-        length: Elements of a fixed-length array, else `SCALAR` or `VARIABLE`.
+        name: Name of the field.
+        type: Name of a primitive type (`float64`, `string`, `time`, ...), or a message type.
+        length: Number of elements of a fixed-length array, or `SCALAR`, or `VARIABLE` for other arrays.
     """
 
     name: str
@@ -48,13 +49,13 @@ class Field(NamedTuple):
 
 @dataclass(eq=False)
 class MessageType:
-    """A message type with all the types it is made of.
+    """A message type, including the types of its fields.
 
     Attributes:
         name: Full name, such as `sensor_msgs/JointState`.
-        fields: Its fields in the order in which they are serialised, without those that have no bytes: messages
-            without fields, arrays of a fixed number of them, and arrays of length 0.
-        holds_bytes: Whether it has a variable number of bytes (`uint8[]`) anywhere, as images and point clouds do.
+        fields: Fields in the order of serialisation. Fields without bytes are left out: messages without fields,
+            fixed-length arrays of such messages, and arrays of length 0.
+        holds_bytes: Whether the type contains a variable-length byte array (`uint8[]`), like images and point clouds.
     """
 
     name: str
@@ -63,12 +64,13 @@ class MessageType:
 
     @classmethod
     def parse(cls, name: str, definition: str) -> MessageType:
-        """Reads a definition as bags carry it: the type's text, then a `MSG: package/Type` section for each it uses.
+        """Parses a definition as in bags: the text of the type, then a section `MSG: package/Type` for each type in it.
 
-        It takes time in proportion to the length of the text, as each type is read once.
+        The time is proportional to the length of the text, since each type is parsed once.
 
         Raises:
-            ValueError: If the text is no valid definition; a LimitError if it is too long or too deep.
+            LimitError: If the definition is too long, or types are nested too deeply.
+            ValueError: If the text is not a valid definition.
         """
         try:
             if len(definition) > MAX_DEFINITION_BYTES:
@@ -79,7 +81,7 @@ class MessageType:
 
     @property
     def has_header(self) -> bool:
-        """Whether it starts with a `std_msgs/Header`, and so has a stamp."""
+        """Whether the first field is a `std_msgs/Header`, so that messages have a stamp."""
         first, length = self.fields[0][1:] if self.fields else ("", SCALAR)
         is_header = isinstance(first, MessageType) and first.name == "std_msgs/Header" and first.fields == _HEADER
         return is_header and length == SCALAR
@@ -89,7 +91,7 @@ class _Builder:
     """Builds each type of a definition once.
 
     Args:
-        declared: By type the name, the type's name and the length of each field.
+        declared: Name, type name and length of each field, indexed by the name of the message type.
     """
 
     def __init__(self, declared: dict[str, list[tuple[str, str, int]]]) -> None:
@@ -138,7 +140,7 @@ def _split(name: str, definition: str) -> Iterator[tuple[str, list[tuple[str, st
 
 
 def _fields(type_name: str, text: str) -> Iterator[tuple[str, str, int]]:
-    """Yields name, type and length of each field that a text declares; constants are no part of messages."""
+    """Yields name, type and length of each field that a text declares; constants are skipped."""
     package = type_name.partition("/")[0]
     seen = set()
     for line in text.split("\n"):
@@ -175,8 +177,8 @@ class Leaf(NamedTuple):
 
     Attributes:
         kind: A primitive type, or `BYTES` for an array that is kept whole.
-        start: Offset of its first byte; of a string, of its first character.
-        size: Number of bytes.
+        start: Offset of the value's first byte in the message; of a string, offset of the first character.
+        size: Number of bytes of the value.
     """
 
     kind: str
@@ -185,11 +187,11 @@ class Leaf(NamedTuple):
 
     @property
     def span(self) -> tuple[int, int]:
-        """Offsets of its first byte and of the byte after it."""
+        """Offsets of the value's first byte, and of the first byte after the value."""
         return self.start, self.start + self.size
 
     def text(self, raw: bytes) -> str:
-        """Returns the string at this place of a message."""
+        """Returns the string at the location of this value in a serialised message."""
         return raw[self.start : self.start + self.size].decode("utf-8", "replace")
 
 
@@ -197,9 +199,9 @@ class Layout(NamedTuple):
     """Locations of the values of one message.
 
     Attributes:
-        leaves: Values by path, such as `pose/position/x` or `data/3`.
-        counts: Numbers of elements of arrays by path.
-        fixed: Spans that must be equal in another message for this layout to be valid for it: the lengths.
+        leaves: Values, indexed by path, such as `pose/position/x` or `data/3`.
+        counts: Number of elements of each array, indexed by path.
+        fixed: Spans of bytes that contain lengths. The layout is valid for another message with equal bytes there.
     """
 
     leaves: dict[str, Leaf]
@@ -208,13 +210,13 @@ class Layout(NamedTuple):
 
 
 def lay_out(message_type: MessageType, raw: bytes) -> Layout:
-    """Finds the values of a serialised message.
+    """Finds the locations of all values in a serialised message.
 
-    Arrays become one value an element (`K/0`, `K/1`, ...). Variable-length arrays of bytes, and arrays of
-    more than `MAX_ARRAY_COLUMNS` numbers, are one value of kind `BYTES`.
+    Each element of an array is a value (`K/0`, `K/1`, ...). Variable-length byte arrays, and arrays of more than
+    `MAX_ARRAY_COLUMNS` numbers, are single values of the kind `BYTES`.
 
     Raises:
-        LimitError: If it has too many values, or one whose path is too long.
+        LimitError: If the message has too many values, or a value's path is too long.
         ValueError: If the message does not fit its type.
     """
     cursor = _Cursor(raw)
@@ -225,7 +227,7 @@ def lay_out(message_type: MessageType, raw: bytes) -> Layout:
 
 
 class _Cursor:
-    """Walks through one message, field by field."""
+    """Reads the layout of one message, field by field."""
 
     def __init__(self, raw: bytes) -> None:
         self.raw = raw

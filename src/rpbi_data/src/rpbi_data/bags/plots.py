@@ -1,4 +1,4 @@
-"""Figures of the tables of a bag."""
+"""Draws figures from the tables of a bag."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_LINES = 20
-"""Largest number of lines of a panel with a legend; with more there is none."""
+"""Largest number of lines of a panel that has a legend; panels with more lines have none."""
 MAX_POINTS = 20_000
-"""Largest number of points of a line; longer lines are drawn with evenly spaced points."""
+"""Largest number of points of a line; of longer lines, every k-th point is drawn."""
 _AXES = "xyz"
 _QUANTITIES = {
     "position": "position [rad or m]",
@@ -29,15 +29,19 @@ _QUANTITIES = {
 
 
 def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Figure]) -> Iterator[tuple[str, Figure]]:
-    """Yields figures of a bag's tables, each with a file name without ending.
+    """Yields figures of a bag's tables, each with a file name without suffix.
 
-    Each group of values has one figure, with a panel for each quantity. Joint states have positions, velocities and
-    efforts; wrenches forces and torques; transforms the paths of all frames of a body; contacts the normal forces by
-    pair of bodies. The last figures are the times between messages of all
-    topics, and the delays from stamps to the time of recording.
+    Each figure has a panel for each quantity:
+
+    - joint states: positions, velocities and efforts,
+    - wrenches: forces and torques,
+    - transforms: x, y and z of all frames of a body,
+    - contacts: normal forces, with a line for each touching body.
+
+    The last figures show the times between messages, and the delays from stamp to recording, for all topics.
 
     Args:
-        tables: By topic, as `bag_to_dataframes` returns them. The time axis starts at their first row.
+        tables: Tables from `bag_to_dataframes`, indexed by topic. The time axis starts at the first row of all tables.
         new_figure: `matplotlib.figure.Figure`, or `matplotlib.pyplot.figure` for windows.
     """
     filled = {topic: table for topic, table in tables.items() if len(table)}
@@ -55,11 +59,11 @@ def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Fi
 
 
 Lines = Mapping[str, pd.Series]
-"""Values over time [s] by the names of the lines."""
+"""Values over time [s], indexed by the name of the line."""
 
 
 def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
-    """Yields figures of a table: the end of a file name, and panels by the labels of their y axes."""
+    """Yields figures of a table: the end of the file name, and the lines of each panel, indexed by y-axis label."""
     if {"link", "other_body", "normal_force"} <= set(table.columns):
         forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
         every = forces.reindex(table.index.unique(), fill_value=0.0)
@@ -89,17 +93,17 @@ def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
 
 
 def _is_twice(body: str, bodies: Iterable[tuple[str, str]]) -> bool:
-    """Returns whether frames of a body have more than one parent."""
+    """Returns whether frames of a body occur with more than one parent."""
     return sum(other == body for _, other in bodies) > 1
 
 
 def _by_last_name(table: pd.DataFrame) -> Lines:
-    """Returns the columns of joints that have values; those of fixed joints, always 0, are left out."""
+    """Returns the columns with a value other than 0, indexed by joint; this leaves out fixed joints."""
     return {name.partition("/")[2]: table[name] for name in table if table[name].fillna(0.0).any()}
 
 
 def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
-    """Returns the components of a vector at the first prefix that has them."""
+    """Returns the components x, y and z of a vector, for the first prefix for which the table has them; or none."""
     for prefix in prefixes:
         if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
             return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}
@@ -112,7 +116,7 @@ def _intervals(tables: Mapping[str, pd.DataFrame]) -> Lines:
 
 
 def _delays(tables: Mapping[str, pd.DataFrame], start_s: float) -> Lines:
-    """Returns the delays of topics with stamps [ms]; others have their time of recording as the index."""
+    """Returns the delay from stamp to recording of each topic [ms]; topics without stamps are left out."""
     delays = {topic: 1e3 * (table[RECORD_TIME] - table.index.to_numpy()) for topic, table in tables.items()}
     return {topic: each.set_axis(each.index - start_s) for topic, each in delays.items() if each.any()}
 

@@ -1,4 +1,4 @@
-"""Records topics in a process of its own without losing messages, and reports losses."""
+"""Records topics in a separate process that buffers all messages, and reports lost messages."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from .connected_topics import count_received, count_sent, find_unconnected
 from .limits import RecordingError
 
 NOT_RECORDING = "not recording: "
-"""Beginning of what the recording process prints before it ends with 1."""
+"""Beginning of the line that the recording process prints before it ends with the exit code 1."""
 _POLL_S = 0.02
 _QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
-"""Number, spacing [s] and duration [s] of checks that find the recorder idle at the end, to let the last messages
-arrive. Several checks, since a single time span might pass while the machine stands still.
+"""At the end, the recorder has to be idle in this number of checks, with this spacing [s], to let the last messages
+arrive. The checks end after `_MOST_GRACE_S` at the latest [s]. A single check could fall into a pause of the machine.
 """
 _ACTIVE = ".active"
 _DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
@@ -38,27 +38,27 @@ _log = logging.getLogger(__name__)
 
 
 class Recorder:
-    """Records some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
+    """Context manager that records all messages published inside the context to a bag with LZ4 compression.
 
-    The bag is written by a process of its own. It keeps all messages until they are written, even if it gets no
-    processor time for a while. When this process is killed, it closes the bag and ends, too.
+    A separate process writes the bag. It keeps all messages until they are written, even if it gets no processor time
+    for a while. When the present process is killed, the recording process closes the bag and ends, too.
 
-    On entry it waits until the recorder has subscribed to every topic and every publisher that is there sends to it; on
-    exit it stops the recorder and waits until the bag is closed. It waits in wall time, never ROS time.
+    On entry, the context waits until the recording process has subscribed to every topic, and every existing publisher
+    sends to it. On exit, it stops the recording process and waits until the bag is closed. All waiting is in wall time.
 
         with Recorder("out/run.bag", ["/rpbi/kuka/joint_states", "/tf"]):
             ...
 
     Args:
-        path: The bag to write, ending with `.bag`. Its folder is created, and a bag of that name is replaced.
+        path: Path of the bag, ending with `.bag`. Its folder is created, and an existing bag is replaced.
         topics: Topics to record; relative names are resolved in the namespace of this process.
-        timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
-        min_space_mb: Free space of the disk below which the recording ends [MB].
-        handles: File handles that the process of the recorder holds open, too, such as of a lock.
+        timeout_s: Longest time to wait for the subscriptions, and for the bag to be closed [s].
+        min_space_mb: Free disk space below which the recording ends [MB].
+        handles: File handles that the recording process keeps open, too, such as the handle of a lock.
 
     Attributes:
-        missing: Number of messages that had been sent when it was stopped and that have not arrived, since its process
-            stood still for too long.
+        missing: Number of messages that had been sent before the stop but never arrived, because the recording process
+            got no processor time for too long.
     """
 
     def __init__(
@@ -93,26 +93,26 @@ class Recorder:
             return
         try:
             self.stop()
-        except RecordingError as second:  # what happened inside is the news; Ctrl-C goes to the recorder too
+        except RecordingError as second:  # the first error matters more; Ctrl-C also ends the recorder
             _log.log(logging.INFO if isinstance(error, KeyboardInterrupt) else logging.WARNING, "%s", second)
 
     @property
     def is_running(self) -> bool:
-        """Whether the recorder is alive."""
+        """Whether the recording process runs."""
         return self._process is not None and self._process.poll() is None
 
     def published(self) -> dict[str, int]:
-        """Returns the number of messages that publishers have sent to the recorder so far, by topic.
+        """Returns how many messages publishers have sent to the recorder so far, indexed by topic.
 
-        Publishers that do not answer are left out, and so are all if the master does not answer.
+        Publishers that do not answer are left out. If the master does not answer, the result is empty.
         """
         return count_sent(self._node, self.topics)
 
     def start(self) -> None:
-        """Starts recording and returns when everything that is published from now on will be recorded.
+        """Starts recording. When this method returns, all messages published from then on are recorded.
 
         Raises:
-            RecordingError: If there is no master or it ends, the bag cannot be written, or the recorder ends or
+            RecordingError: If the master cannot be reached, the bag cannot be written, or the recorder ends or
                 does not subscribe in time.
         """
         if self.is_running:
@@ -137,10 +137,10 @@ class Recorder:
             raise
 
     def stop(self) -> Path:
-        """Stops recording and returns the path of the bag, closed and complete.
+        """Stops recording, waits until the bag is complete and closed, and returns the bag's path.
 
         Raises:
-            RecordingError: If the recorder had ended before, could not write, or did not close the bag.
+            RecordingError: If the recorder was not started, ended early, could not write, or did not close the bag.
         """
         if self._process is None:
             raise RecordingError(self.path, "has not been started")
@@ -183,9 +183,10 @@ class Recorder:
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
 
     def _wait_until_received(self) -> None:
-        """Waits for all messages sent before: TCP may pause for seconds after the recorder got no processor time.
+        """Waits until all messages sent so far have arrived, and sets `missing`.
 
-        It waits as long as messages arrive, and longer for a process that does not answer.
+        Waits at most `_MOST_GRACE_S` without progress, or `timeout_s` if the recorder never answers. TCP may pause for
+        seconds after the recorder got no processor time.
         """
         wanted, last = self.published(), -1
         answer_end = time.monotonic() + self._timeout_s
@@ -209,7 +210,11 @@ class Recorder:
             turns += _is_asleep(self._process.pid)
 
     def _end(self) -> bool:
-        """Ends the process, which may write for as long as its file grows; returns whether it did so by itself."""
+        """Ends the recording process; kills it if it has not ended and the bag stops growing.
+
+        Returns:
+            Whether the process ended by itself with the exit code 0.
+        """
         assert self._process is not None and self._process.stdin is not None
         self._process.send_signal(signal.SIGTERM)
         size = self._written()
@@ -227,7 +232,7 @@ class Recorder:
             self._process.stdin.close()
 
     def _written(self) -> int:
-        """Returns the size of the bag that is being written [bytes]; -1 if it is closed."""
+        """Returns the size of the bag that is being written [bytes]; -1 if the bag is closed."""
         try:
             return self.path.with_name(self.path.name + _ACTIVE).stat().st_size
         except OSError:
@@ -243,14 +248,14 @@ class Recorder:
         return f": {lines[-1]}" if lines else ""
 
     def _lines(self) -> list[str]:
-        """Returns the lines that the recorder has printed."""
-        file = self._output.fileno()  # the recorder shares its position, so that it must not be moved
+        """Returns the lines that the recording process has printed, without log prefixes."""
+        file = self._output.fileno()  # `pread` keeps the file position, which the recorder shares
         text = os.pread(file, os.fstat(file).st_size, 0).decode("utf-8", "replace")
         return [line for line in _DECORATION.sub("", text).splitlines() if line.strip()]
 
 
 def _is_asleep(process_id: int) -> bool:
-    """Returns whether all threads of a process wait: none runs, is runnable or is stopped."""
+    """Returns whether all threads of a process sleep: no thread runs, is runnable or is stopped."""
     try:
         threads = [path.read_text() for path in Path(f"/proc/{process_id}/task").glob("*/stat")]
     except OSError:  # one has just ended

@@ -1,4 +1,4 @@
-"""Tables of different rates on one clock."""
+"""Resampling of tables with different rates at common times."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .times import MAX_SECONDS, resolution_ns, row_times, to_nanoseconds, to_sec
 Array = NDArray[Any]
 
 TIME_ERROR = "time_error"
-"""Column with the time between a row and the nearest sample that it was computed from [s]."""
+"""Name of the column with the time between a row and the nearest sample from which the row was computed [s]."""
 _QUATERNION = "xyzw"
 
 
 class Aligned(NamedTuple):
-    """Several tables on one clock.
+    """Several tables, resampled at common times.
 
     Attributes:
         table: Columns `NAME/COLUMN` of all tables; the index is `time` [s].
-        max_time_error_s: Largest time error by name [s]; NaN for a table without a sample in the range.
+        max_time_error_s: Largest time error of each table [s], indexed by name; NaN if no row of the table has a value.
     """
 
     table: pd.DataFrame
@@ -43,19 +43,20 @@ def align(
     method: str | Mapping[str, str] = "linear",
     max_time_error_s: float = np.inf,
 ) -> Aligned:
-    """Resamples tables at common times; exactly one of `to`, `hz` and `times` states which.
+    """Resamples tables at common times, which exactly one of `to`, `hz` and `times` defines.
 
     Args:
-        tables: Tables of one clock by names of your choice, for instance those of `bag_to_dataframes`.
-        to: Name of the table with the times.
-        hz: Rate of the times, over the range that all tables cover [Hz].
-        times: The times [s], ascending.
-        method: See `resample`; one for all, or by name (the default for those left out is `linear`).
+        tables: Tables whose times belong to the same clock, indexed by any name; for instance from `bag_to_dataframes`.
+        to: Name of the table at whose times the other tables are resampled.
+        hz: Rate of the times, which cover the range that all tables have in common [Hz].
+        times: The times, ascending, shape (n,) [s].
+        method: Method for all tables, or a method for each table name; see `resample`. The default is `linear`.
         max_time_error_s: See `resample`.
 
     Raises:
-        ValueError: If there is no table, the times are not stated once, or the tables have no range in common.
-        UnknownNameError: If there is no table or method of that name.
+        ValueError: If `tables` is empty, not exactly one of `to`, `hz` and `times` is given, or the tables have no
+            range in common.
+        UnknownNameError: If a table or a method does not exist.
     """
     if not tables:
         raise ValueError("expected at least one table, got none")
@@ -83,24 +84,25 @@ def resample(
 ) -> pd.DataFrame:
     """Returns the values of a table at other times.
 
-    Each column is computed from its own samples, without the rows where it is NaN or None. Of several samples of one
-    time the last counts. There is no extrapolation: before the first sample, and with `linear` after the last one,
-    there is no value. Times are compared as integer nanoseconds; those that floats cannot distinguish are one time,
-    which is 0.24 us in wall time.
+    Each column is computed from its own samples; rows in which the column is NaN or None are skipped. If several
+    samples have the same time, the last one is used. Before its first sample, a column has no value with `previous` and
+    `linear`; after its last sample, it has no value with `linear`. Times are compared as integer nanoseconds. Times
+    that floats cannot distinguish count as equal; in wall time, these differ by up to 0.24 us.
 
     Args:
         table: A table with the index `time` [s], ascending.
         times: Times of the new rows, shape (n,), ascending [s].
-        method: `nearest`, `previous` or `linear`. With `linear`, groups of columns `PATH/x`, `PATH/y`, `PATH/z`,
-            `PATH/w` are quaternions, interpolated by slerp, and text and truth values are the previous ones.
-        max_time_error_s: Rows have no value in a column whose nearest sample in use is further away than this [s].
+        method: `nearest`, `previous` or `linear`. With `linear`, columns `PATH/x`, `PATH/y`, `PATH/z`, `PATH/w` are
+            a quaternion, which is interpolated by slerp. Texts and booleans always have the previous value then.
+        max_time_error_s: Largest time between a row and the nearest sample used [s]; beyond this time, the row has no
+            value.
 
     Returns:
-        The same columns; numbers are floats. The last column, `time_error` [s], has the largest time between the row
-        and the nearest sample that one of its values was computed from.
+        A table with the same columns, in which numbers are floats, and the last column `time_error` [s]. For each value
+        in a row, there is a time to the nearest sample used; `time_error` is the largest of these times.
 
     Raises:
-        UnknownNameError: If there is no such method.
+        UnknownNameError: If the method does not exist.
         ValueError: If times are not ascending and finite, or a quaternion is zero.
     """
     wanted, known = _checked_times(times, "times"), _checked_times(table.index, "index of the table")
@@ -113,7 +115,7 @@ def resample(
 def resample_exactly(
     table: pd.DataFrame, times: Array, method: str = "linear", max_time_error_s: float = np.inf
 ) -> pd.DataFrame:
-    """Returns the values of a table at other times, see `resample`, whose index and times are int64 [ns]."""
+    """Returns the values of a table at other times, like `resample`, but index and times are int64 [ns]."""
     if method not in _METHODS:
         raise UnknownNameError("method", method, _METHODS)
     known = table.index.to_numpy()
@@ -121,7 +123,7 @@ def resample_exactly(
     largest = np.full(len(times), np.nan)
     for names in _groups(table.columns, method):
         is_there = np.flatnonzero(~table[names].isna().to_numpy().any(axis=1))
-        is_last = np.append(np.diff(known[is_there]) > 0, True)[: len(is_there)]  # of the samples of one time
+        is_last = np.append(np.diff(known[is_there]) > 0, True)[: len(is_there)]  # among samples with equal times
         rows = is_there[is_last]
         samples = table[names].to_numpy()[rows]
         if len(names) > 1 and not samples.any(axis=1).all():
@@ -147,9 +149,7 @@ def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
 
 
 def _snapped(times: Array, known: Array, resolution: int) -> Array:
-    """Returns times [ns]; each that floats of that resolution cannot distinguish from a known time is replaced by
-    it.
-    """
+    """Replaces each time by a known time that differs by at most `resolution`, if there is one; all in [ns]."""
     if not len(known):
         return times
     newest = known[np.searchsorted(known, times + resolution, side="right") - 1]
@@ -157,7 +157,7 @@ def _snapped(times: Array, known: Array, resolution: int) -> Array:
 
 
 def _common_times(tables: Mapping[str, pd.DataFrame], hz: float) -> Array:
-    """Returns times of a rate over the range that all tables cover, from its beginning on: int64 [ns]."""
+    """Returns times at a constant rate over the range that all tables have in common, int64 [ns]."""
     if not (np.isfinite(hz) and hz > 0):
         raise ValueError(f"hz: expected a positive rate, got {hz}")
     empty = [name for name, table in tables.items() if not len(table)]
@@ -171,7 +171,7 @@ def _common_times(tables: Mapping[str, pd.DataFrame], hz: float) -> Array:
 
 
 def _groups(columns: Sequence[str], method: str) -> Iterator[list[str]]:
-    """Yields the columns that are interpolated together: those of a quaternion, or each by itself."""
+    """Yields groups of columns that are interpolated together: the four columns of a quaternion, or a single column."""
     every = set(columns)
     for name in columns:
         prefix, _, last = name.rpartition("/")
@@ -183,7 +183,7 @@ def _groups(columns: Sequence[str], method: str) -> Iterator[list[str]]:
 
 
 Resampled = tuple[Array, Array]
-"""New values, shape (n, columns), and the time to the nearest sample that was used, shape (n,) [s]; NaN for none."""
+"""New values, shape (n, columns), and times to the nearest sample used, shape (n,) [s]; NaN for missing values."""
 
 
 def _previous(known: Array, samples: Array, wanted: Array) -> Resampled:
@@ -197,7 +197,7 @@ def _nearest(known: Array, samples: Array, wanted: Array) -> Resampled:
 
 
 def _picked(known: Array, samples: Array, wanted: Array, index: Array) -> Resampled:
-    """Returns samples by their indices; -1 is none."""
+    """Returns the samples with given indices; the index -1 stands for a missing value."""
     is_there = index >= 0
     is_number = samples.dtype.kind in "iuf"
     new = np.full((len(wanted), samples.shape[1]), np.nan if is_number else None, float if is_number else object)
@@ -226,8 +226,9 @@ def _linear(known: Array, samples: Array, wanted: Array) -> Resampled:
 
 
 def _slerp(start: Array, end: Array, share: Array) -> Array:
-    """Interpolates along the shortest rotation between unit quaternions, shape (n, 4); the signs are those of
-    `start`.
+    """Interpolates between unit quaternions, shape (n, 4), along the shortest rotation.
+
+    The sign of each result is chosen such that the result is nearest to `start`.
     """
     first = Rotation.from_quat(start)
     whole = (first.inv() * Rotation.from_quat(end)).as_rotvec()

@@ -1,4 +1,4 @@
-"""Mapping of a message to rows and columns: one row per message, except for the types in `PLANS`."""
+"""Maps messages to rows and columns of tables: one row per message, except for message types in `PLANS`."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -19,9 +19,9 @@ class RowPlan(NamedTuple):
     """Mapping of messages of one layout to rows.
 
     Attributes:
-        rows: The columns of each row of a message; a stamp is the column `STAMP`.
-        fixed: Spans that must be equal in another message for this plan to be valid for it.
-        notes: Content that has no place in the table, for the log.
+        rows: Columns of each row that a message becomes; the column `STAMP` is the stamp of the row.
+        fixed: Spans of bytes that must be equal in another message, for this plan to be valid for that message.
+        notes: Messages for the log about content that is not in the table.
     """
 
     rows: list[Columns]
@@ -30,21 +30,21 @@ class RowPlan(NamedTuple):
 
 
 def plan_rows(message_type: MessageType, raw: bytes, is_plain: bool = False) -> RowPlan:
-    """Finds rows and columns for a serialised message and all that share its layout.
+    """Plans rows and columns for a serialised message, and for all messages with the same layout.
 
     Args:
-        message_type: Its type.
-        raw: The message.
-        is_plain: Whether to ignore `PLANS`.
+        message_type: Type of the message.
+        raw: The serialised message.
+        is_plain: Whether to make one row per message for all message types, without `PLANS`.
 
     Raises:
-        LimitError: If it has too many values, or a row too many columns or one with too long a name.
+        LimitError: If the message has too many values, a row has too many columns, or a column's name is too long.
         ValueError: If the message does not fit its type.
     """
     layout = lay_out(message_type, raw)
     try:
         rows, names, notes = (_one_row if is_plain else PLANS.get(message_type.name, _one_row))(layout, raw)
-    except (KeyError, ValueError):  # a value is at another place than in the usual definition, or in a long array
+    except (KeyError, ValueError):  # the type differs from its usual definition, or a value is in a long array
         rows, names, notes = _one_row(layout, raw)
         notes = [*notes, f"not as {message_type.name} usually is: one row a message"]
     for row in rows:
@@ -54,7 +54,7 @@ def plan_rows(message_type: MessageType, raw: bytes, is_plain: bool = False) -> 
 
 
 def _check_columns(row: Columns) -> None:
-    """Raises a LimitError if a row has too many columns, or one with too long a name."""
+    """Raises a LimitError if a row has too many columns, or a column's name is too long."""
     if len(row) > MAX_COLUMNS:
         raise LimitError.over(f"{MAX_COLUMNS:,} columns", f"{len(row):,} in one message")
     for name in row:
@@ -67,7 +67,7 @@ Plan = tuple[list[Columns], Iterable[Leaf], list[str]]  # rows, leaves that name
 
 
 def _one_row(layout: Layout, raw: bytes) -> Plan:
-    """One row with every value; long arrays of messages or strings are left out."""
+    """Makes one row with all values; long arrays of messages or strings are left out."""
     counts = layout.counts.items()
     long = [path for path, count in counts if count > MAX_ARRAY_COLUMNS and path not in layout.leaves]
     inside = tuple(f"{path}/" for path in long)
@@ -76,7 +76,7 @@ def _one_row(layout: Layout, raw: bytes) -> Plan:
 
 
 def _joint_state(layout: Layout, raw: bytes) -> Plan:
-    """One row with a column for each joint that is named; without names, for each index."""
+    """Makes one row with columns for each joint, named by joint; by index if the message has no joint names."""
     leaves, counts, notes = layout.leaves, layout.counts, []
     names = [leaves[f"name/{index}"] for index in range(counts["name"])]
     columns = {path: leaf for path, leaf in leaves.items() if path.startswith("header/")}
@@ -92,7 +92,7 @@ def _joint_state(layout: Layout, raw: bytes) -> Plan:
 
 
 def _transforms(layout: Layout, raw: bytes) -> Plan:
-    """One row per transform, each with its own stamp."""
+    """Makes one row per transform, with the stamp of the transform."""
     leaves, rows = layout.leaves, []
     for index in range(layout.counts["transforms"]):
         prefix = f"transforms/{index}/"
@@ -104,7 +104,10 @@ def _transforms(layout: Layout, raw: bytes) -> Plan:
 
 
 def _contacts(layout: Layout, raw: bytes) -> Plan:
-    """One row per contact, with stamp and sum of forces of its message; without contacts, one row with these alone."""
+    """Makes one row per contact, which also has the message's stamp and sum of forces.
+
+    A message without contacts becomes one row with stamp and sum of forces.
+    """
     message = {path: leaf for path, leaf in layout.leaves.items() if not path.startswith("points/")}
     points: list[Columns] = [{} for _ in range(layout.counts["points"])]
     for path, leaf in layout.leaves.items():
@@ -115,7 +118,7 @@ def _contacts(layout: Layout, raw: bytes) -> Plan:
 
 
 def _diagnostics(layout: Layout, raw: bytes) -> Plan:
-    """One row per status, with a column for each of its keys."""
+    """Makes one row per status, with a column for each key of the status."""
     leaves, counts, rows, keys = layout.leaves, layout.counts, [], []
     for index in range(counts["status"]):
         prefix = f"status/{index}/"
@@ -139,12 +142,12 @@ PLANS: dict[str, Callable[[Layout, bytes], Plan]] = {
 
 
 def _rename_reserved(row: Columns) -> Columns:
-    """Renames fields that have the name of the index or of the column that every table has."""
+    """Renames fields called `time` or `record_time`, since the index and a column of every table have these names."""
     return {f"{name}_" if name in (INDEX, RECORD_TIME) else name: leaf for name, leaf in row.items()}
 
 
 def _merge(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Joins spans that touch, so that there are few to compare."""
+    """Joins touching spans, so that fewer spans have to be compared."""
     merged: list[tuple[int, int]] = []
     for start, stop in sorted(spans):
         if merged and start <= merged[-1][1]:

@@ -1,4 +1,4 @@
-"""Serialised messages to pandas tables, many at a time and without ROS; and tables to files."""
+"""Converts serialised messages to pandas tables, many at a time and without ROS, and writes tables to files."""
 
 import logging
 import re
@@ -22,28 +22,28 @@ from .times import PER_SECOND, clock_of, to_seconds
 
 Array = NDArray[Any]
 _Piece = tuple[int, Array]
-"""Values of a column, and the row that they begin with."""
+"""Index of the first row, and values of a column from this row on."""
 
 FORMATS = ("parquet", "csv", "hdf5")
 BATCH_MESSAGES = 16_384
 BATCH_BYTES = 32 * 1024 * 1024
 MAX_STEM_LENGTH = 200
-"""Largest number of characters of a file's name from the topic, before a number; file systems allow 255 bytes."""
+"""Largest number of characters of a file name, without number and suffix; file systems allow 255 bytes."""
 MAX_PIECES = 500_000
-"""Largest number of pieces of all columns, some 200 bytes each beside their values; beyond it they are merged."""
+"""Number of pieces of all columns above which pieces are merged; each needs 200 bytes in addition to its values."""
 OWN_COLUMNS = 3
-"""Columns that the builder adds: time, time of recording, number of the message."""
+"""Number of columns that the builder adds: time, recording time, and number of the message."""
 
 _log = logging.getLogger(__name__)
 
 
 class _Block(NamedTuple):
-    """Messages of one layout.
+    """Messages with the same layout.
 
     Attributes:
-        rows: The columns of each row that one of them gives.
-        matrix: The messages, shape (n, size), uint8.
-        indices: Their places in the batch, shape (n,), ascending.
+        rows: Columns of each row that one message becomes.
+        matrix: The n serialised messages, shape (n, size), uint8.
+        indices: Indices of the messages in the batch, ascending, shape (n,).
     """
 
     rows: list[Columns]
@@ -52,17 +52,17 @@ class _Block(NamedTuple):
 
 
 class TableBuilder:
-    """Collects the serialised messages of one topic and turns them into one table.
+    """Collects the serialised messages of one topic, and converts them to one table.
 
-    Messages are read in batches, those of one layout (see `message_layout.py`) at once. Strings and numbers are
-    unchanged; a value that a message lacks is NaN (None in columns of text).
+    Messages are read in batches; messages with the same layout (see `message_layout.py`) are read at once. Strings and
+    numbers are not changed. A value that a message lacks is NaN, or None in columns of text.
 
     Args:
         topic: Name of the topic, for the log.
-        keep_binary: Whether binary arrays become columns of `bytes`; else they are left out.
-        budget: Limits of time and cells, if any.
-        is_plain: Whether every message is one row, with columns named by its fields alone.
-        in_nanoseconds: Whether the index is int64 [ns] instead of a float [s].
+        keep_binary: Whether binary arrays become columns of `bytes`; otherwise they are left out.
+        budget: Limits of time and cells; None for no limits.
+        is_plain: Whether every message becomes one row, and columns are named only by the path of the field.
+        in_nanoseconds: Whether the index is int64 [ns] instead of float [s].
     """
 
     def __init__(
@@ -92,11 +92,11 @@ class TableBuilder:
         self._types: Counter[str] = Counter()
 
     def add(self, message_type: MessageType, raw: bytes, record_time_ns: int) -> None:
-        """Adds a serialised message with the time at which it was recorded [ns].
+        """Adds a serialised message and its recording time [ns].
 
         Raises:
-            LimitError: If the table has too many columns, or one with too long a name; so does `table`.
-            BagError: If the budget is used up; so does `table`.
+            LimitError: If the table has too many columns, or a column's name is too long.
+            BagError: If the budget is used up.
         """
         self._batch.append((message_type, raw, record_time_ns))
         self._batch_bytes += len(raw)
@@ -104,12 +104,14 @@ class TableBuilder:
             self._read_batch()
 
     def table(self) -> pd.DataFrame:
-        """Returns all rows in the order of time; to be called once, after the last message.
+        """Returns the table of all messages, sorted by time. Must be called only once, after the last message.
 
-        The index `time` is the stamp of the header [s], or the record time where there is none or it is 0; with
-        `in_nanoseconds`, int64 [ns].
-        The column `record_time` [s] is the first; the others are grouped by field. A warning names a clock that was
-        set back, and messages of several types.
+        The index `time` is the stamp of the header [s], or int64 [ns] with `in_nanoseconds`. Without a header, or with
+        the stamp 0, it is the recording time. The first column is `record_time` [s]; the others are grouped by field.
+        A warning is logged if a clock was set back, or if messages have several types.
+
+        Raises:
+            LimitError, BagError: See `add`.
         """
         self._read_batch()
         for note, times in self._notes.items():
@@ -132,7 +134,7 @@ class TableBuilder:
         return table.set_axis(pd.Index(time[order], name=INDEX)) if self._in_nanoseconds else table
 
     def _read_batch(self) -> None:
-        """Reads the messages that are waiting, sorted by type and size."""
+        """Reads the messages of the current batch, grouped by type and size."""
         groups: dict[tuple[MessageType, int], list[int]] = {}
         for index, (message_type, raw, _) in enumerate(self._batch):
             groups.setdefault((message_type, len(raw)), []).append(index)
@@ -147,10 +149,11 @@ class TableBuilder:
         self._batch, self._batch_bytes = [], 0
 
     def _read_block(self, block: _Block) -> None:
-        """Reads all rows of messages of one layout.
+        """Reads all rows of messages with the same layout.
 
         Raises:
-            LimitError, BagError: If there are too many columns or cells, or the time is over.
+            LimitError: If the table has too many columns.
+            BagError: If all tables together have too many cells.
         """
         first, places = self._messages + int(block.indices[0]), count()
         for row in block.rows:
@@ -167,9 +170,7 @@ class TableBuilder:
             self._merge_pieces()
 
     def _merge_pieces(self) -> None:
-        """Merges the pieces that were added to each column since the last time, since each piece needs memory of its
-        own.
-        """
+        """Merges the pieces of each column that were added since the last merge, to save memory."""
         first, rows = self._merged_rows, self._rows - self._merged_rows
         for pieces in self._columns.values():
             new = [(start - first, values) for start, values in pieces if start >= first]
@@ -178,7 +179,7 @@ class TableBuilder:
         self._merged_rows, self._pieces = self._rows, 0
 
     def _split_by_layout(self, message_type: MessageType, matrix: Array, indices: Array) -> Iterator[_Block]:
-        """Yields messages of one type and size, one layout at a time; for the arguments see `_Block`."""
+        """Splits messages of one type and size into blocks with the same layout; for the arguments, see `_Block`."""
         while len(indices):
             if self._budget is not None:
                 self._budget.check_time(self._topic)
@@ -202,7 +203,7 @@ class TableBuilder:
             if alike == len(indices):
                 yield _Block(plan.rows, matrix, indices)
                 return
-            if alike == 1:  # a view, which copies nothing
+            if alike == 1:  # a view, without a copy
                 yield _Block(plan.rows, matrix[:1], indices[:1])
                 matrix, indices = matrix[1:], indices[1:]
                 continue
@@ -210,7 +211,7 @@ class TableBuilder:
             matrix, indices = matrix[~same], indices[~same]
 
     def _read_rows(self, row: Columns, matrix: Array, indices: Array) -> None:
-        """Reads one row of each message; for the arguments see `_Block`."""
+        """Reads one row of each message; for `matrix` and `indices`, see `_Block`."""
         record_time = np.array([self._batch[index][2] for index in indices], np.int64)
         time = record_time
         for name, leaf in row.items():
@@ -229,10 +230,10 @@ class TableBuilder:
 
 
 def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
-    """Reads the same value out of messages of one layout, shape (n, size), uint8.
+    """Reads the same value from each of n messages with the same layout, shape (n, size), uint8.
 
     Returns:
-        Shape (n,): numbers of the field's own type, bool, float64 [s] for `time` and `duration`, `str` or
+        Values of the shape (n,): numbers of the field's type, bool, float64 [s] for `time` and `duration`, `str`, or
         `bytes`.
     """
     start, stop = leaf.span
@@ -256,7 +257,7 @@ def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
 
 
 def _read_stamps(leaf: Leaf, matrix: Array) -> Array:
-    """Reads a `time` out of messages of one layout: int64, shape (n,) [ns]."""
+    """Reads the same `time` from each of n messages with the same layout; returns int64, shape (n,) [ns]."""
     start, stop = leaf.span
     seconds, nanoseconds = np.ascontiguousarray(matrix[:, start:stop]).view("<u4").astype(np.int64).T
     return np.asarray(seconds * PER_SECOND + nanoseconds)
@@ -280,10 +281,10 @@ def _join(pieces: list[_Piece], rows: int) -> Array:
 
 
 def file_stems(topics: Iterable[str]) -> dict[str, str]:
-    """Finds a file name for each topic: `/kuka/joint_states` becomes `kuka.joint_states`.
+    """Returns a file name without suffix for each topic: `/kuka/joint_states` becomes `kuka.joint_states`.
 
-    Names are made of letters, digits, `_`, `-` and `.`, at most `MAX_STEM_LENGTH` of them; where two would be the same,
-    the second ends with `-2`.
+    Names consist of at most `MAX_STEM_LENGTH` letters, digits, `_`, `-` and `.`. If two names would be equal, the
+    second one ends with `-2`.
     """
     stems: dict[str, str] = {}
     used: Counter[str] = Counter()
@@ -302,15 +303,15 @@ def file_stems(topics: Iterable[str]) -> dict[str, str]:
 
 
 def write_table(table: pd.DataFrame, path: Path) -> None:
-    """Writes a table with its index; the format follows from the ending of the file, `.parquet`, `.csv` or `.hdf5`.
+    """Writes a table with its index to a file; the suffix `.parquet`, `.csv` or `.hdf5` determines the format.
 
-    A column of several types (two types of message on one topic) is written as text in a Parquet or HDF5 file. An HDF5
-    file has a data set a column, with `/` as the separator of groups, and the index as `time`.
+    If a column has values of several types, since a topic had two message types, Parquet and HDF5 files contain the
+    values as text. An HDF5 file has a data set for each column, in groups separated by `/`, and the index as `time`.
 
     Raises:
-        ValueError: If binary columns were to go into a text file, or an HDF5 file cannot have a column.
+        ValueError: If a column is binary and the format is CSV, or HDF5 cannot represent a column.
         MissingDependency: If fastparquet or h5py is not installed.
-        OSError: If the file cannot be written; a former one stays as it was.
+        OSError: If the file cannot be written; an existing file is not changed then.
     """
     with atomic_file(path) as part:
         _WRITERS[path.suffix](table, part)
@@ -359,7 +360,7 @@ _WRITERS = {".parquet": _write_parquet, ".csv": _write_csv, ".hdf5": _write_hdf5
 
 
 def _rows_of(cells: list[Array]) -> Array:
-    """Returns arrays of different lengths as an array of objects, shape (rows,)."""
+    """Converts a list of arrays with different lengths to an array of objects, shape (rows,)."""
     rows: Array = np.empty(len(cells), object)
     rows[:] = cells
     return rows

@@ -1,4 +1,4 @@
-"""Times of messages: integers in nanoseconds, as stamps are, and clocks that were set back during a recording."""
+"""Conversion of message times between seconds and integer nanoseconds, and detection of clocks that were set back."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ Array = NDArray[Any]
 
 PER_SECOND = 1_000_000_000
 MAX_SECONDS = 4.5e9
-"""Largest size of a time [s]: ROS has at most 2**32 s, and differences of two times fit into 63 bits."""
+"""Largest absolute time [s]: ROS times are below 2**32 s, and differences of two times [ns] fit into 63 bits."""
 
 
 def to_seconds(nanoseconds: ArrayLike) -> Array:
-    """Returns times as floats [s], each as `stamp.to_sec()` computes it.
+    """Converts times to floats [s], with the same rounding as `stamp.to_sec()`.
 
     Args:
-        nanoseconds: The times, int64, of any shape [ns].
+        nanoseconds: Times, int64, of any shape [ns].
     """
     seconds, rest = np.divmod(nanoseconds, PER_SECOND)
     return np.asarray(seconds + rest / 1e9)
 
 
 def to_nanoseconds(seconds: ArrayLike) -> Array:
-    """Returns times of the same shape, int64 [ns]; exact for stamps below 2**23 s (97 days).
+    """Converts times to int64 [ns]; exact for stamps below 2**23 s (97 days).
 
     Args:
-        seconds: The times, finite, of at most `MAX_SECONDS` [s].
+        seconds: Finite times of any shape, with absolute values of at most `MAX_SECONDS` [s].
     """
     whole = np.floor(np.asarray(seconds, float))
     rest = np.rint((np.asarray(seconds, float) - whole) * 1e9)
@@ -40,21 +40,24 @@ def to_nanoseconds(seconds: ArrayLike) -> Array:
 
 
 def resolution_ns(seconds: ArrayLike) -> int:
-    """Returns the distance of neighbouring floats at the latest of some times [ns]: 0 up to 97 days, 239 since 2004."""
+    """Returns the distance of neighbouring floats at the largest of given times [ns].
+
+    The result is 0 for times up to 97 days, and 239 for wall times since 2004.
+    """
     distance = np.spacing(np.abs(np.asarray(seconds, float)).max(initial=0.0)) * 1e9
     return int(np.ceil(distance)) if distance > 1.0 else 0
 
 
 def row_times(start: int, end: int, hz: float) -> Array:
-    """Returns the times of a rate from the start on, at most the end, each rounded to its nearest nanosecond.
+    """Returns times at a constant rate from a start to an end, each rounded to the nearest nanosecond.
 
     Args:
         start: Time of the first row [ns].
-        end: The end, not before the start [ns].
-        hz: Rows a second.
+        end: Largest time, not before the start [ns].
+        hz: Rows per second.
 
     Returns:
-        int64, shape (n,) [ns].
+        Times, int64, shape (n,) [ns].
     """
     period = PER_SECOND / Fraction(hz)
     double, half = 2 * period.numerator, period.denominator  # k periods: k * double / (2 * half)
@@ -64,17 +67,18 @@ def row_times(start: int, end: int, hz: float) -> Array:
 
 
 MAX_BACK_S = 1.0
-"""Largest time by which stamps may run back against the order of recording [s]; publishers are never exactly
-synchronous.
+"""Largest time by which stamps may go back, in the order of recording [s], before the clock counts as set back.
+
+Publishers are never exactly synchronous.
 """
 
 
 class ClockStep(NamedTuple):
-    """Times that run back against the order of recording.
+    """The largest backward step of times in the order of recording.
 
     Attributes:
-        time_s: Latest time before [s].
-        back_s: Largest time by which later times are before that [s]; 0 if none is.
+        time_s: Latest time before the step [s].
+        back_s: Size of the step [s]; 0 if times never go back.
     """
 
     time_s: float
@@ -82,7 +86,7 @@ class ClockStep(NamedTuple):
 
     @property
     def is_fault(self) -> bool:
-        """Whether the clock was set back, and messages are not only a little out of order."""
+        """Whether the step exceeds `MAX_BACK_S`: the clock was set back, not just messages out of order."""
         return self.back_s > MAX_BACK_S
 
     def __str__(self) -> str:
@@ -90,10 +94,10 @@ class ClockStep(NamedTuple):
 
 
 def set_back(times: Array) -> ClockStep:
-    """Returns the largest step back of times.
+    """Returns the largest backward step of times.
 
     Args:
-        times: In the order of recording, shape (n,) [s].
+        times: Times in the order of recording, shape (n,) [s].
     """
     latest = np.maximum.accumulate(times)
     back = latest - times
@@ -104,10 +108,12 @@ def set_back(times: Array) -> ClockStep:
 
 
 def clock_of(table: pd.DataFrame) -> ClockStep:
-    """Returns the largest step back of a table's stamps against the order of recording.
+    """Returns the largest backward step of a table's stamps in the order of recording.
+
+    In a table of transforms, only stamps of the same child frame are compared.
 
     Args:
-        table: As `bag_to_dataframes` returns it. Stamps of different TF frames are not compared.
+        table: A table from `bag_to_dataframes`.
     """
     order = np.argsort(table[RECORD_TIME].to_numpy(), kind="stable")
     found = set_back(table.index.to_numpy()[order])

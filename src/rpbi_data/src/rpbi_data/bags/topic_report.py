@@ -1,4 +1,4 @@
-"""Topics of a bag, and the regularity of their messages."""
+"""Report on the topics of a bag: number, size, rate and gaps of the messages."""
 
 import struct
 from pathlib import Path
@@ -13,33 +13,39 @@ from .times import PER_SECOND, ClockStep, set_back, to_seconds
 
 Array = NDArray[Any]
 
-_STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
+_STAMP = struct.Struct("<4xII")  # skips the `seq` of a header
 _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "first", "last")
 
 
 class TopicReport(pd.DataFrame):
-    """A table that is printed completely, on a terminal of any width; tables derived from it are ordinary."""
+    """A table that is always printed completely; tables derived from this table are ordinary DataFrames."""
 
     def __repr__(self) -> str:
         return self.to_string()
 
 
 def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
-    """Measures every topic of a bag.
+    """Measures number, size and rate of the messages of every topic in a bag.
+
+    Times are stamps of headers; for messages without a stamp, such as on `/tf`, they are recording times.
 
     Args:
-        path: A `.bag` file, of any compression.
-        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
+        path: A `.bag` file with any compression.
+        any_size: Whether the bag may unpack to more than 1 GiB and 255 times its size.
 
     Returns:
-        A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
-        (serialised, before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the
-        same time), `max_gap_s` (longest time without a message in between), `set_back_s` (largest time by which a
-        message is before an earlier one, in the order of recording), `first` and `last` [s of ROS time]. Times are the
-        stamps of headers, or of recording where there is none, as for `/tf`.
+        A table with one row per topic, whose index is the topic, sorted by name. The columns are:
+
+        - `type`: message type,
+        - `messages`: number of messages,
+        - `bytes`: size of the serialised messages before compression,
+        - `rate_hz`: mean rate from the first to the last message; NaN if both have the same time,
+        - `max_gap_s`: longest time between two successive messages,
+        - `set_back_s`: largest backward step of times in the order of recording,
+        - `first`, `last`: ROS time of the first and the last message [s].
 
     Raises:
-        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
+        BagError: If the file does not exist, is not a complete bag, or exceeds a limit.
     """
     with BagReader(path, any_size) as bag:
         times: dict[str, list[int]] = {topic: [] for topic in bag.types}
@@ -60,7 +66,7 @@ def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
 
 
 def message_time_ns(message: BagMessage) -> int:
-    """Returns the stamp of a message [ns], or where it has none the time of its recording."""
+    """Returns the stamp of a message [ns]; without a stamp, the recording time."""
     if not message.type.has_header or len(message.raw) < _STAMP.size:
         return message.record_time_ns
     seconds, nanoseconds = _STAMP.unpack_from(message.raw)
@@ -68,12 +74,12 @@ def message_time_ns(message: BagMessage) -> int:
 
 
 def message_time(message: BagMessage) -> float:
-    """Returns the stamp of a message [s], or where it has none the time of its recording."""
+    """Returns the stamp of a message [s]; without a stamp, the recording time."""
     return float(to_seconds(message_time_ns(message)))
 
 
 def _rhythm(times: Array, clock: ClockStep) -> tuple[float, float, float, float, float]:
-    """Returns mean rate [Hz], longest gap, largest time by which times run back, first and last time [s]."""
+    """Returns mean rate [Hz], longest gap [s], largest backward step [s], first time [s] and last time [s]."""
     back_s = max(set_back(times).back_s, clock.back_s)
     ordered = np.sort(times)
     first, last = ordered[0], ordered[-1]

@@ -1,4 +1,4 @@
-"""The pose of one TF frame in another over time."""
+"""Computes the pose of a TF frame in another frame over time."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class _Edge(NamedTuple):
-    """Pose of a frame in its parent.
+    """Poses of a frame in its parent frame.
 
     Attributes:
-        parent: Name of the parent.
-        poses: Columns `TRANSLATION` and `ROTATION` over time [s].
-        is_static: Whether the first row holds for all times.
+        parent: Name of the parent frame.
+        poses: Table with the columns `TRANSLATION` and `ROTATION`, indexed by time [s].
+        is_static: Whether the first row is the pose at all times.
     """
 
     parent: str
@@ -44,23 +44,26 @@ def transforms_between(
     times: ArrayLike | None = None,
     max_time_error_s: float = np.inf,
 ) -> pd.DataFrame:
-    """Returns the pose of a frame in another one over time, along the tree of TF.
+    """Returns the poses of the frame `child` in the frame `parent` over time, from the transforms in the TF tree.
+
+    Between samples, positions are interpolated linearly, and rotations by slerp.
 
     Args:
-        tables: Tables of a bag, as `bag_to_dataframes` returns them; those of `/tf` and `/tf_static` count.
-        parent: Frame that poses are in, without a leading slash.
-        child: Frame whose poses are returned.
-        times: Times of the rows [s], ascending; by default, all times of transforms on the way from one to the other.
-        max_time_error_s: Rows are left out where a transform has no sample as close as this [s].
+        tables: Tables of a bag from `bag_to_dataframes`, of which `/tf` and `/tf_static` are used.
+        parent: Reference frame of the poses, without a leading slash. It need not be above `child` in the tree.
+        child: Frame whose poses are returned, without a leading slash.
+        times: Times of the rows, ascending, shape (n,) [s]. By default, all times of the transforms between the frames.
+        max_time_error_s: Largest time between a row and the nearest sample of each transform [s]. Other rows are left
+            out.
 
     Returns:
-        Columns `translation/x` ... [m], `rotation/x` ... `rotation/w`, and `time_error` [s]: the largest time between
-        the row and the nearest sample of a transform on the way. In between, positions are interpolated linearly and
-        rotations by slerp; outside the range of a transform there is no row.
+        A table with the columns `translation/x` ... `translation/z` [m], `rotation/x` ... `rotation/w`, and
+        `time_error` [s]. The time error is the largest time between the row and the nearest sample of a transform.
+        Rows outside the time range of a transform are left out.
 
     Raises:
-        UnknownNameError: If there is no frame of that name.
-        ValueError: If the frames are not connected, or one has several parents or a quaternion of zeros.
+        UnknownNameError: If a frame does not exist.
+        ValueError: If the frames are not connected, a frame has several parents, or a quaternion is zero.
     """
     edges = _edges(tables)
     frames = edges.keys() | {each.parent for each in edges.values()}
@@ -93,7 +96,7 @@ def transforms_between(
 
 
 def _edges(tables: Mapping[str, pd.DataFrame]) -> dict[str, _Edge]:
-    """Returns the transforms by the names of their children."""
+    """Returns all transforms, indexed by child frame."""
     edges: dict[str, _Edge] = {}
     for topic, is_static in (("/tf_static", True), ("/tf", False)):
         if topic not in tables:
@@ -110,10 +113,10 @@ def _edges(tables: Mapping[str, pd.DataFrame]) -> dict[str, _Edge]:
 
 
 def _path_to_root(edges: Mapping[str, _Edge], frame: str) -> list[str]:
-    """Returns a frame and all above it.
+    """Returns a frame and all frames above it in the tree, up to the root.
 
     Raises:
-        ValueError: If they form a circle.
+        ValueError: If the frames form a circle.
     """
     path = [frame]
     while path[-1] in edges:
@@ -124,10 +127,15 @@ def _path_to_root(edges: Mapping[str, _Edge], frame: str) -> list[str]:
 
 
 def _product(way: Iterable[_Edge], times: Array, max_time_error_s: float) -> tuple[Array, Rotation, Array]:
-    """Multiplies transforms from a frame up to one above it.
+    """Multiplies the transforms from a frame up to a frame above it.
+
+    Args:
+        way: The transforms, starting at the lower frame.
+        times: Times of the poses, shape (n,) [s].
+        max_time_error_s: See `transforms_between`.
 
     Returns:
-        Positions, shape (n, 3) [m], rotations, and time errors, shape (n,) [s], NaN where there is no transform.
+        Positions, shape (n, 3) [m], n rotations, and time errors, shape (n,) [s]; NaN where a transform is missing.
     """
     position, error = np.zeros((len(times), 3)), np.zeros(len(times))
     rotation = Rotation.from_quat([IDENTITY] * len(times))
