@@ -1,4 +1,4 @@
-"""Model predictive control in lock-step: sense, solve, act, step; in simulation and on hardware."""
+"""Model predictive control in lock-step, in simulation and on hardware. Each cycle senses, solves, acts and steps."""
 
 from .controller import ControlPlan as ControlPlan
 from .controller import MpcController as MpcController

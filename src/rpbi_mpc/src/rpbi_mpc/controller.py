@@ -1,4 +1,4 @@
-"""Controllers and the plants that they control: measurements in, plans and commands out."""
+"""Interfaces of controllers and plants. A controller turns the plant's measurements into plans of commands."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 
 
 class Sensed(NamedTuple):
-    """A measurement.
+    """A measurement of a plant.
 
     Attributes:
         time_s: Plant time at which the measurement is available [s].
-        values: The measured numbers, in the order and units that the controller expects; None if a number is missing.
-        missing: What is missing, as a clause such as `vicon/box/box: no pose for 0.52 s, expected one every 0.01 s`.
+        values: The measured numbers, in the order and units that the controller expects. None if a number is missing.
+        missing: Clause that names the missing number, such as `vicon/box/box: no pose for 0.52 s, expected one every
+            0.01 s`. Empty for a complete measurement.
         age_s: Time from the instant of measurement to `time_s` [s].
     """
 
@@ -26,11 +27,11 @@ class Sensed(NamedTuple):
 
 
 class Plant(ABC):
-    """A system that is measured and commanded, and that advances in time.
+    """A system that a controller measures and commands, in simulation or on hardware.
 
     Attributes:
-        is_timed: Whether the plant runs in real time, as hardware does. If so, late plans are discarded; otherwise the
-            plant waits for plans, and no decision depends on the speed of the computer.
+        is_timed: Whether the plant runs in real time, as hardware does. The loop discards late plans for a timed plant.
+            Other plants wait for plans, so that the result does not depend on the computer's speed.
     """
 
     is_timed = False
@@ -41,7 +42,7 @@ class Plant(ABC):
 
     @abstractmethod
     def act(self, command: np.ndarray) -> None:
-        """Applies a command until the next one."""
+        """Applies a command, which acts until the next command."""
 
     @abstractmethod
     def stand(self) -> None:
@@ -49,7 +50,7 @@ class Plant(ABC):
 
     @abstractmethod
     def advance(self, duration_s: float) -> None:
-        """Lets the given time pass: a simulation is stepped by the corresponding ticks; on hardware, the call waits."""
+        """Lets a duration [s] pass: steps a simulation by the corresponding number of ticks, or waits for hardware."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +58,16 @@ class ControlPlan:
     """Commands for the next cycles, and the predicted states.
 
     Attributes:
-        commands: Commands of this and the following cycles, shape (cycles, numbers of a command).
-        states: Predicted states, from the time at which the first command acts, shape (rows, numbers of a state).
+        commands: Commands of this and the following cycles, shape (cycles, numbers in a command).
+        states: Predicted states, shape (rows, numbers in a state). The first row is at the start of the first command.
         state_step_s: Time between two predicted states [s].
-        cost: Value of the cost.
+        cost: Cost of the plan.
         converged: Whether the solver found a solution within its limits.
         status: Status that the solver reports, or the reason why there is no solution.
         iterations: Number of solver iterations.
         wall_s: Wall time that the solver took [s].
         processor_s: Processor time that the solver took [s].
-        extras: Further numbers of this cycle for the table of cycles, indexed by name.
+        extras: Additional numbers for this cycle's row in the table of cycles, indexed by name.
     """
 
     commands: np.ndarray
@@ -82,12 +83,12 @@ class ControlPlan:
 
 
 class MpcController(ABC):
-    """Makes plans from measurements; the loop executes the first command of each plan.
+    """Makes plans from measurements. The loop executes the first command of each plan.
 
     Attributes:
-        measured_names: Names of the numbers that a plant measures.
-        command_names: Names of the numbers of a command.
-        state_names: Names of the numbers of a predicted state.
+        measured_names: Names of the numbers in a measurement.
+        command_names: Names of the numbers in a command.
+        state_names: Names of the numbers in a predicted state.
     """
 
     measured_names: tuple[str, ...]
@@ -96,7 +97,7 @@ class MpcController(ABC):
 
     @abstractmethod
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns a plan. It depends only on the measurements since `reset`, not on wall time or random numbers.
+        """Returns a plan, which depends only on the measurements since `reset`, not on wall time.
 
         Args:
             sensed: A complete measurement.
@@ -104,14 +105,14 @@ class MpcController(ABC):
         """
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:  # noqa: B027 (optional)
-        """Records the command that acts from `time_s` [s] on; None if the plant is stopped."""
+        """Records a command that acts from `time_s` [s] on. None: the plant is stopped."""
 
     def reset(self) -> None:  # noqa: B027 (optional)
         """Discards all history, so that the next plan equals the first plan of a new controller."""
 
     @property
     def is_finished(self) -> bool:
-        """Whether the task is done; the loop then ends."""
+        """Whether the task is done. The loop ends when the task is done."""
         return False
 
     @property
@@ -121,5 +122,5 @@ class MpcController(ABC):
 
     @property
     def failure(self) -> str:
-        """Reason why the task has failed, for which the loop stops; empty while the task can succeed."""
+        """Reason why the task has failed. Empty while the task can succeed. The loop stops after a failure."""
         return ""

@@ -1,4 +1,4 @@
-"""The loop in lock-step: sense, solve, act, step."""
+"""The control loop in lock-step: each cycle senses, solves, acts and steps."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class LoopConfig(ConfigModel):
     """Timing of a loop.
 
     Attributes:
-        hz: Cycles a second [Hz].
-        delay_s: Time from a measurement until the resulting command acts [s], at most one cycle. The delay is constant:
-            in simulation always, on hardware as long as the solver takes no longer than `delay_s`.
-        max_missed: Number of successive cycles without a new plan in which the last plan is still executed; after
-            them, plant and loop stop.
+        hz: Rate of the cycles [Hz].
+        delay_s: Time from a measurement until the resulting command acts [s], at most one cycle. In simulation, the
+            delay is always exact. On hardware, the delay is exact if the solver takes at most `delay_s`.
+        max_missed: Largest number of successive cycles without a new plan. In these cycles, the last plan is executed;
+            afterwards, plant and loop stop.
     """
 
     hz: Hz = Field(25.0, description="Cycles a second.")
@@ -58,15 +58,15 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Cycle:
-    """One pass of the loop.
+    """Record of one cycle of the loop.
 
     Attributes:
-        index: Number of the cycle, from 0.
+        index: Number of the cycle, counted from 0.
         status: Outcome of the cycle.
-        reason: Reason for the status; empty if the status is `solved`.
+        reason: Reason for the status. Empty if the status is `solved`.
         sensed: The measurement.
-        plan: The new plan; None without a measurement.
-        command: The command that was applied; None if the plant was stopped.
+        plan: The new plan, also if the solver failed. None without a measurement, and after a stop.
+        command: The applied command. None if the plant was stopped.
     """
 
     index: int
@@ -79,7 +79,7 @@ class Cycle:
 
 @dataclass
 class _Held:
-    """The last good plan, and the number of cycles since that plan."""
+    """The last good plan, and its age in cycles."""
 
     plan: ControlPlan | None = None
     age: int = 0
@@ -87,7 +87,7 @@ class _Held:
 
 
 class LockStep:
-    """Senses, solves, acts and steps, one cycle at a time.
+    """Runs the control loop, one cycle at a time: measures the plant, plans, applies the command, and lets time pass.
 
     The measurement of a cycle determines the command that acts `delay_s` later. A simulated plant waits for the
     solver, so that the same start leads to the same end on any computer. A timed plant does not wait: late plans are
@@ -99,8 +99,8 @@ class LockStep:
     Args:
         plant: The controlled system.
         controller: The controller.
-        config: Timing; by default `LoopConfig()`.
-        observers: Functions that are called with each cycle after its end.
+        config: Timing. Default: `LoopConfig()`.
+        observers: Functions that are called with the record of each cycle, after the cycle's end.
 
     Raises:
         InterfaceError: If a measurement or a command does not have one number for each name that the controller lists.
@@ -122,16 +122,16 @@ class LockStep:
 
     @property
     def is_over(self) -> bool:
-        """Whether the loop has stopped, or its task is done."""
+        """Whether the loop has stopped, or the controller's task is done."""
         return bool(self._stopped) or self.controller.is_finished
 
     def restart(self) -> None:
-        """Makes the loop run again after a stop; discards the last plan and resets the controller."""
+        """Discards the last plan and resets the controller, so that the loop can run again after a stop."""
         self._held, self._stopped = _Held(), ""
         self.controller.reset()
 
     def run(self, max_s: float = math.inf) -> list[Cycle]:
-        """Runs cycles until the task is done, the loop stops, or `max_s` [s] has passed, and returns these cycles."""
+        """Runs cycles until the task is done, the loop stops, or `max_s` [s] have passed. Returns the run cycles."""
         first = len(self.cycles)
         while not self.is_over and (len(self.cycles) - first) * self.config.period_s < max_s - 1e-9:
             self.cycle()
@@ -139,7 +139,7 @@ class LockStep:
         return self.cycles[first:]
 
     def cycle(self) -> Cycle:
-        """Runs one cycle, which advances the plant by one period."""
+        """Runs one cycle, which advances the plant by one period, and returns the cycle's record."""
         sensed = self.plant.sense()
         plan, status, reason = self._decide(sensed)
         command = self._command() if status in (Status.SOLVED, Status.LAST_PLAN) else None
@@ -186,8 +186,11 @@ class LockStep:
         return ""
 
     def _without(self, fault: str) -> tuple[Status, str]:
-        """Returns status and reason of a cycle without a new plan; stops the loop if the last plan cannot be
-        continued.
+        """Determines status and reason of a cycle without a new plan. Stops the loop if the last plan is missing or too
+        old.
+
+        Args:
+            fault: Reason why a new plan is missing.
         """
         self._held.age += 1
         last = self._held.plan

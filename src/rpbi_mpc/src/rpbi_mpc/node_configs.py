@@ -102,7 +102,7 @@ CONFIGS: dict[str, type[ConfigModel]] = {"pushing_mpc": PushingNodeConfig, "samp
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each schema file, indexed by its path.
+    """Returns the text of each JSON schema file, indexed by the file's path.
 
     Args:
         root: Root folder of the workspace.
@@ -114,7 +114,7 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 
 def _any_sampler() -> Schema:
-    """Returns the schema of a sampler: one of `SAMPLERS`, or a user's own class."""
+    """Returns the JSON schema of a sampler's options: a sampler of `SAMPLERS`, or a user's own class."""
     own_type = {"type": "object", "properties": {"type": {"pattern": r"^[\w.]+:\w+$"}}, "required": ["type"]}
     known = [
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}

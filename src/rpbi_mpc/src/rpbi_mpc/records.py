@@ -1,4 +1,4 @@
-"""Cycles of a loop as a table, and its figures."""
+"""Writes the cycles of a loop as a table, and computes a summary of the table."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def table_of(cycles: Sequence[Cycle], controller: MpcController) -> pandas.DataFrame:
-    """Returns one row for each cycle.
+    """Returns a table with one row for each cycle.
 
-    Columns are `cycle`, `time_s`, `status`, `reason`, `cost`, `iterations`, `wall_s`, `processor_s`, those of the
-    controller's `extras`, and, with the prefixes `measured.`, `command.` and `state.`, the measurement, the command and
-    the first predicted state.
+    The first columns are `cycle`, `time_s`, `status`, `reason`, `cost`, `iterations`, `wall_s` and `processor_s`. The
+    `extras` of the plans follow. The last columns are the measurement, the command and the first predicted state, with
+    the prefixes `measured.`, `command.` and `state.`.
     """
     import pandas
 
@@ -29,7 +29,9 @@ def table_of(cycles: Sequence[Cycle], controller: MpcController) -> pandas.DataF
 
 
 def summary_of(table: pandas.DataFrame) -> dict[str, Any]:
-    """Returns figures of a table: numbers of cycles by status, and solve times [ms]."""
+    """Returns a summary of the table: the number of cycles for each status, and mean, 99 % quantile and maximum of the
+    solve times [ms].
+    """
     solved = table[table["wall_s"].notna()] if len(table) else table
     times = {
         f"{name}_{figure}_ms": float(function(1e3 * solved[f"{name}_s"]))
@@ -42,7 +44,7 @@ def summary_of(table: pandas.DataFrame) -> dict[str, Any]:
 
 
 def write_records(folder: str | Path, cycles: Sequence[Cycle], controller: MpcController) -> dict[str, Any]:
-    """Writes `cycles.csv` and `summary.json` to a folder, which is created if missing; returns the summary.
+    """Writes `cycles.csv` and `summary.json` to a folder, and returns the summary. Creates the folder if necessary.
 
     Raises:
         OSError: If the folder cannot be written.

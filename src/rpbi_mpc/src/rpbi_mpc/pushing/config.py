@@ -1,4 +1,4 @@
-"""The options of pushing."""
+"""Options of the controller that pushes a slider along a path."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class PushingConfig(ConfigModel):
         estimator: Filter of measurements.
         approach: Motion of the pusher to the slider.
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
-        max_lag: Distance along the path by which the reference may be ahead of the slider [m]; beyond it, the reference
-            waits.
+        max_lag: Largest distance along the path of the reference ahead of the slider [m]. At a larger distance, the
+            reference waits.
         max_off: Distance of the slider from the path beyond which the task fails [m].
-        tolerance: Largest errors with which a push counts as finished.
-        settle_s: Time after the end of the path for which the last pose is the target [s].
-        cycle_s: Duration of a cycle, for which one command acts [s].
+        tolerance: Largest errors of a successful push.
+        settle_s: Time for which the end of the path stays the reference before the task is done [s].
+        cycle_s: Duration of a cycle, in which one command acts [s].
         lag_s: Delay from a command to the motion of the pusher, in addition to the delay of the loop [s].
-        plan_cycles: Number of commands of a plan, one for each cycle.
+        plan_cycles: Number of commands in a plan, one for each cycle.
         max_command: Largest speed of the pusher [m/s].
     """
 

@@ -1,6 +1,4 @@
-"""The controller of pushing: estimates the state, moves the pusher to the slider, and executes the commands of a
-planner along the path.
-"""
+"""The controller of a push: estimates the state, moves the pusher to the slider, and executes a planner's commands."""
 
 from __future__ import annotations
 
@@ -20,18 +18,21 @@ from .planar.paths import PushPath
 from .planner import ProgramPlanner, PushPlanner, PushSituation
 
 KEPT_REFERENCES = 100
-"""Number of references kept for comparison with later measurements."""
+"""Number of recent references that are stored for the comparison with measurements, which arrive late."""
 
 
 class PushingController(MpcController):
-    """Pushes a slider along a path with a round pusher whose velocity is commanded.
+    """Pushes a slider along a path. The commands are velocities of a round pusher.
 
-    Path time stops while the pusher is not at the slider, and while the slider is too far behind the reference. Whether
-    the task is done depends on the measured pose of the slider, not on its estimated pose, which follows the model.
+    The reference on the path waits while the pusher is not at the slider, and while the slider is too far behind the
+    reference. Success depends on the measured pose of the slider, not on the estimated pose, which follows the model.
 
     Args:
         config: Slider, pusher, path and cost.
-        planner: Makes plans while the pusher is at the slider; by default, a nonlinear program.
+        planner: Makes plans while the pusher is at the slider. Default: `ProgramPlanner`, a nonlinear program.
+
+    Attributes:
+        path_time_s: Time along the path at which the newest plan starts [s].
     """
 
     measured_names = ("x", "y", "yaw", "pusher_x", "pusher_y")
@@ -59,7 +60,7 @@ class PushingController(MpcController):
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors of the measured slider, and the misfit of the model, so far."""
+        """Errors of the measured slider and misfit of the model, up to the present cycle."""
         return self._record.outcome
 
     @property
@@ -85,9 +86,9 @@ class PushingController(MpcController):
         self._estimator.executed(time_s + self.config.lag_s, command)
 
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns commands that are planned from the scene predicted for the time at which the first command acts.
+        """Predicts the scene for the time at which the first command acts, and plans commands from this scene.
 
-        Commands of the approach do not come from a solver; the cost of such a plan is NaN.
+        If the pusher is not at the slider, the plan is an approach without a solver, and the plan's cost is NaN.
         """
         acts_s = sensed.time_s + delay_s + self.config.lag_s
         self._references.append((acts_s, self.path_time_s))
@@ -108,8 +109,9 @@ class PushingController(MpcController):
         return dataclasses.replace(plan, extras=extras | plan.extras)
 
     def _note(self, sensed: Sensed) -> float:
-        """Records a measurement, and returns the slider's distance from the reference at the time of
-        measurement [m].
+        """Records the errors of a measurement, and returns the slider's distance from the reference [m].
+
+        The reference is the one at the time of the measurement.
         """
         assert sensed.values is not None
         measured = PlanarScene.of(sensed.values)
@@ -124,7 +126,12 @@ class PushingController(MpcController):
         return float(np.hypot(*deviation[:2]))
 
     def _go_on(self, lag: float) -> None:
-        """Advances the reference by a cycle, unless the slider is too far behind; at the end, counts settling time."""
+        """Advances the reference by one cycle, unless the slider is too far behind. At the end of the path, counts the
+        settling time instead.
+
+        Args:
+            lag: Distance along the path of the reference ahead of the slider [m].
+        """
         if self.path_time_s >= self.path.duration_s:
             self._settled_s += self.config.cycle_s
         elif lag <= self.config.max_lag:

@@ -1,4 +1,4 @@
-"""A hand that moves in a plane: joint positions of an arm for given positions of a point on the hand."""
+"""Inverse kinematics of a hand that moves in a horizontal plane."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from robot_model.linear_algebra import solve
 from robot_model.model import RobotModel
 
 TOLERANCE_M, TOLERANCE_RAD = 1e-4, 1e-3
-"""Largest errors of position and orientation with which a place counts as reached [m, rad]."""
+"""Largest errors of position [m] and orientation [rad] at which inverse kinematics stop."""
 MAX_ITERATIONS = 100
-"""Newton steps after which a place counts as out of reach."""
+"""Number of Newton steps after which a position counts as out of reach."""
 MAX_STEP_RAD = 0.1
-"""Largest change of a joint in a Newton step [rad]; larger changes can jump to a different posture."""
+"""Largest change of a joint in a Newton step [rad]. Larger changes can lead to a jump to a different posture."""
 DAMPING = 1e-3
-"""Damping of the least squares [m^2/rad^2]; with larger values the solver converges slowly, with smaller values it
-oscillates near singular postures.
+"""Damping of the least squares [m^2/rad^2]. With a larger value, the solver converges slowly. With a smaller value, the
+solver oscillates near singular postures.
 """
 
 
 class PlanarHandConfig(ConfigModel):
-    """A point of an arm that moves at a constant height and orientation.
+    """A point on an arm's hand that moves at a constant height and with a constant orientation.
 
-    The hand does not turn: a round tip that turns would rub along the face that it pushes.
+    The hand does not turn, since a turning round tip would rub along the pushed face.
 
     Attributes:
-        urdf: The robot.
-        link: Link whose origin is the point; its axis z points down.
-        joints: The joints that move the point.
+        urdf: URDF file of the robot.
+        link: Link whose origin is the point. The link's z axis points down.
+        joints: Names of the joints that move the point.
         base: Position of the robot's root link in the world [m].
         height: Height of the point in the world [m].
         yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
-        posture: Joint positions from which the first solution starts [rad]; 0 if empty.
+        posture: Joint positions from which the first solution starts [rad]. If empty, all are 0.
     """
 
     urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
@@ -53,12 +53,13 @@ class PlanarHandConfig(ConfigModel):
 
 
 class PlanarHand:
-    """Inverse kinematics of a hand over a table, with damped least squares (C. Wampler, IEEE SMC 16, 1986).
+    """Forward and inverse kinematics of a hand over a table.
 
-    The same sequence of places leads to the same joint positions on any computer.
+    Inverse kinematics use damped least squares (C. Wampler, IEEE SMC 16, 1986). The same sequence of positions leads to
+    the same joint positions on any computer.
 
     Args:
-        config: Robot, joints and height.
+        config: Robot, joints, and height and orientation of the hand.
 
     Raises:
         ConfigError: If the URDF cannot be read.
@@ -76,19 +77,19 @@ class PlanarHand:
         self.posture = np.array(posture, dtype=float)
 
     def position(self, joints: np.ndarray) -> np.ndarray:
-        """Returns the position of the point in the world [m], shape (3,)."""
+        """Returns the position of the point in the world for joint positions [rad], shape (3,) [m]."""
         position: np.ndarray = self._pose(joints)[:3, 3] + self._config.base
         return position
 
     def solve(self, start: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Returns joint positions that bring the point to a place [rad].
+        """Returns joint positions [rad] with which the point is at a position in the plane.
 
         Args:
             start: Joint positions from which the iteration starts [rad].
-            place: x, y in the world [m]; the height is that in the configuration.
+            place: Desired x, y of the point in the world [m]. The configuration specifies height and orientation.
 
         Raises:
-            InterfaceError: If the place is out of reach.
+            InterfaceError: If the position is out of reach.
         """
         goal = np.array([*place, self._config.height])
         q = np.clip(np.array(start, dtype=float), self._robot.limits.lower, self._robot.limits.upper)
@@ -101,8 +102,10 @@ class PlanarHand:
         raise InterfaceError(f"hand.{self._config.link}: expected a place within reach, got ({place_text}) m")
 
     def _error(self, q: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """Returns the vector from the point to a goal [m], and the rotation vector to the desired orientation [rad], in
-        the axes of the root, shape (6,).
+        """Returns the error of joint positions `q`, in the axes of the root link, shape (6,).
+
+        The error consists of the vector from the point to the goal [m] and of the rotation vector to the desired
+        orientation [rad].
         """
         pose, cos, sin = self._pose(q), np.cos(self._config.yaw), np.sin(self._config.yaw)
         wanted = np.array([[cos, sin, 0.0], [sin, -cos, 0.0], [0.0, 0.0, -1.0]])
@@ -110,7 +113,7 @@ class PlanarHand:
         return np.array([*(goal - self._config.base - pose[:3, 3]), *turn])
 
     def _improved(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
-        """Returns joint positions after one step of damped least squares, within the joint limits."""
+        """Returns the joint positions after one step of damped least squares, clipped to the joint limits."""
         jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
         damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
         step = jacobian.T @ solve(damped, error)

@@ -1,4 +1,4 @@
-"""Measured result of a push: errors at the goal and along the path, and the error of the model."""
+"""Measured result of a push: errors at the goal and along the path, and the misfit of the model."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from rpbi_mpc.pushing.planar.model import SliderConfig
 
 
 class ToleranceConfig(ConfigModel):
-    """Largest errors with which a push counts as finished.
+    """Largest errors of a successful push.
+
+    Measured errors at the end of the path are averaged over the second half of the settling time.
 
     Attributes:
-        goal: Distance of the measured slider from the end of the path [m], from the mean position in the second half of
-            the settling time.
-        goal_rad: Difference in yaw from the end of the path [rad], from the mean over the same time.
-        tracking: Mean distance of the measured slider from the reference [m].
+        goal: Distance of the slider from the end of the path [m].
+        goal_rad: Angle between the slider and the direction of the path at its end [rad].
+        tracking: Mean distance of the slider from the reference during the whole push [m].
     """
 
     goal: PositiveMetres = Field(0.005, description="Largest distance of the slider from the end of the path.")
@@ -32,12 +33,12 @@ class PushOutcome(NamedTuple):
     """Errors of a push, and the misfit of its model.
 
     Attributes:
-        goal_m: Final distance from the end of the path [m]; NaN before the reference has reached the end.
-        goal_rad: Final angle from the direction of the path at its end [rad]; NaN before the reference has reached the
-            end.
-        tracking_m: Mean distance from the reference [m].
-        misfit: Mean difference between the velocities of the slider and of the model during pushing, as a share of the
-            speed along the path; rotation is weighted with the characteristic length.
+        goal_m: Final distance of the slider from the end of the path [m]. NaN before the reference is at the end.
+        goal_rad: Final angle between the slider and the direction of the path at its end [rad]. NaN before the
+            reference is at the end.
+        tracking_m: Mean distance of the slider from the reference [m].
+        misfit: Mean difference between the twists of slider and model during pushing, divided by the speed along the
+            path. Angular velocity is multiplied by the characteristic length.
         face_m: Measured minus modelled distance of the pushed face from the middle of the slider [m].
     """
 
@@ -48,7 +49,7 @@ class PushOutcome(NamedTuple):
     face_m: float
 
     def fault(self, tolerance: ToleranceConfig) -> str:
-        """Returns a text with the errors that are too large and the misfit; empty if no error is too large."""
+        """Returns a text with the errors that are too large, and the model's misfit. Empty if all errors are small."""
         faults = []
         if self.goal_m > tolerance.goal:
             faults.append(
@@ -64,7 +65,7 @@ class PushOutcome(NamedTuple):
 
     @property
     def of_model(self) -> str:
-        """A clause that states how the box differs from the model: `misfit` and `face_m`."""
+        """Describes the difference between box and model in a clause, from `misfit` and `face_m`."""
         side = "farther from" if self.face_m > 0.0 else "nearer to"
         return (
             f"unlike the model, the box moves by {100 * self.misfit:.0f} % of its speed, and its pushed face is "
@@ -79,12 +80,12 @@ class PushOutcome(NamedTuple):
 
 
 class PushRecord:
-    """Collects the errors of each cycle.
+    """Collects the errors of all cycles of a push.
 
     Args:
-        slider: The slider of the model.
+        slider: Slider of the model.
         speed: Speed along the path [m/s].
-        final_cycles: Number of last cycles over which the error at the goal is averaged.
+        final_cycles: Number of final cycles over which the error at the goal is averaged.
     """
 
     def __init__(self, slider: SliderConfig, speed: float, final_cycles: int) -> None:
@@ -94,10 +95,10 @@ class PushRecord:
         self._pushed: list[tuple[float, float]] = []
 
     def track(self, deviation: np.ndarray, at_end: bool) -> None:
-        """Records the deviation of the measured slider from the reference [m, m, rad].
+        """Records the deviation of the measured slider from the reference.
 
         Args:
-            deviation: Differences in x, y and yaw.
+            deviation: Differences in x, y and yaw [m, m, rad].
             at_end: Whether the reference is at the end of the path.
         """
         self._errors.append(float(np.hypot(*deviation[:2])))
@@ -105,12 +106,17 @@ class PushRecord:
             self._ends.append(deviation)
 
     def push(self, drift: np.ndarray, gap: float) -> None:
-        """Records the difference between the twists of slider and model [m/s, m/s, rad/s], and the measured gap [m]."""
+        """Records the misfit of the model in a cycle of pushing.
+
+        Args:
+            drift: Difference between the twists of slider and model [m/s, m/s, rad/s].
+            gap: Measured distance between pusher and face [m].
+        """
         self._pushed.append((float(np.linalg.norm(self._scale * drift)) / self._speed, gap))
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors and misfit so far; each is NaN if nothing is recorded for it."""
+        """Errors and misfit up to now. A value without recorded data is NaN."""
         x, y, yaw = np.mean(self._ends, axis=0) if self._ends else np.full(3, math.nan)
         misfit, gap = np.mean(self._pushed, axis=0) if self._pushed else np.full(2, math.nan)
         tracking_m = float(np.mean(self._errors)) if self._errors else math.nan

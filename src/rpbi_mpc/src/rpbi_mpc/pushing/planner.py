@@ -1,4 +1,4 @@
-"""Planners of pushing: their interface, and a planner that solves a nonlinear program."""
+"""Interface of planners for pushing, and a planner that solves a nonlinear program."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class PushSituation(NamedTuple):
     """Scene, path and time from which a planner starts.
 
     Attributes:
-        scene: The predicted scene at the time of the first command.
-        gap: Distance between pusher and face in this scene [m], negative inside the slider.
+        scene: Scene predicted for the time at which the first command acts.
+        gap: Distance between pusher and face in this scene [m]. Negative if the pusher is inside the slider.
         contact: Position of the pusher along the face in this scene [m].
         delay_s: Time until the first command acts [s].
-        path: The path.
-        path_time_s: Time along the path when the first command acts [s].
+        path: The path of the slider.
+        path_time_s: Time along the path at which the first command acts [s].
     """
 
     scene: PlanarScene
@@ -37,9 +37,13 @@ class PushSituation(NamedTuple):
     path_time_s: float
 
     def reference(self, times_s: np.ndarray) -> np.ndarray:
-        """Returns the slider's reference poses at given times after the first command [s], shape (N, 3) [m, m, rad].
+        """Returns the slider's reference poses.
 
-        The first reference yaw differs by at most half a turn from the slider's yaw.
+        Args:
+            times_s: N times after the start of the first command [s].
+
+        Returns:
+            x, y and yaw, shape (N, 3) [m, m, rad]. The first yaw differs by at most half a turn from the slider's yaw.
         """
         poses = self.path.poses(self.path_time_s + times_s)
         poses[:, 2] += 2 * math.pi * round((self.scene.slider[2] - poses[0, 2]) / (2 * math.pi))
@@ -47,7 +51,7 @@ class PushSituation(NamedTuple):
 
     @property
     def speed(self) -> float:
-        """Speed along the path [m/s]; 0 at its end."""
+        """Speed along the path [m/s]. At the end of the path, the speed is 0."""
         return self.path.speed if self.path_time_s < self.path.duration_s else 0.0
 
 
@@ -56,7 +60,10 @@ class PushPlanner(ABC):
 
     @abstractmethod
     def plan(self, situation: PushSituation) -> ControlPlan:
-        """Returns a plan of pusher velocities in the table's axes [m/s], with predicted states (x, y, yaw, contact)."""
+        """Returns a plan for the pusher.
+
+        Commands are pusher velocities in the table's axes [m/s]. States are (x, y, yaw, contact) [m, m, rad, m].
+        """
 
     @abstractmethod
     def reset(self) -> None:
@@ -66,8 +73,8 @@ class PushPlanner(ABC):
 class ProgramPlanner(PushPlanner):
     """Solves `PushingProgram` in each cycle, with a warm start from the last solution.
 
-    The extras of a plan are its first force, `normal` and `tangential` in units of the speed that the force causes
-    [m/s], and `sliding`, the speed of the pusher to the left along the face [m/s].
+    Each plan has three extras for its first step. `normal` and `tangential` are the components of the force, in units
+    of the speed that the force causes [m/s]. `sliding` is the pusher's speed to the left along the face [m/s].
 
     Args:
         config: Slider, pusher, path and cost.
@@ -115,7 +122,12 @@ class ProgramPlanner(PushPlanner):
         return self._program.solve(state, reference, situation.speed, self._force, guess)
 
     def _commands(self, solved: Solved, gap: float) -> np.ndarray:
-        """Returns pusher velocities in the table's axes [m/s], one for each cycle."""
+        """Returns the pusher's velocity in the table's axes for each cycle, shape (plan_cycles, 2) [m/s].
+
+        Args:
+            solved: Solution of the program.
+            gap: Distance between pusher and face [m], which the first command reduces.
+        """
         config = self._config
         rows = []
         for cycle in range(config.plan_cycles):
@@ -128,6 +140,6 @@ class ProgramPlanner(PushPlanner):
 
 
 def _limited(velocity: np.ndarray, most: float) -> np.ndarray:
-    """Returns a velocity, scaled down to the speed `most` if it is faster."""
+    """Scales a velocity down to the speed `most` [m/s] if the velocity is faster."""
     speed = float(np.hypot(*velocity))
     return velocity if speed <= most else velocity * (most / speed)

@@ -20,7 +20,7 @@ except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
 NX, NU = 4, 4
-"""Numbers of a state and of an input, see `model`."""
+"""Numbers of entries in a state and in an input; see the module `planar.model`."""
 
 
 class WeightsConfig(ConfigModel):
@@ -33,9 +33,9 @@ class WeightsConfig(ConfigModel):
         force: Tangential force, and difference between the normal force and the force of motion along the path
             [s^2/m^2].
         sliding: Speed of sliding along the face [s^2/m^2].
-        change: Change from the previous force to the force of the first step [s^2/m^2].
-        final: Factor by which the weights of the last state are multiplied.
-        complementarity: Penalty of inputs with which the contact neither sticks nor slides [s^2/m^2].
+        change: Difference between the force in the first step and the force before it [s^2/m^2].
+        final: Factor for the weights of the last state.
+        complementarity: Penalty for inputs with which the contact neither sticks nor slides [s^2/m^2].
     """
 
     position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
@@ -54,11 +54,11 @@ class ProgramConfig(ConfigModel):
     Attributes:
         steps: Number of steps of the horizon.
         step_s: Duration of a step [s].
-        max_speed: Largest normal speed of the pusher, and of sliding along the face [m/s].
+        max_speed: Largest speed of the pusher normal to the face, and largest speed of sliding along the face [m/s].
         weights: Weights of the cost.
-        solvers: Solvers in the order in which they are tried until one converges: `fatrop` (L. Vanroye et al., IROS
-            2023), an interior-point method for optimal control, and `ipopt` (A. Waechter and L. Biegler, Mathematical
-            Programming 106, 2006), which is several times slower but converges more often.
+        solvers: Solvers, which are tried in this order until one converges. `fatrop` (L. Vanroye et al., IROS 2023) is
+            an interior-point method for optimal control. `ipopt` (A. Waechter and L. Biegler, Mathematical Programming
+            106, 2006) is several times slower but converges more often.
         max_iterations: Number of iterations after which a solver gives up.
         tolerance: Optimality error at which a solver stops.
     """
@@ -83,9 +83,9 @@ class Solved(NamedTuple):
         cost: Value of the cost.
         converged: Whether the solver converged to finite numbers.
         status: Name of the solver, and the status that it reports.
-        iterations: Number of iterations of all solvers that were tried.
-        wall_s: Wall time [s].
-        processor_s: Processor time [s].
+        iterations: Total number of iterations of all tried solvers.
+        wall_s: Wall time of all tried solvers [s].
+        processor_s: Processor time of all tried solvers [s].
     """
 
     states: np.ndarray
@@ -99,7 +99,7 @@ class Solved(NamedTuple):
 
 
 class PushingProgram:
-    """Program for the optimal inputs of a push over a horizon; compiled once, solved in each cycle.
+    """Nonlinear program for the optimal inputs of a push over a horizon. Compiled once, and solved in each cycle.
 
     Args:
         slider: The slider.
@@ -114,14 +114,14 @@ class PushingProgram:
     def solve(
         self, state: np.ndarray, reference: np.ndarray, speed: float, force: np.ndarray, guess: np.ndarray
     ) -> Solved:
-        """Solves the problem from a given state with each solver in turn, until one converges.
+        """Solves the program, with one solver after the other until a solver converges.
 
         Args:
-            state: The first state.
+            state: First state, shape (4,).
             reference: Reference poses, shape (steps + 1, 3) [m, m, rad].
-            speed: Speed along the path, to which the normal force is compared [m/s].
-            force: Normal and tangential force before the first step [m/s].
-            guess: States and inputs from which the solvers start, as a vector from `guess_of`.
+            speed: Speed along the path, which is the reference of the normal force [m/s].
+            force: Normal and tangential force before the first step, shape (2,) [m/s].
+            guess: Vector from `guess_of` with the states and inputs from which the solvers start.
         """
         parameters = np.concatenate([state, reference.ravel(), [speed], force])
         wall, processor, iterations = time.perf_counter(), time.thread_time(), 0
@@ -145,7 +145,7 @@ class PushingProgram:
         return Solved(states, inputs, float(answer["f"]), converged, status, int(stats["iter_count"]), 0.0, 0.0)
 
     def guess_of(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Returns states (steps + 1, 4) and inputs (steps, 4) as a vector of the program's variables."""
+        """Arranges states of shape (steps + 1, 4) and inputs of shape (steps, 4) as a vector of program variables."""
         return np.concatenate([np.hstack([states[:-1], inputs]).ravel(), states[-1]])
 
     def _split(self, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -153,9 +153,9 @@ class PushingProgram:
         return np.vstack([table[:, :NX], vector[-NX:]]), table[:, NX:]
 
     def _compiled(self) -> list[Any]:
-        """Returns the program compiled for each solver.
+        """Compiles the program for each solver.
 
-        The variables are x0, u0, x1, ...; the constraints are, step by step, rows of the dynamics and of the limits.
+        The variables are x0, u0, x1 and so on. For each step, the constraints are the dynamics, followed by the limits.
         """
         states = [casadi.SX.sym(f"x{k}", NX) for k in range(self._steps + 1)]
         inputs = [casadi.SX.sym(f"u{k}", NU) for k in range(self._steps)]
@@ -199,8 +199,8 @@ class PushingProgram:
         )
 
     def _limited(self, state: Any, control: Any) -> Any:
-        """Returns expressions that must not be negative in a step: the distances from the edges of the friction cone,
-        and from the largest speed of the pusher.
+        """Returns the expressions that must not be negative in a step: the force's distances from both edges of the
+        friction cone, and the margin to the pusher's largest normal speed.
         """
         normal, tangential = control[0], control[1]
         edge = self._slider.friction * normal

@@ -1,4 +1,4 @@
-"""The report of a push: table, figures and pictures."""
+"""Writes the report of a push: a table of the cycles, a summary, and pictures."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 OUTLINES = 12
 """Number of outlines of the slider in the picture of the path."""
 AHEAD_S = (0.4, 1.2)
-"""Times after which the predicted and the actual position of the slider are compared [s]."""
+"""Prediction times at which the predicted and the actual position of the slider are compared [s]."""
 
 
 def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingController) -> dict[str, Any]:
-    """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder; returns the summary.
+    """Writes `cycles.csv`, `summary.json`, `path.png`, `errors.png` and `cycles.png` to a folder. Returns the summary.
 
-    Errors are differences of the measured slider from the reference at the time of the measurement.
+    Errors are differences between the measured slider and the reference at the time of the measurement.
 
     Raises:
         OSError: If the folder cannot be written.
@@ -60,7 +60,7 @@ def write_report(folder: Path, cycles: Sequence[Cycle], controller: PushingContr
 
 
 def _finite(value: float) -> float | None:
-    """Returns a number, None in place of NaN, which JSON lacks."""
+    """Returns a finite number unchanged, and None otherwise, since JSON lacks NaN."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -74,8 +74,11 @@ def _figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, An
 
 
 def _predicted(cycle: Cycle, ahead_s: float) -> np.ndarray:
-    """Returns x, y of the slider predicted by a plan for a time after its first command [m]; NaN without a
-    prediction.
+    """Returns the slider's position x, y [m] that the plan of a cycle predicts. NaN without a prediction.
+
+    Args:
+        cycle: The cycle.
+        ahead_s: Time after the start of the plan's first command [s].
     """
     plan = cycle.plan
     row = 0 if plan is None else round(ahead_s / plan.state_step_s)
@@ -83,7 +86,7 @@ def _predicted(cycle: Cycle, ahead_s: float) -> np.ndarray:
 
 
 def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingController) -> None:
-    """Draws path, slider and pusher from above."""
+    """Writes a picture of path, slider and pusher as seen from above."""
     figure, axes = _figure(1, 1, (7.0, 5.5))
     points = controller.path.points
     axes.plot(*points.T, color="tab:green", lw=2, label="path")
@@ -100,7 +103,7 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
 
 
 def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], controller: PushingController) -> None:
-    """Draws errors of position and yaw, and of predictions, over the length of the path."""
+    """Writes a picture of the errors of position, yaw and predicted position along the path."""
     figure, axes = _figure(3, 1, (7.0, 6.0))
     along_m = table["path_time_s"].clip(upper=controller.path.duration_s) * controller.config.path.speed
     turned = table["state.yaw"] - table["reference_yaw"]
@@ -119,7 +122,7 @@ def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], c
 
 
 def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> None:
-    """Draws force and sliding of a plan, place and velocity of the pusher, cost and solve times over time."""
+    """Writes a picture with six plots over time: force, sliding, pusher's position, its velocity, cost, solve time."""
     figure, axes = _figure(6, 1, (7.0, 10.5))
     time_s = table["time_s"] - table["time_s"].iloc[0]
     if "normal" in table:

@@ -1,4 +1,4 @@
-"""Plans of pushing by simulation: candidates are simulated in forks of the world, and the best one is executed."""
+"""A planner for pushing that simulates candidates in forks of the world, and chooses the best candidate."""
 
 from __future__ import annotations
 
@@ -18,28 +18,31 @@ from .planner import PushPlanner, PushSituation
 
 
 class PushRollouts(Protocol):
-    """A plant that simulates pushes from its present state."""
+    """A plant that can simulate pushes from its present state, without changing this state."""
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the scene after each command of each candidate, candidates x cycles x 5, as `PlanarScene.values`.
-
-        The scenes of a candidate that cannot be simulated are NaN.
+        """Simulates candidates, and returns the scene after each command of each candidate.
 
         Args:
-            velocities: Velocities of the pusher in the axes of the table [m/s], candidates x cycles x 2.
-            period_s: Time of a command [s].
-            delay_s: Time until the first one acts [s]; until then, the present one is kept.
+            velocities: Velocities of the pusher in the table's axes, shape (candidates, cycles, 2) [m/s].
+            period_s: Duration of each command [s].
+            delay_s: Time until the first command acts [s]. Until then, the present command continues to act.
+
+        Returns:
+            Scenes as in `PlanarScene.values`, shape (candidates, cycles, 5). NaN for a candidate that cannot be
+            simulated.
         """
 
 
 class PushSamplingConfig(SamplingConfig):
-    """Options of plans by sampling; the cost is that of `pushing.program.weights`, except for yaw.
+    """Options of the controller `sampling`. Except for `yaw`, the weights of the cost are in `pushing.program.weights`.
 
     Attributes:
-        forward: Largest speed of the pusher towards the face [m/s]; it retreats at a fifth of it.
-        across: Largest speed along the face [m/s].
-        yaw: Weight of the difference from the direction of the path [1/rad^2]. A box turns before it leaves a straight
-            line. Within the horizon, turning hardly reduces the distance from the path, so it has a weight of its own.
+        forward: Largest speed of the pusher towards the face [m/s]. The largest speed away from the face is a fifth.
+        across: Largest speed of the pusher along the face [m/s].
+        yaw: Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]. The weight must
+            be large: a box turns before it leaves a straight line, but turning hardly changes the distance from the
+            path within the horizon.
     """
 
     horizon: Seconds = Field(1.2, description="Horizon.")
@@ -54,16 +57,16 @@ class PushSamplingConfig(SamplingConfig):
 
 
 RETREAT = 0.2
-"""Largest speed away from the face, as a share of that towards it."""
+"""Ratio of the largest speed away from the face to the largest speed towards the face."""
 
 
 class SamplingPlanner(PushPlanner):
-    """Chooses the push with the lowest cost in forks of the world.
+    """Simulates candidate pushes in forks of the world, and plans with a sampler of `SAMPLERS`.
 
     Args:
-        rollouts: Simulates pushes.
+        rollouts: Simulates the candidates.
         config: Slider, path and weights.
-        sampling: Number and choice of candidates.
+        sampling: Options of the sampling.
     """
 
     def __init__(self, rollouts: PushRollouts, config: PushingConfig, sampling: PushSamplingConfig) -> None:
@@ -88,11 +91,13 @@ class SamplingPlanner(PushPlanner):
 
 
 class _ScoredPushes:
-    """Costs of pushes in the axes of the slider, forwards and to the left, as `Rollouts`.
+    """Computes the costs of candidate pushes, with the interface of `Rollouts`.
+
+    Commands are pusher velocities in the slider's axes: forwards and to the left [m/s].
 
     Attributes:
-        situation: Scene, path and time from which they start.
-        best_states: x, y, yaw, contact of the best of the last candidates.
+        situation: Scene, path and time from which all candidates start.
+        best_states: Predicted states (x, y, yaw, contact) of the best candidate in the last call of `costs`.
     """
 
     names: tuple[str, ...] = ("forward", "across")
@@ -105,7 +110,7 @@ class _ScoredPushes:
         self.best_states = np.empty((0, 4))
 
     def on_the_table(self, commands: np.ndarray) -> np.ndarray:
-        """Returns velocities in the axes of the table [m/s]."""
+        """Rotates velocities from the slider's axes at the start to the table's axes [m/s]."""
         turned: np.ndarray = commands @ rotation(self.situation.scene.slider[2]).T
         return turned
 
@@ -119,14 +124,20 @@ class _ScoredPushes:
         return costs
 
     def _places(self, scenes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the distance of the pusher from the face, and its place along it [m], candidates x cycles."""
+        """Returns the pusher's distance from the face, and its position along the face [m].
+
+        Both arrays have the shape (candidates, cycles).
+        """
         slider, radius = self._config.slider, self._config.radius
         places = np.array([gap_and_contact(PlanarScene.of(each), slider, radius) for each in scenes.reshape(-1, 5)])
         gaps, contacts = places.T.reshape(2, *scenes.shape[:2])
         return gaps, contacts
 
     def _costs(self, scenes: np.ndarray, gaps: np.ndarray, contacts: np.ndarray, period_s: float) -> np.ndarray:
-        """Returns the cost of each candidate; inf without scenes, or if the pusher leaves the face."""
+        """Returns the cost of each candidate, shape (candidates,).
+
+        The cost is inf if a candidate was not simulated, or if the pusher leaves the face.
+        """
         weights, slider = self._config.program.weights, self._config.slider
         difference = scenes[..., :3] - self.situation.reference(period_s * (1.0 + np.arange(scenes.shape[1])))
         by_cycle = (

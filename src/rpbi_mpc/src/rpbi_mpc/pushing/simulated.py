@@ -1,4 +1,4 @@
-"""Pushing in a world in this process, without ROS."""
+"""A plant for pushing that simulates the world in this process, without ROS."""
 
 from __future__ import annotations
 
@@ -18,19 +18,22 @@ from rpbi_mpc.sampling.world import RolloutTicks
 from .planar.motion import rotation
 
 TIMEOUT_S = 0.1
-"""Time without a pose of the slider after which it counts as hidden [s]."""
+"""Time without a pose of the slider after which the slider counts as hidden [s]."""
 
 
 class PushingWorld(Plant):
-    """A slider tracked by Vicon, and a pusher on two linear joints whose velocities are commanded.
+    """A simulated plant with a slider that is tracked by Vicon, and a pusher on two linear joints.
 
-    Measurements of the pusher have the same delay as those of the slider.
+    The commands are the velocities of both joints. Measurements of pusher and slider have the same delay.
 
     Args:
-        world: The world, with a body `box` that carries a sensor `vicon`, and a robot `pusher` whose first two joints
-            move it along x and y.
-        middle: Position of the middle of the slider in the frame of its body [m].
+        world: World with a body `box`, which has a sensor `vicon`, and a robot `pusher`. The first two joints of the
+            robot move the pusher along x and y.
+        middle: Position x, y of the slider's middle in the body's frame [m].
         timeout_s: Time without a pose after which the slider counts as hidden [s].
+
+    Attributes:
+        truth: True scene after each `advance`: time [s], x, y, yaw of the slider, x, y of the pusher [m, rad].
     """
 
     def __init__(self, world: World, middle: tuple[float, float] = (0.0, 0.0), timeout_s: float = TIMEOUT_S) -> None:
@@ -77,7 +80,7 @@ class PushingWorld(Plant):
         )
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the scene after each command of each candidate, see `PushRollouts`."""
+        """Simulates candidates in forks of the world, and returns the scenes; see `PushRollouts`."""
         ticks = RolloutTicks.of(velocities.shape[1], period_s, delay_s, self.world.clock.dt_s)
         candidates = [
             [PlannedInput(int(start), *self._target(velocity)) for start, velocity in zip(ticks.starts, each)]
@@ -93,12 +96,12 @@ class PushingWorld(Plant):
         return np.hstack([poses, self._base + prediction.joints["pusher"][rows, :2]])
 
     def pusher_position(self) -> np.ndarray:
-        """Returns the true position of the pusher [m]."""
+        """Returns the true position x, y of the pusher in the world [m]."""
         position: np.ndarray = self._base + list(self.pusher.joint_positions().values())[:2]
         return position
 
     def slider_pose(self) -> np.ndarray:
-        """Returns the true pose of the slider's middle [m, m, rad]."""
+        """Returns the true pose x, y, yaw of the slider's middle in the world [m, m, rad]."""
         pose = self.box.base_pose()
         return self._in_plane(pose.position, pose.quat_xyzw)
 

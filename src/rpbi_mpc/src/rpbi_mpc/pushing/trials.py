@@ -1,4 +1,4 @@
-"""Random trials of pushing in the simulator: with varied friction and centre of mass, noise, delay and shoves."""
+"""Simulated trials of pushing, with random friction and centre of mass, measurement noise and delay, and shoves."""
 
 from __future__ import annotations
 
@@ -20,29 +20,31 @@ from .simulated import PushingWorld
 
 WORLD = "{rpbi_mpc}/configs/bench/config.yaml"
 FRICTION, CENTRE = 0.3, 0.1
-"""Largest error of the coefficients of friction, relative, and of the centre of mass, as a share of the box's size."""
+"""Largest relative error of the friction coefficients, and largest offset of the centre of mass divided by the box's
+size.
+"""
 SIZE, HEIGHT = (0.1, 0.1), 0.025
-"""Length and width of the box, and the height of its middle [m]."""
+"""Length and width of the box, and height of the box's middle [m]."""
 TABLE_FRICTION, PUSHER_FRICTION = 1.0, 0.857
-"""Nominal friction in the files of the world; the friction of the box, 0.35, is a factor of both."""
+"""Nominal friction coefficients of table and pusher. Both are multiplied by the box's coefficient, 0.35."""
 SHOVE_M, SHOVE_RAD = 0.03, math.radians(30.0)
-"""Distance and angle of a shove."""
+"""Distance [m] and angle [rad] by which a shove moves the box."""
 LEAST_CLEARANCE = 0.0005
 """Least distance of a shoved box from the pusher [m]."""
 
 
 class Variation(NamedTuple):
-    """Differences of a world from the model of the controller.
+    """Differences between a world and the controller's model.
 
     Attributes:
-        seed: Seed of the noise of the tracker.
-        table: Factor of the friction with the table.
-        pusher: Factor of the friction with the pusher.
-        centre: Centre of mass in the frame of the middle [m].
-        start: Pose of the box at the start, relative to that of the path [m, m, rad].
-        noise_m: Standard deviation of measured positions [m]; that of yaw is 5 rad/m times this.
-        latency_s: Age of measurements [s].
-        size: Factor of length and width of the box.
+        seed: Seed of the tracker's noise.
+        table: Factor for the friction between box and table.
+        pusher: Factor for the friction between box and pusher.
+        centre: Position x, y of the centre of mass, relative to the box's middle [m].
+        start: Initial pose of the box, relative to the start of the path [m, m, rad].
+        noise_m: Standard deviation of measured positions [m]. The standard deviation of yaw is `noise_m` times 5 rad/m.
+        latency_s: Delay of measurements [s].
+        size: Factor for length and width of the box.
     """
 
     seed: int = 1
@@ -56,7 +58,11 @@ class Variation(NamedTuple):
 
     @classmethod
     def random(cls, seed: int, noise_m: float = 0.002, latency_s: float = 0.02) -> Variation:
-        """Returns the variation of a seed, uniformly distributed between the limits above."""
+        """Draws a random variation. All distributions are uniform.
+
+        Friction and centre of mass vary within `FRICTION` and `CENTRE`. The box starts at most 1 cm beside the path,
+        turned by at most 0.1 rad.
+        """
         random = np.random.default_rng(seed)
         table, pusher = 1.0 + random.uniform(-FRICTION, FRICTION, 2)
         x, y = random.uniform(-CENTRE, CENTRE, 2) * SIZE
@@ -69,13 +75,14 @@ class PushingTrial(NamedTuple):
     """Result of a trial.
 
     Attributes:
-        errors: Distance of the slider's middle from the reference, one for each cycle [m]. The reference stops while
-            the pusher is not at the slider, or the slider is too far behind.
-        off_path: Least distance from the path, one for each cycle [m].
-        cycles: The cycles.
-        truth: Time, x, y, yaw, pusher x, pusher y after each half of a cycle.
-        finished: Whether the slider reached the end of the path, with errors within the tolerance of the configuration.
-        recovered_s: Time from the shove until the error stays below a limit [s]; NaN without a shove, inf if never.
+        errors: Distance of the slider's middle from the reference in each cycle [m]. The reference waits while the
+            pusher is not at the slider, and while the slider is too far behind.
+        off_path: Distance of the slider's middle from the nearest point of the path in each cycle [m].
+        cycles: Records of all cycles.
+        truth: True scenes; see `PushingWorld.truth`.
+        finished: Whether the slider reached the end of the path, with errors within the configured tolerance.
+        recovered_s: Time from the shove until the error stays below the limit [s]. NaN without a shove, and inf if the
+            error stays above the limit.
     """
 
     errors: np.ndarray
@@ -87,7 +94,7 @@ class PushingTrial(NamedTuple):
 
 
 def pushing_world(variation: Variation, path: PushPath) -> World:
-    """Builds the world of a variation, with the box at the start of a path and the pusher behind it."""
+    """Builds the world of a variation, with the box near the start of a path and the pusher behind the box."""
     x, y, yaw = path.poses(0.0)[0]
     cos, sin = math.cos(yaw), math.sin(yaw)
     dx, dy, turned = variation.start
@@ -144,15 +151,15 @@ def run_trial(
     recovered_below: float = 0.01,
     max_s: float = 60.0,
 ) -> PushingTrial:
-    """Pushes along a path in the simulator.
+    """Runs a simulated trial: pushes the box along the configured path, and returns the result.
 
     Args:
         config: Configuration of the controller.
-        variation: How the world differs from its model.
-        loop: Times of the loop; by default those of the package.
-        shove_at_s: Time at which the box is shoved by 3 cm and 30 degrees [s]; None for no shove.
-        make_controller: Makes the controller for the plant; by default that of the configuration.
-        recovered_below: Error below which the box has recovered [m].
+        variation: Differences between the world and the controller's model.
+        loop: Timing of the loop. Default: `LoopConfig()`.
+        shove_at_s: World time at which the box is shoved by 3 cm and 30 degrees [s]. Default: without a shove.
+        make_controller: Makes a controller for the plant. Default: makes a `PushingController`.
+        recovered_below: Error below which the box counts as recovered from the shove [m].
         max_s: Time after which the trial ends [s].
     """
     path = PushPath(config.path)
@@ -188,9 +195,9 @@ def run_trial(
 
 
 def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generator) -> None:
-    """Teleports the box by 3 cm in a random direction and by 30 degrees to a random side.
+    """Teleports the box by 3 cm in a random direction, and turns the box by 30 degrees to a random side.
 
-    A box that would penetrate the pusher is put in front of it.
+    A box that would penetrate the pusher is placed next to the pusher instead.
     """
     world, pose = plant.world, plant.slider_pose()
     direction, side = random.uniform(-math.pi, math.pi), random.choice((-1.0, 1.0))
@@ -214,7 +221,13 @@ def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generato
 
 
 def _recovered(errors: list[float], limit: float, loop: LoopConfig) -> float:
-    """Returns the time after which all errors are below a limit [s]."""
+    """Returns the time from the first error until all later errors are below a limit [s]; inf if the last one is above.
+
+    Args:
+        errors: Error in each cycle [m].
+        limit: The limit [m].
+        loop: Timing of the loop.
+    """
     above = np.flatnonzero(np.array(errors) > limit)
     if len(above) == 0:
         return 0.0

@@ -1,4 +1,4 @@
-"""The newest pose of the slider, and the position of the hand at the same time."""
+"""Subscribes to the slider's pose and the robot's joint states, and returns the newest scene for the controller."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rpbi_mpc.node_configs import PlantConfig
 from rpbi_mpc.pushing.hand import PlanarHand
 
 SLACK_S = 1e-4
-"""Difference below which stamps count as equal [s]: less than a tick, more than rounding."""
+"""Difference below which two stamps count as equal [s]: less than a tick, more than rounding errors."""
 TF = "/tf"
 KEPT = 1000
-"""Number of joint states that are kept."""
+"""Number of recent joint states that are stored."""
 
 
 class SeenScene(NamedTuple):
-    """Slider and pusher at the time of the newest pose.
+    """Slider and pusher at the time of the slider's newest pose.
 
     Attributes:
-        stamp_s: Stamp of the pose [s].
-        values: x, y, yaw of the slider, x, y of the pusher.
+        stamp_s: Stamp of the slider's pose [s].
+        values: x, y, yaw of the slider, and x, y of the pusher [m, rad].
     """
 
     stamp_s: float
@@ -38,11 +38,11 @@ class SeenScene(NamedTuple):
 
 
 class SceneListener:
-    """Subscribes to Vicon and to the joints of the robot.
+    """Subscribes to the slider's pose from Vicon, and to the robot's joint states.
 
     Args:
-        config: Topics.
-        hand: Kinematics of the hand.
+        config: Names of the topics.
+        hand: Kinematics of the hand, whose point is the pusher.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
@@ -56,12 +56,12 @@ class SceneListener:
         rospy.Subscriber(self.joint_states, JointState, self._on_joints, queue_size=100, tcp_nodelay=True)
 
     def joints(self) -> np.ndarray | None:
-        """Returns the newest positions of the joints [rad]; None before the first."""
+        """Returns the newest joint positions [rad]. None before the first joint states."""
         with self._changed:
             return self._joints[-1][1] if self._joints else None
 
     def scene(self) -> SeenScene | None:
-        """Returns the newest pose and the pusher at its time; None before the first."""
+        """Returns the slider's newest pose, and the pusher's position at that time. None before the first messages."""
         with self._changed:
             if self._pose is None or not self._joints:
                 return None
@@ -103,14 +103,14 @@ class SceneListener:
 
 
 class TickSceneListener(SceneListener):
-    """Takes poses from TF, where a simulator sends all poses of a tick in one message.
+    """Reads the slider's pose from TF instead of the tracker's topic.
 
-    A slider is hidden if this message lacks it. The tracker's topic cannot distinguish a hidden slider from a late
-    message.
+    A simulator sends all poses of a tick in one TF message. If this message lacks the slider, the slider is hidden. On
+    the tracker's topic, a hidden slider and a late message would look the same.
 
     Args:
-        config: Topics; the frame on TF has the name of the tracker's topic.
-        hand: Kinematics of the hand.
+        config: Names of the topics. The slider's TF frame has the name of the tracker's topic.
+        hand: Kinematics of the hand, whose point is the pusher.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
@@ -122,14 +122,14 @@ class TickSceneListener(SceneListener):
         super().__init__(config, hand)
 
     def wait_for_tick(self, time_s: float, timeout_s: float) -> str:
-        """Waits for the joint states and the TF of a tick, for at most a time of the wall clock.
+        """Waits until the joint states and the TF message of a tick have arrived.
 
         Args:
             time_s: Stamp of the tick [s].
-            timeout_s: Longest wait [s].
+            timeout_s: Longest wait, in wall time [s].
 
         Returns:
-            The topics that have no such message yet, separated by commas; empty if all have one.
+            Topics whose message is still missing, separated by commas. Empty if both messages have arrived.
         """
         with self._changed:
             self._changed.wait_for(lambda: not self._late(time_s), timeout_s)

@@ -1,4 +1,4 @@
-"""A loop in lock-step as a node: services start it, stop it, or make it run one cycle."""
+"""A node that runs a control loop in lock-step. Services start and stop the loop, or run a single cycle."""
 
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ from rpbi_mpc.msg import MpcStatus
 from rpbi_mpc.records import write_records
 
 IDLE_S = 0.04
-"""Time between two commands to a stopped timed plant [s]."""
+"""Time between two commands to a timed plant while the loop is stopped [s]."""
 MAX_MEAN_PERIODS = 1.2
-"""Mean duration of the newest cycles of a timed plant, in periods, beyond which a warning is logged."""
+"""Ratio of the mean duration of recent cycles to the period at which a warning is logged, for a timed plant."""
 MEAN_CYCLES = 25
-"""Number of cycles of this mean."""
+"""Number of recent cycles whose durations are averaged."""
 WARNING_PERIOD_S = 10.0
-"""Shortest time between two of these warnings [s]."""
+"""Least time between two warnings of slow cycles [s]."""
 LONG_S = 10.0
-"""Duration of a cycle after which `mpc/step` warns that it still waits [s]."""
+"""Time after which the service `mpc/step` warns that it is still waiting for the end of the cycle [s]."""
 
 Answer = tuple[bool, str]
 
 
 class LoopNode:
-    """Runs a loop in the main thread; services and buttons start it, stop it, or make it run one cycle.
+    """Runs a control loop in the main thread. The services `mpc/start`, `mpc/stop` and `mpc/step` control the loop.
 
-    Parameters are `~start_on_init`, `~out`, the folder of its records, and `~end`, whether the node ends with the task.
+    The node has three private parameters. With `~start_on_init` (default: true), the loop starts at once. `~out` is the
+    folder for the report. With `~end`, the node ends together with the task.
 
     Args:
         plant: The controlled system.
         controller: The controller.
-        config: Times.
+        config: Timing of the loop.
     """
 
     def __init__(self, plant: Plant, controller: MpcController, config: LoopConfig) -> None:
@@ -55,13 +56,13 @@ class LoopNode:
         self._status.publish(MpcStatus(status="ready", running=self._running))
 
     def show(self, cycle: Cycle) -> None:
-        """Publishes a cycle, in addition to its status."""
+        """Publishes details of a cycle in addition to `mpc/status`. Does nothing by default."""
 
     def on_stop(self) -> None:
-        """Called after the service has stopped the loop."""
+        """Is called after the service `mpc/stop` has stopped the loop. Does nothing by default."""
 
     def write_report(self, folder: Path) -> str:
-        """Writes the records of all cycles to a folder, and returns a one-line summary.
+        """Writes the records of all cycles to a folder, and returns a summary in one line.
 
         Raises:
             OSError: If the folder cannot be written.
@@ -70,10 +71,10 @@ class LoopNode:
         return f"{summary['cycles']} cycles"
 
     def run(self) -> None:
-        """Runs cycles as requested until ROS shuts down, or the task is done and `~end` is true.
+        """Runs the requested cycles until ROS shuts down. With `~end`, also returns when the task is done.
 
         Raises:
-            InterfaceError: If the simulator refuses to be stepped, or no joint states arrive; with `~end`, also if the
+            InterfaceError: If the simulator rejects a step, or joint states do not arrive. With `~end`, also if the
                 loop stops before the task is done.
         """
         while not rospy.is_shutdown():
@@ -111,7 +112,7 @@ class LoopNode:
         return was_running, "stopped: the robot stands" if was_running else "the loop is not running"
 
     def _step(self) -> Answer:
-        """Requests a cycle and waits for its end."""
+        """Requests a cycle, waits for the cycle's end, and returns success and message of the service."""
         with self._changed:
             if self._running:
                 return False, "the loop is running; call mpc/stop first"
@@ -137,7 +138,7 @@ class LoopNode:
             rospy.logwarn_throttle(WARNING_PERIOD_S, f"{text}; end other programs (docs/slow.md)")
 
     def _is_due(self) -> bool:
-        """Returns whether a cycle is requested; waits a little if none is and the plant is stepped."""
+        """Returns whether the next cycle is requested. Waits at most 0.1 s for a request if the plant is not timed."""
         with self._changed:
             if not self._running and not self._steps and not self._loop.plant.is_timed:
                 self._changed.wait(0.1)
@@ -166,7 +167,7 @@ class LoopNode:
             self._changed.notify_all()
 
     def _end(self) -> None:
-        """Stops the plant, and writes the report."""
+        """Stops the plant, and writes the report if `~out` is given."""
         with self._changed:
             self._running = False
         self._loop.plant.stand()

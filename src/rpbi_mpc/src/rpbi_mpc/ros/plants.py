@@ -1,4 +1,4 @@
-"""The robot and the slider as plants: a world that is stepped by services, or one that runs in real time."""
+"""Plants of the pushing node: a simulator that services step, and a robot or simulator that runs in real time."""
 
 from __future__ import annotations
 
@@ -23,21 +23,23 @@ from .listener import SceneListener, TickSceneListener
 from .simulator import SteppedSimulator
 
 PATIENCE_S = 30.0
-"""Longest wait for the first joint states [s]."""
+"""Timeout for the first joint states [s]."""
 LATE_S = 5.0
-"""Wall time of waiting for the messages of a tick after which a warning is logged [s]."""
+"""Wall time after which a warning is logged if the messages of a tick are missing [s]."""
 
 
 class HandPlant(Plant):
-    """A hand with a commanded velocity in the plane, moved by targets of the robot's joints.
+    """Moves a robot's hand in a plane. The commands are velocities x, y of the hand [m/s].
+
+    `advance` integrates the velocity to target positions of the hand, and sends the corresponding joint targets.
 
     Args:
-        config: Topics and rates.
+        config: Names of topics, rates and limits.
         hand: Inverse kinematics of the hand.
-        listener: Source of poses and joints.
+        listener: Receives the slider's poses and the robot's joint states.
 
     Raises:
-        InterfaceError: If no joint states arrive, or the hand is out of its plane.
+        InterfaceError: If joint states do not arrive, or the hand cannot reach its plane.
     """
 
     def __init__(self, config: PlantConfig, hand: PlanarHand, listener: SceneListener) -> None:
@@ -71,7 +73,7 @@ class HandPlant(Plant):
         self._velocity = np.zeros(2)
 
     def begin_at_the_robot(self) -> None:
-        """Makes the next targets begin at the measured position, for instance after a stop of the robot."""
+        """Makes the next target start from the hand's measured position, for instance after a stop of the robot."""
         self._place = None
 
     def advance(self, duration_s: float) -> None:
@@ -91,7 +93,11 @@ class HandPlant(Plant):
         return JointState(name=list(self._hand.joint_names), position=self._joints.tolist())
 
     def _begin(self) -> None:
-        """Begins the targets at the robot's measured position."""
+        """Waits for the first joint state. Then sets the hand's target to the hand's measured position.
+
+        Raises:
+            InterfaceError: If joint states do not arrive within `PATIENCE_S`, or the hand cannot reach its plane.
+        """
         end_s = time.monotonic() + PATIENCE_S
         while (joints := self._listener.joints()) is None and time.monotonic() < end_s and not rospy.is_shutdown():
             self._wait_for_joints()
@@ -107,14 +113,14 @@ class HandPlant(Plant):
 
     @abstractmethod
     def _pass(self, step_s: float, target: JointState) -> None:
-        """Sets a target and waits for a time [s]."""
+        """Sends a joint target, and lets a time pass [s]."""
 
     @abstractmethod
     def _wait_for_joints(self) -> None: ...
 
 
 class SteppedPlant(HandPlant):
-    """A simulator that is stepped, so that no decision depends on the speed of the computer."""
+    """A plant in a simulator that is stepped by services, so that results do not depend on the computer's speed."""
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
         self._ticks = TickSceneListener(config, hand)
@@ -122,10 +128,10 @@ class SteppedPlant(HandPlant):
         self._simulator = SteppedSimulator(config.robot)
 
     def sense(self) -> Sensed:
-        """Returns the newest measurement up to the last tick; waits for its messages.
+        """Waits for the messages of the last tick, and returns the newest measurement.
 
         Raises:
-            InterfaceError: If the simulator stops answering.
+            InterfaceError: If the simulator does not answer any more.
         """
         while (late := self._ticks.wait_for_tick(self._simulator.time_s, LATE_S)) and not rospy.is_shutdown():
             rospy.logwarn(f"{late}: no message of the tick at {self._simulator.time_s:.3f} s yet, expected one")
@@ -133,9 +139,9 @@ class SteppedPlant(HandPlant):
         return super().sense()
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the scene after each command of each candidate, see `PushRollouts`.
+        """Simulates candidates with the service `rpbi/predict`, and returns the scenes; see `PushRollouts`.
 
-        A candidate with a place out of reach cannot be simulated.
+        A candidate with a position of the hand that is out of reach is not simulated.
         """
         robot, slider, cycles = self._config.robot, self._config.slider, velocities.shape[1]
         ticks = RolloutTicks.of(cycles, period_s, delay_s, self._simulator.dt_s)
@@ -155,12 +161,16 @@ class SteppedPlant(HandPlant):
         return found
 
     def _targets(self, velocities: np.ndarray, durations_s: np.ndarray) -> list[PlannedInput]:
-        """Returns targets of the joints for velocities of the hand, one after the other.
+        """Returns the joint targets for a sequence of hand velocities.
 
-        Inverse kinematics is solved at the end of each; joints are linear in between.
+        Inverse kinematics are solved at the end of each velocity. In between, joint positions change linearly.
+
+        Args:
+            velocities: Velocities x, y of the hand, shape (n, 2) [m/s].
+            durations_s: Duration of each velocity, shape (n,) [s].
 
         Raises:
-            InterfaceError: If a place is out of reach.
+            InterfaceError: If a position of the hand is out of reach.
         """
         if self._place is None:
             self._begin()
@@ -197,7 +207,7 @@ class SteppedPlant(HandPlant):
 
 
 class TimedPlant(HandPlant):
-    """A robot in real time: hardware, its stand-in, or a running world."""
+    """A plant that runs in real time: a real robot, an emulated robot, or a running simulator."""
 
     is_timed = True
 

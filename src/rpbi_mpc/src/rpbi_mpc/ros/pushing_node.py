@@ -1,4 +1,4 @@
-"""`pushing_mpc_node.py`: pushes a slider along a path and shows the plan in RViz; start, stop and step by services."""
+"""`pushing_mpc_node.py`: pushes a slider along a path, and shows the plan in RViz. Services start and stop the node."""
 
 from __future__ import annotations
 
@@ -32,17 +32,18 @@ FRAME = "rpbi/world"
 SPACING = 0.005
 """Distance between points of the path in RViz [m]."""
 SHOWN_EVERY = 4
-"""Number of predicted poses from one outline to the next."""
+"""Number of predicted poses between two outlines of the slider in RViz."""
 PLAN, REFERENCE, SEEN = ColorRGBA(0.1, 0.55, 0.9, 0.9), ColorRGBA(0.2, 0.7, 0.3, 0.9), ColorRGBA(0.93, 0.53, 0.14, 0.9)
 NODE = "pushing_mpc"
 
 
 class PushingDisplay:
-    """Publishes `mpc/path`, `mpc/prediction` (nav_msgs/Path) and `mpc/markers`, outlines of the slider.
+    """Publishes the display for RViz: `mpc/path` and `mpc/prediction` (nav_msgs/Path), and `mpc/markers` with outlines
+    of the slider.
 
     Args:
-        path: The path.
-        slider: The slider.
+        path: Path of the slider.
+        slider: Size of the slider.
     """
 
     def __init__(self, path: PushPath, slider: SliderConfig) -> None:
@@ -56,7 +57,7 @@ class PushingDisplay:
         self._path.publish(self._path_message(path.poses(times)))
 
     def show(self, plan: ControlPlan | None, sensed: Sensed) -> None:
-        """Publishes a plan, the measured slider, and the reference."""
+        """Publishes the predicted poses of a plan, the measured slider, and the reference."""
         if plan is None or sensed.values is None:
             return
         self._prediction.publish(self._path_message(plan.states[:, :3]))
@@ -66,7 +67,7 @@ class PushingDisplay:
         self._markers.publish(MarkerArray([self._outline(i, *each) for i, each in enumerate(outlines)]))
 
     def _path_message(self, poses: np.ndarray) -> PathMessage:
-        """Returns poses x, y, yaw, N x 3 [m, m, rad], as a path at the height of the display."""
+        """Converts poses x, y, yaw, shape (N, 3) [m, m, rad], to a path message at the height of the display."""
         message = PathMessage()
         message.header.frame_id = FRAME
         message.poses = [self._pose(pose) for pose in poses]
@@ -81,7 +82,7 @@ class PushingDisplay:
         return stamped
 
     def _outline(self, index: int, pose: np.ndarray, colour: ColorRGBA) -> Marker:
-        """Returns the outline of the slider at a pose x, y, yaw [m, m, rad]."""
+        """Returns a marker with the outline of the slider at a pose x, y, yaw [m, m, rad]."""
         marker = Marker(ns="slider", id=index, type=Marker.LINE_STRIP, action=Marker.ADD, color=colour)
         marker.header.frame_id = FRAME
         marker.scale.x = 0.002
@@ -94,10 +95,10 @@ class PushingDisplay:
 
 
 class PushingNode(LoopNode):
-    """Pushes a slider with the hand of a robot.
+    """Pushes a slider along a path with a robot's hand.
 
     Raises:
-        ConfigError: If the configuration is wrong.
+        ConfigError: If the node's configuration is invalid.
         MissingDependency: If CasADi is not installed.
     """
 

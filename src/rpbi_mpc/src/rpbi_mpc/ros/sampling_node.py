@@ -1,4 +1,4 @@
-"""`sampling_mpc_node.py`: commands a robot by the best of simulated candidates."""
+"""`sampling_mpc_node.py`: simulates candidate commands for a robot, and executes the best candidate."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ TARGET = "/target"
 
 
 class PredictedRobot(Plant):
-    """A robot in a stepped simulator, with predictions by `rpbi/predict`.
+    """A robot in a stepped simulator. The service `rpbi/predict` simulates candidates.
 
     Args:
-        config: The targets of a robot that are commanded.
-        cost: Cost of a state.
+        config: Commanded input, which must be the target of a robot.
+        cost: Cost of a state, as `module:name`.
 
     Raises:
-        InterfaceError: If the simulator refuses to be stepped, or the input is not the target of a robot.
+        InterfaceError: If the simulator rejects steps, or the input is not the target of a robot.
     """
 
     def __init__(self, config: InputConfig, cost: str) -> None:
@@ -47,13 +47,13 @@ class PredictedRobot(Plant):
         self._simulator.set_target(JointState(name=list(self.names), position=command.tolist()))
 
     def stand(self) -> None:
-        """Keeps the last target, at which the robot holds."""
+        """Does nothing: the robot stays at its last target."""
 
     def advance(self, duration_s: float) -> None:
         self._simulator.step(whole_ticks(duration_s, self._simulator.dt_s))
 
     def costs(self, commands: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the cost of each candidate, see `Rollouts`."""
+        """Simulates candidates, and returns the cost of each candidate; see `Rollouts`."""
         period, delay = (whole_ticks(each_s, self._simulator.dt_s) for each_s in (period_s, delay_s))
         candidates = [planned(each, self._config, period, delay) for each in commands]
         found = self._simulator.predict(candidates, delay + commands.shape[1] * period, cost=self._cost)

@@ -1,4 +1,4 @@
-"""A simulator that advances only in requested steps, and makes predictions."""
+"""A client for the services of a simulator that advances only in requested steps."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ from rpbi.world.forks.prediction import PlannedInput
 
 
 class SteppedSimulator:
-    """Steps the simulator and sets targets of a robot, by services.
+    """Calls services of the simulator: steps the simulator, sets a robot's targets, and requests predictions.
+
+    The constructor stops the running simulator, and advances it by two ticks.
 
     Args:
-        robot: Name of the robot.
+        robot: Name of the robot whose targets are set.
 
     Attributes:
-        dt_s: Time of a tick [s].
-        time_s: Time of the last tick [s].
+        dt_s: Duration of a tick [s].
+        time_s: Simulation time of the last tick [s].
 
     Raises:
-        InterfaceError: If the simulator refuses to be stepped.
+        InterfaceError: If the simulator rejects a step.
     """
 
     def __init__(self, robot: str) -> None:
@@ -43,19 +45,19 @@ class SteppedSimulator:
         self.dt_s = round(self.time_s - before_s, 9)
 
     def step(self, ticks: int) -> None:
-        """Advances by ticks.
+        """Advances the simulator by a number of ticks.
 
         Raises:
-            InterfaceError: If the simulator refuses.
+            InterfaceError: If the simulator rejects the request.
         """
         answer = _accepted("rpbi/step_n", self._step_n(ticks))
         self.time_s = float(answer.stamp.to_sec())
 
     def set_target(self, target: JointState) -> None:
-        """Sets targets of joints, which act from the next tick on.
+        """Sets joint targets, which act from the next tick on.
 
         Raises:
-            InterfaceError: If the simulator refuses.
+            InterfaceError: If the simulator rejects the request.
         """
         _accepted(f"rpbi/{self._robot}/set_target", self._set_target(target))
 
@@ -67,10 +69,17 @@ class SteppedSimulator:
         every: int = 0,
         cost: str = "",
     ) -> list[Prediction]:
-        """Returns the predicted states for each candidate, see `World.predict`.
+        """Simulates candidates from the present state, and returns the prediction for each; see `World.predict`.
+
+        Args:
+            candidates: Planned inputs of each candidate.
+            ticks: Number of ticks to simulate.
+            watch: Names of the bodies whose states are returned.
+            every: Number of ticks between two returned states.
+            cost: Cost of a state, as `module:name`. Empty: without a cost.
 
         Raises:
-            InterfaceError: If the simulator refuses.
+            InterfaceError: If the simulator rejects the request.
         """
         messages = [Candidate([_message(each) for each in candidate]) for candidate in candidates]
         answer = self._predict(candidates=messages, ticks=ticks, watch=watch, every=every, cost=cost)
@@ -82,10 +91,10 @@ class SteppedSimulator:
 
 
 def _accepted(service: str, answer: Any) -> Any:
-    """Returns the answer of a service.
+    """Checks that a service has accepted a request, and returns the service's answer.
 
     Raises:
-        InterfaceError: If the request was refused.
+        InterfaceError: If the service has rejected the request.
     """
     if not answer.success:
         raise InterfaceError(f"{service}: {answer.message}")

@@ -1,5 +1,5 @@
-"""Model predictive control by sampling: candidates are simulated in forks of the world, and the best one is
-executed.
+"""Model predictive control by sampling. Candidate plans are simulated in forks of the world, and improve the executed
+plan.
 """
 
 from .controller import SamplingConfig as SamplingConfig

@@ -1,4 +1,4 @@
-"""A controller that simulates candidates from the present state, and executes the best."""
+"""A controller that simulates candidate plans from the present state, and improves its plan from their costs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .samplers import SAMPLERS
 
 
 class Rollouts(Protocol):
-    """Simulates from the present state of a world.
+    """Simulates candidates from the present state of a world, without changing this state.
 
     Attributes:
-        names: Names of the m numbers of a command.
-        lower: Their lower limits.
-        upper: Their upper limits.
+        names: Names of the m numbers in a command.
+        lower: Lower limit of each number, shape (m,).
+        upper: Upper limit of each number, shape (m,).
     """
 
     names: tuple[str, ...]
@@ -28,17 +28,17 @@ class Rollouts(Protocol):
     upper: np.ndarray
 
     def costs(self, commands: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the cost of each candidate; inf for one that cannot be simulated.
+        """Simulates candidates, and returns the cost of each candidate. A failed simulation has the cost inf.
 
         Args:
-            commands: Candidates x cycles x m.
-            period_s: Time between two commands [s].
-            delay_s: Time until the first one acts [s].
+            commands: Commands of each candidate, shape (candidates, cycles, m).
+            period_s: Duration of each command [s].
+            delay_s: Time until the first command acts [s].
         """
 
 
 class SamplingConfig(ConfigModel):
-    """Options of the controller."""
+    """Options of `SamplingController`."""
 
     horizon: Seconds = Field(0.5, description="Horizon.")
     knots: Annotated[int, Field(ge=2)] = Field(
@@ -52,19 +52,19 @@ class SamplingConfig(ConfigModel):
 
 
 class SamplingController(MpcController):
-    """Plans by simulation of candidates, chosen by one of `SAMPLERS`.
+    """Plans by simulating candidates. A sampler of `SAMPLERS` draws the candidates and improves the plan.
 
-    Random numbers depend only on the seed and the cycle.
+    Random numbers depend only on the seed and the number of the cycle.
 
     Args:
         rollouts: Simulates the candidates.
         config: Options.
-        hz: Cycles a second, as those of the loop [Hz].
-        start: Command at the start, m numbers.
+        hz: Rate of the cycles [Hz]; must equal the loop's rate.
+        start: Initial command, shape (m,).
 
     Raises:
-        ConfigError: If an option is wrong.
-        UnknownNameError: If there is no such sampler.
+        ConfigError: If an option is invalid.
+        UnknownNameError: If the sampler does not exist.
     """
 
     def __init__(self, rollouts: Rollouts, config: SamplingConfig, hz: float, start: np.ndarray) -> None:
@@ -89,7 +89,11 @@ class SamplingController(MpcController):
         return self.sample(delay_s)
 
     def sample(self, delay_s: float) -> ControlPlan:
-        """Returns a plan from the present state of the simulation, whose first command acts after a delay [s]."""
+        """Improves the plan by simulations from the present state, and returns the plan.
+
+        Args:
+            delay_s: Time until the plan's first command acts [s].
+        """
         begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
         random = np.random.default_rng([self._config.seed, self._count])
         self._count += 1
@@ -132,12 +136,16 @@ class SamplingController(MpcController):
         )
 
     def _commands(self, plans: np.ndarray) -> np.ndarray:
-        """Returns the commands of plans, plans x cycles x m."""
+        """Converts plans (knots, as shares of the limits) to commands, shape (plans, cycles, m)."""
         times = np.arange(self._cycles) * self._period_s
         shares = np.stack([self._at(plan, times) for plan in plans])
         commands: np.ndarray = self._rollouts.lower + shares * self._span
         return commands
 
     def _at(self, plan: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Returns the commands of a plan at times from its start [s], times x m; after its end, the last one."""
+        """Interpolates a plan at times since its start [s]. After the end of the plan, repeats the last knot.
+
+        Returns:
+            Shares of the limits, shape (times, m).
+        """
         return np.stack([np.interp(times, self._times, column) for column in plan.T], axis=1)

@@ -1,7 +1,7 @@
-"""Samplers draw candidates around a nominal plan, and improve the plan from their costs.
+"""Samplers, which draw candidates around a nominal plan and improve the plan from the candidates' costs.
 
-A plan is a matrix of knots, k x m: m numbers of the command at k equidistant times, each as a share of its range from
-0 (lower limit) to 1 (upper limit).
+A plan is a matrix of shape (k, m): the m numbers of a command at k equidistant times, the knots. Each number is a share
+of its range, from 0 (lower limit) to 1 (upper limit).
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class SamplerConfig(ConfigModel):
 
 
 class Sampler(ABC):
-    """Draws candidates around a nominal plan, and improves the plan from their costs.
+    """Draws candidates around a nominal plan, and improves the plan from the candidates' costs.
 
     Args:
-        config: Its options.
-        shape: Knots and numbers of a plan.
+        config: Options of the sampler.
+        shape: Shape (k, m) of a plan.
     """
 
     Config: type[SamplerConfig] = SamplerConfig
@@ -41,26 +41,31 @@ class Sampler(ABC):
         self.shape = shape
 
     def begin(self) -> None:  # noqa: B027 (optional)
-        """Begins a cycle."""
+        """Prepares the sampler for a new cycle. Does nothing by default."""
 
     def draw(self, nominal: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """Returns candidates within the limits, candidates x k x m; the first one is the nominal plan."""
+        """Draws candidates within the limits, shape (candidates, k, m). The first candidate is the nominal plan."""
         noise = random.standard_normal((self.config.candidates, *self.shape)) * self.deviation
         noise[0] = 0.0
         return np.clip(nominal + noise, 0.0, 1.0)
 
     @property
     def deviation(self) -> float | np.ndarray:
-        """Standard deviation of the next candidates, a number or k x m."""
+        """Standard deviation of the next candidates, a number or an array of shape (k, m)."""
         return self.config.noise
 
     @abstractmethod
     def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
-        """Returns the new nominal plan, k x m, from candidates and their finite costs."""
+        """Computes the new nominal plan, shape (k, m).
+
+        Args:
+            candidates: Candidates with finite costs, shape (n, k, m).
+            costs: Cost of each candidate, shape (n,).
+        """
 
 
 class PredictiveSampler(Sampler):
-    """The best candidate is the plan (Howell et al., Predictive Sampling, arXiv 2212.00541, algorithm 1)."""
+    """Adopts the best candidate as plan (Howell et al., Predictive Sampling, arXiv 2212.00541, algorithm 1)."""
 
     def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
         best: np.ndarray = candidates[np.argmin(costs)]
@@ -82,7 +87,10 @@ class CemConfig(SamplerConfig):
 
 
 class CemSampler(Sampler):
-    """The cross-entropy method: mean and deviation of the best candidates (Rubinstein 1999; Kobilarov 2012)."""
+    """The cross-entropy method (Rubinstein 1999; Kobilarov 2012): the plan is the mean of the best candidates.
+
+    The deviation of the best candidates is the deviation for the next candidates in the same cycle.
+    """
 
     Config = CemConfig
     config: CemConfig
@@ -110,10 +118,10 @@ class MppiConfig(SamplerConfig):
 
 
 class MppiSampler(Sampler):
-    """Model predictive path integral control: the mean of all candidates, weighted by exp(-cost / temperature).
+    """Model predictive path integral control: a mean of all candidates with the weights exp(-cost / temperature).
 
-    Weights are those of Williams et al., Information-Theoretic MPC, IEEE T-RO 34 (2018), algorithm 2, without the cost
-    of control; the temperature is relative to the spread of the costs, and thus independent of their unit.
+    Source of the weights: Williams et al., Information-Theoretic MPC, IEEE T-RO 34 (2018), algorithm 2, here without
+    control costs. The temperature is relative to the spread of the costs, so that the costs may have any unit.
     """
 
     Config = MppiConfig
@@ -135,4 +143,4 @@ SAMPLERS: PluginTable[Sampler] = PluginTable(
         "mppi": "rpbi_mpc.sampling.samplers:MppiSampler",
     },
 )
-"""Samplers by name."""
+"""Samplers, indexed by name."""

@@ -1,4 +1,4 @@
-"""A world in this process as a plant; its forks simulate candidates."""
+"""A plant that is a world in this process. Forks of the world simulate candidates."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rpbi_mpc.controller import Plant, Sensed
 
 
 class InputConfig(ConfigModel):
-    """An input of the world that is commanded."""
+    """An input of the world that the controller commands, with limits."""
 
     input: str = Field(description="NAME/INPUT, such as kuka_lwr/target.")
     names: ListOf[str] = Field(description="Joints, or fields of its value, that are commanded.")
@@ -37,12 +37,19 @@ class InputConfig(ConfigModel):
 
     @property
     def middle(self) -> tuple[float, ...]:
-        """Command at the start."""
+        """Initial command: `start`, or by default the middle between the limits."""
         return self.start or tuple((np.add(self.lower, self.upper) / 2.0).tolist())
 
 
 def planned(commands: np.ndarray, config: InputConfig, period_ticks: int, delay_ticks: int) -> list[PlannedInput]:
-    """Returns the inputs of a candidate by tick; `commands` are cycles x m."""
+    """Converts the commands of a candidate to planned inputs.
+
+    Args:
+        commands: Commands, shape (cycles, m).
+        config: Input and names of the m numbers.
+        period_ticks: Duration of each command in ticks.
+        delay_ticks: Tick at which the first command acts.
+    """
     return [
         PlannedInput(delay_ticks + index * period_ticks, config.input, dict(zip(config.names, row, strict=True)))
         for index, row in enumerate(commands.tolist())
@@ -50,10 +57,10 @@ def planned(commands: np.ndarray, config: InputConfig, period_ticks: int, delay_
 
 
 def whole_ticks(duration_s: float, dt_s: float) -> int:
-    """Returns a duration [s] in ticks.
+    """Converts a duration [s] to a number of ticks.
 
     Raises:
-        InterfaceError: If it is not a whole number of ticks.
+        InterfaceError: If the duration is not a whole number of ticks.
     """
     ticks = round(duration_s / dt_s)
     if abs(ticks * dt_s - duration_s) > 1e-9:
@@ -62,13 +69,13 @@ def whole_ticks(duration_s: float, dt_s: float) -> int:
 
 
 class RolloutTicks(NamedTuple):
-    """Ticks of a prediction in which commands act one after the other.
+    """Ticks of a prediction in which n commands act one after the other.
 
     Attributes:
-        starts: First tick of each command, n.
-        total: Number of ticks.
-        every: Ticks between two rows of the prediction.
-        rows: Row at the end of each command, n.
+        starts: First tick of each command, shape (n,).
+        total: Number of ticks in the prediction.
+        every: Number of ticks between two rows of the prediction.
+        rows: Index of the row at the end of each command, shape (n,).
     """
 
     starts: np.ndarray
@@ -78,7 +85,13 @@ class RolloutTicks(NamedTuple):
 
     @classmethod
     def of(cls, commands: int, period_s: float, delay_s: float, dt_s: float) -> RolloutTicks:
-        """Returns the ticks of some commands of a period [s], the first of which acts after a delay [s].
+        """Computes the ticks of a prediction.
+
+        Args:
+            commands: Number n of commands.
+            period_s: Duration of each command [s].
+            delay_s: Time until the first command acts [s].
+            dt_s: Duration of a tick [s].
 
         Raises:
             InterfaceError: If period or delay is not a whole number of ticks.
@@ -89,13 +102,13 @@ class RolloutTicks(NamedTuple):
 
 
 class ForkedWorld(Plant):
-    """A `World` that waits for its controller; its forks simulate candidates.
+    """A plant that is a `World` in this process. Forks of the world simulate candidates.
 
     Args:
         world: The world.
-        config: The input that is commanded.
-        cost: Cost of a state, which is summed over all ticks: `module:name` of a function of the `World`, or of a class
-            whose objects are called with it.
+        config: Commanded input.
+        cost: Cost of a state, which is summed over all ticks, as `module:name`. The name is a function that takes the
+            `World`, or a class whose objects are such functions.
 
     Raises:
         InterfaceError: If the world cannot be forked, for instance because of a soft body.
@@ -115,14 +128,14 @@ class ForkedWorld(Plant):
         self.world.put(self._config.input, dict(zip(self.names, command.tolist(), strict=True)))
 
     def stand(self) -> None:
-        """Keeps the last command, at which a robot holds."""
+        """Does nothing: the last command continues to act, so that a robot stays at its target."""
 
     def advance(self, duration_s: float) -> None:
         for _ in range(whole_ticks(duration_s, self.world.clock.dt_s)):
             self.world.step()
 
     def costs(self, commands: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
-        """Returns the cost of each candidate, see `Rollouts`."""
+        """Simulates candidates, and returns the cost of each candidate; see `Rollouts`."""
         dt_s = self.world.clock.dt_s
         period, delay = whole_ticks(period_s, dt_s), whole_ticks(delay_s, dt_s)
         candidates: Sequence[list[PlannedInput]] = [planned(each, self._config, period, delay) for each in commands]

@@ -1,4 +1,4 @@
-"""Estimate of slider and pusher from late and noisy measurements, predicted to the time of the next command."""
+"""Estimates slider and pusher from late and noisy measurements, and predicts both for the time of the next command."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .model import SliderConfig
 from .motion import PlanarScene, moved, rotation
 
 KEPT_S = 2.0
-"""Time for which commands are kept [s]; predictions from older measurements lack the commands before this time."""
+"""Time for which commands are stored [s]. Measurements must not be older, since predictions need all later commands."""
 
 DRIFT_S = 1.0
 """Time constant of the filter of `SceneEstimator.drift` [s]."""
@@ -24,12 +24,11 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class EstimatorConfig(ConfigModel):
-    """Gains of the estimator, which corrects a share of the difference between measurement and prediction in each
-    cycle.
+    """Gains of the estimator. In each cycle, a share of the difference between measurement and prediction is corrected.
 
     Attributes:
-        position: Corrected share of the difference in position.
-        yaw: Corrected share of the difference in yaw.
+        position: Share of the difference in position that is corrected.
+        yaw: Share of the difference in yaw that is corrected.
         jump: Distance between measurement and prediction beyond which the measurement replaces the estimate [m].
         jump_rad: Difference in yaw beyond which the measurement replaces the estimate [rad].
     """
@@ -46,7 +45,7 @@ class SceneEstimator:
     """Corrects the predictions of the model with measurements (an observer with fixed gains, D. Luenberger, 1964).
 
     Args:
-        config: Gains.
+        config: Gains of the correction.
         slider: The slider.
         radius: Radius of the pusher [m].
 
@@ -59,24 +58,24 @@ class SceneEstimator:
         self.reset()
 
     def reset(self) -> None:
-        """Discards measurements and commands."""
+        """Discards the estimate and all recorded commands."""
         self._estimate: PlanarScene | None = None
         self._time_s = -math.inf
         self.drift = np.zeros(3)
         self._commands: list[tuple[float, np.ndarray]] = []
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
-        """Records the velocity of the pusher [m/s] from `time_s` [s] on; None means rest."""
+        """Records the pusher's velocity, shape (2,) [m/s], from `time_s` [s] on. None: the pusher is at rest."""
         self._commands.append((time_s, np.zeros(2) if command is None else np.asarray(command)))
         while len(self._commands) > 2 and self._commands[1][0] < time_s - KEPT_S:
             del self._commands[0]
 
     def update(self, sensed: Sensed, ahead_s: float) -> PlanarScene:
-        """Corrects the estimate with a measurement, and returns the scene predicted for a time.
+        """Corrects the estimate with a measurement, and returns the scene predicted for a later time.
 
         Args:
             sensed: A complete measurement (x, y, yaw, pusher_x, pusher_y).
-            ahead_s: Time for which the scene is predicted [s].
+            ahead_s: Plant time for which the scene is predicted [s].
         """
         measured_s = sensed.time_s - sensed.age_s
         assert sensed.values is not None
@@ -101,7 +100,7 @@ class SceneEstimator:
         return PlanarScene(expected.slider + gains * difference, measured.pusher)
 
     def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:
-        """Returns the scene at `end_s`, predicted from a scene at `begin_s` with the recorded commands."""
+        """Predicts the scene at `end_s` [s] from the scene at `begin_s` [s], with the recorded commands."""
         edges = [*(time_s for time_s, _ in self._commands), math.inf]
         for (start_s, velocity), stop_s in zip(self._commands, edges[1:]):
             duration_s = min(stop_s, end_s) - max(start_s, begin_s)

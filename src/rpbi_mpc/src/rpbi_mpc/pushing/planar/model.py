@@ -27,7 +27,7 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel, PositiveMetres
 
 QUADRATURE = 64
-"""Points along each side of the rectangle for the integral of the pressure; the relative error is 1e-4."""
+"""Number of points along each side of the rectangle for the integral of the pressure. The relative error is 1e-4."""
 STATE = ("x", "y", "yaw", "contact")
 INPUT = ("normal", "tangential", "left", "right")
 Vector = Any
@@ -35,7 +35,7 @@ Vector = Any
 
 
 class SliderConfig(ConfigModel):
-    """A box on a table that is pushed at the face on its -x side.
+    """A box on a table. The pusher pushes against the face on the box's -x side.
 
     The origin of the box's frame is the middle of the box; x points forwards, y to the left.
 
@@ -43,8 +43,8 @@ class SliderConfig(ConfigModel):
         length: Size along x [m].
         width: Size along y [m].
         friction: Coefficient of friction between pusher and slider.
-        support: Distribution of the supporting pressure: `uniform` over the area, or at the four `corners`, as in a
-            simulator that represents the contact between two boxes with four points.
+        support: Distribution of the supporting pressure: `uniform` over the area, or at the four `corners`. Simulators
+            that represent the contact between two boxes with four points correspond to `corners`.
         margin: Least distance of the pusher from the ends of the face [m].
     """
 
@@ -58,7 +58,7 @@ class SliderConfig(ConfigModel):
 
     @property
     def face(self) -> float:
-        """Distance of the pushed face from the middle [m]."""
+        """Distance of the pushed face from the middle of the box [m]."""
         return self.length / 2
 
     @property
@@ -70,10 +70,10 @@ class SliderConfig(ConfigModel):
     def characteristic_length(self) -> float:
         """Ratio of the largest friction moment about the middle to the largest friction force [m].
 
-        This length is the mean distance of the supporting points from the middle, weighted with their pressure, and the
-        ratio of the half axes of the ellipsoidal limit surface (S. Goyal, A. Ruina and J. Papadopoulos, "Planar sliding
-        with dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie, "Manipulation and active sensing by
-        pushing using tactile feedback", IROS 1992).
+        This length is the mean distance of the supporting points from the middle, weighted with their pressure. It is
+        also the ratio of the half axes of the ellipsoidal limit surface. Sources: S. Goyal, A. Ruina and J.
+        Papadopoulos, "Planar sliding with dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie,
+        "Manipulation and active sensing by pushing using tactile feedback", IROS 1992.
         """
         if self.support == "corners":
             return math.hypot(self.length, self.width) / 2
@@ -82,22 +82,25 @@ class SliderConfig(ConfigModel):
 
 
 def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the load of a contact in the slider's frame: force x, y [m/s] and moment about the middle [m^2/s]."""
+    """Returns a contact force's load in the slider's frame: force x, y [m/s], and moment about the middle [m^2/s]."""
     return normal, tangential, -slider.face * tangential - contact * normal
 
 
 def twist_of(load: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the twist in the slider's frame [m/s, m/s, rad/s]: the normal of the limit surface at a load."""
+    """Returns the slider's twist under a load, in the slider's frame [m/s, m/s, rad/s].
+
+    The twist is the normal of the limit surface at the load.
+    """
     return load[0], load[1], load[2] / slider.characteristic_length**2
 
 
 def load_for(twist: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
-    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a given twist; the inverse of `twist_of`."""
+    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a given twist. Inverse of `twist_of`."""
     return twist[0], twist[1], twist[2] * slider.characteristic_length**2
 
 
 def rates(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any, Any, Any]:
-    """Returns the time derivative of the state."""
+    """Returns the time derivative of the state (x, y, yaw, contact) under an input."""
     yaw, contact = state[2], state[3]
     along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
     cos, sin = _cos_sin(yaw)
@@ -111,19 +114,19 @@ def advanced(state: Vector, control: Vector, duration_s: Any, slider: SliderConf
 
 
 def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any]:
-    """Returns the pusher's velocity in the slider's axes [m/s]: velocity of the contact point plus sliding."""
+    """Returns the pusher's velocity in the slider's axes [m/s]: the contact point's velocity plus the sliding speed."""
     contact = state[3]
     along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
     return along - turning * contact, across - turning * slider.face + control[2] - control[3]
 
 
 def complementarity(control: Vector, slider: SliderConfig) -> Any:
-    """Returns the amount by which an input violates the contact modes [m^2/s^2]; 0 if the contact sticks or slides.
+    """Returns the amount by which an input violates the contact modes [m^2/s^2]. 0: the contact sticks or slides.
 
     The contact slides to the left only at the left edge of the friction cone, and to the right only at the right edge.
-    Inside the cone the violation is not negative. It is penalised instead of constrained to 0, similar to the
-    relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar manipulation via
-    trajectory optimization with complementarity constraints", ICRA 2022.
+    Inside the cone, the violation is never negative. The program penalises the violation instead of constraining it to
+    0, similar to the relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar
+    manipulation via trajectory optimization with complementarity constraints", ICRA 2022.
     """
     normal, tangential, left, right = _items(control)
     return (slider.friction * normal - tangential) * left + (slider.friction * normal + tangential) * right
@@ -132,19 +135,19 @@ def complementarity(control: Vector, slider: SliderConfig) -> Any:
 def response(
     state: Vector, velocity: Vector, slider: SliderConfig
 ) -> tuple[tuple[float, float, float], tuple[float, float], float]:
-    """Returns the motion that a given velocity of the pusher causes at the contact.
+    """Returns the motion of the slider that a velocity of the touching pusher causes.
 
     The contact sticks if the required force is in the friction cone, that is, if the velocity is in the motion cone (M.
-    Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986); otherwise it slides at the edge of
-    the cone. A pusher that moves away does not move the slider.
+    Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986). Otherwise, the contact slides, and
+    the force is at the edge of the cone. A pusher that moves away does not move the slider.
 
     Args:
         state: (x, y, yaw, contact).
-        velocity: Velocity of the pusher in the axes of the slider [m/s].
+        velocity: Velocity of the pusher in the slider's axes [m/s].
         slider: The slider.
 
     Returns:
-        The twist in the frame of the slider [m/s, m/s, rad/s], the force (normal, tangential) [m/s], and the speed at
+        The slider's twist in its own frame [m/s, m/s, rad/s], the force (normal, tangential) [m/s], and the speed at
         which the pusher slides to the left along the face [m/s].
     """
     contact, square = float(state[3]), slider.characteristic_length**2
@@ -165,10 +168,10 @@ def response(
 
 
 def _cos_sin(angle: Any) -> tuple[Any, Any]:
-    """Returns cosine and sine; CasADi symbols have them as methods, and cause warnings with NumPy's functions."""
+    """Returns cosine and sine of an angle. Calls methods for CasADi symbols, since NumPy's functions cause warnings."""
     return (angle.cos(), angle.sin()) if hasattr(angle, "cos") else (np.cos(angle), np.sin(angle))
 
 
 def _items(vector: Vector) -> list[Any]:
-    """Returns the four entries of a vector as a list; CasADi vectors cannot be iterated over."""
+    """Returns the four entries of a vector as a list, since CasADi vectors cannot be iterated over."""
     return [vector[index] for index in range(4)]

@@ -1,6 +1,4 @@
-"""Motion of slider and round pusher in the plane, with or without contact, and the approach of the pusher to the
-slider.
-"""
+"""Predicts the motion of slider and round pusher in the plane, and computes the pusher's approach to the slider."""
 
 from __future__ import annotations
 
@@ -31,12 +29,12 @@ class PlanarScene(NamedTuple):
 
     @classmethod
     def of(cls, values: np.ndarray) -> PlanarScene:
-        """Returns the scene for the numbers x, y, yaw, pusher_x, pusher_y."""
+        """Returns the scene with the numbers x, y, yaw, pusher_x, pusher_y [m, rad]."""
         return cls(np.array(values[:3], dtype=float), np.array(values[3:5], dtype=float))
 
     @property
     def values(self) -> np.ndarray:
-        """The numbers x, y, yaw, pusher_x, pusher_y."""
+        """The numbers x, y, yaw, pusher_x, pusher_y as an array of shape (5,) [m, rad]."""
         return np.concatenate([self.slider, self.pusher])
 
 
@@ -47,15 +45,15 @@ def rotation(yaw: float) -> np.ndarray:
 
 
 def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
-    """Returns the position of the pusher in the frame of the slider [m]."""
+    """Returns the position x, y of the pusher in the slider's frame [m]."""
     offset: np.ndarray = rotation(scene.slider[2]).T @ (scene.pusher - scene.slider[:2])
     return offset
 
 
 def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
-    """Returns the distance between pusher and face, and the position of the pusher along the face [m, m].
+    """Returns the distance between pusher and face, and the pusher's position along the face to the left [m, m].
 
-    The face counts as infinitely long; the distance is negative if the pusher penetrates the slider.
+    The distance is measured to the infinite line through the face. It is negative if the pusher is behind this line.
     """
     x, y = pusher_in_slider(scene)
     return -x - slider.face - radius, y
@@ -64,7 +62,7 @@ def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> 
 def moved(
     scene: PlanarScene, velocity: np.ndarray, duration_s: float, slider: SliderConfig, radius: float, steps: int = 4
 ) -> PlanarScene:
-    """Returns the scene after the pusher has moved at a given velocity for `duration_s`, from the quasi-static model.
+    """Predicts the scene after a motion of the pusher with constant velocity, with the quasi-static model.
 
     Args:
         scene: Scene before the motion.
@@ -89,14 +87,14 @@ def moved(
 
 
 class ApproachConfig(ConfigModel):
-    """Motion of a pusher without contact.
+    """Motion of the pusher to the slider.
 
     Attributes:
         speed: Largest speed of the pusher [m/s].
-        clearance: Distance from the face at which the pusher passes along it [m].
-        gap: Distance from the face up to which the pusher counts as touching [m]; three times this distance during a
-            push.
-        rate: Ratio of the pusher's speed to its distance from the point that it approaches [1/s].
+        clearance: Distance from the face at which the pusher moves along the face [m].
+        gap: Largest distance from the face at which a push starts [m]. A push ends at three times this distance.
+        rate: Ratio of the pusher's velocity to the distance still to be covered [1/s]. The velocity towards the face
+            additionally has a constant part, a quarter of `speed`. The total velocity is limited to `speed`.
     """
 
     speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Speed of the pusher.")
@@ -106,14 +104,14 @@ class ApproachConfig(ConfigModel):
 
 
 def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:
-    """Returns whether the pusher is at a position from which it can push.
+    """Returns whether the pusher is at a position from which it can push the slider.
 
     Args:
-        gap: Distance from the face [m], negative inside the slider.
-        contact: Position along the face [m].
+        gap: Distance of the pusher from the face [m], negative inside the slider.
+        contact: Position of the pusher along the face [m].
         slider: The slider.
-        config: Limits of the gap.
-        pushes: Whether the pusher was pushing before; if so, a larger distance is accepted.
+        config: Limit of the gap.
+        pushes: Whether the pusher was already pushing. If so, larger distances from face and middle are accepted.
     """
     slack = 3.0 if pushes else 1.0
     beside = slider.width / 2 if pushes else slider.reach
@@ -121,10 +119,10 @@ def is_pushable(gap: float, contact: float, slider: SliderConfig, config: Approa
 
 
 def approach_velocity(scene: PlanarScene, slider: SliderConfig, radius: float, config: ApproachConfig) -> np.ndarray:
-    """Returns the velocity of a pusher that approaches the face, in the table's axes [m/s].
+    """Returns the velocity with which the pusher approaches the face, in the table's axes, shape (2,) [m/s].
 
-    A pusher at the side of the slider first moves back, then along the face at the distance `clearance`, and then to
-    the face.
+    A pusher beside the slider first moves back, then parallel to the face at the distance `clearance`, and finally
+    towards the face.
     """
     gap, contact = gap_and_contact(scene, slider, radius)
     beyond = contact - np.clip(contact, -slider.reach / 2, slider.reach / 2)

@@ -1,4 +1,4 @@
-"""Paths on a table: poses of the slider as functions of time."""
+"""Paths on a table, which specify the slider's reference pose as a function of time."""
 
 from __future__ import annotations
 
@@ -21,12 +21,11 @@ class PathConfig(ConfigModel):
     """A path on the table.
 
     Attributes:
-        shape: `line`, `arc` (a quarter of a circle to the left), `s` (two arcs, to the left and to the right), `eight`,
-            or `points`.
-        size: Length of the line, radius of the arcs, half the length of the eight [m].
-        angle: Angle of each arc [rad].
-        points: Corners of the path `points` in the frame of its start [m]; straight lines join the corners.
-        start: x, y and yaw of the start [m, m, rad].
+        shape: `line`, `arc` (to the left), `s` (an arc to the left and an arc to the right), `eight`, or `points`.
+        size: Length of the line, radius of the arcs, or half the length of the eight [m].
+        angle: Angle of each arc [rad]. Default: a quarter of a circle.
+        points: Corners of the path `points` in the frame of the path's start [m]. Straight lines join the corners.
+        start: x, y and yaw of the path's start [m, m, rad].
         speed: Speed along the path [m/s].
     """
 
@@ -43,7 +42,7 @@ class PathConfig(ConfigModel):
 
 
 class PushPath:
-    """A path that is followed at a constant speed, with yaw in the direction of the path.
+    """A path of the slider with constant speed. The reference yaw is the direction of the path.
 
     Args:
         config: Shape, start and speed.
@@ -76,13 +75,14 @@ class PushPath:
 
     @property
     def points(self) -> np.ndarray:
-        """Equidistant points at most half a millimetre apart [m], shape (N, 2)."""
+        """Equidistant points of the path, shape (N, 2) [m]. Neighbouring points are at most `SPACING` apart."""
         return self._points
 
     def poses(self, times_s: Any) -> np.ndarray:
-        """Returns the slider's reference poses at given times [s], shape (N, 3) [m, m, rad].
+        """Returns the slider's reference poses x, y, yaw at given times, shape (N, 3) [m, m, rad].
 
-        Times before the start or after the end of the path give the first or the last pose.
+        Args:
+            times_s: One time or N times since the start of the path [s]. Times outside the path are clipped.
         """
         along = np.clip(np.atleast_1d(np.asarray(times_s, dtype=float)) * self.speed, 0.0, self.length)
         columns = (self._points[:, 0], self._points[:, 1], self._yaws)
@@ -94,7 +94,7 @@ class PushPath:
 
 
 def _even(points: np.ndarray) -> np.ndarray:
-    """Returns equidistant points along a path."""
+    """Returns equidistant points along a polyline, at most `SPACING` apart, shape (N, 2) [m]."""
     distances = np.concatenate([[0.0], np.hypot(*np.diff(points, axis=0).T).cumsum()])
     if not distances[-1] > 0.0:
         raise ValueError(f"points: expected at least two different ones, got {len(points)}")
@@ -112,13 +112,16 @@ def _arc(config: PathConfig) -> np.ndarray:
 
 
 def _s(config: PathConfig) -> np.ndarray:
-    """Returns an arc, followed by the same arc turned by half a circle about its end."""
+    """Returns points of an arc, followed by the same arc rotated by 180 degrees about its end."""
     first = _arc(config)
     return np.concatenate([first, (2 * first[-1] - first)[-2::-1]])
 
 
 def _eight(config: PathConfig) -> np.ndarray:
-    """Returns a lemniscate of Bernoulli that starts at its middle along x; its least radius is a third of `size`."""
+    """Returns points of a lemniscate of Bernoulli, which starts at its middle in the direction of x.
+
+    The smallest radius of curvature is a third of `size`.
+    """
     turned = np.linspace(-math.pi / 2, 3 * math.pi / 2, 4000)
     x, y = np.cos(turned), np.sin(turned) * np.cos(turned)
     return config.size * np.stack([x - y, x + y], axis=1) / (math.sqrt(2) * (1 + np.sin(turned) ** 2))[:, None]
@@ -135,4 +138,6 @@ SHAPES: dict[str, Callable[[PathConfig], np.ndarray]] = {
     "eight": _eight,
     "points": _points,
 }
-"""Functions that return points of each shape, from the origin [m], shape (N, 2); straight lines join the points."""
+"""For each shape, a function that returns points of a path from the origin, shape (N, 2) [m]. Straight lines join the
+points.
+"""
