@@ -1,6 +1,6 @@
-"""Recordings and what is made of them: tables, replays, episodes, and data sets.
+"""Recordings, and tables, replays, episodes and data sets that are made from recordings.
 
-The names in `__all__` can be imported from here; each is loaded when it is used, ROS included.
+The names in `__all__` can be imported from this package. The module of a name, and ROS, are loaded on first use.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from rpbi_data.datasets.provenance import is_exported
 from rpbi_data.episodes.folder import EpisodeFolder
 
 MAX_FAULTS = 1000
-"""Number of faults after which a check ends."""
+"""Largest number of reported faults, after which the check ends."""
 
 
 def check_dataset(

@@ -16,7 +16,7 @@ from rpbi_data.episodes.folder import EpisodeFolder
 
 POSE, DELTAS = "pose", "deltas"
 WORDS = (NEXT, PREVIOUS, POSE, DELTAS)
-"""Words of `--action`; all else are topics."""
+"""Keywords of `--action`; other arguments are topics."""
 
 
 def export(
@@ -105,7 +105,7 @@ def export(
 
 
 def _options(words: Sequence[str]) -> dict[str, Any]:
-    """Returns options by key; values are YAML."""
+    """Parses arguments `KEY=VALUE`, in which values are YAML; returns the values, indexed by key."""
     found = {}
     for word in words:
         key, equals, value = word.partition("=")

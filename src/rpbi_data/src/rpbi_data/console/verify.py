@@ -11,7 +11,7 @@ from rpbi_data.episodes.session_messages import MAX_TICKS
 from rpbi_data.episodes.verified_messages import MAX_CPU_S, ReplayLimits, verify_all
 
 MAX_LINE = 10_000
-"""Characters of the line of an episode."""
+"""Largest number of characters in the line of an episode."""
 
 
 def verify(

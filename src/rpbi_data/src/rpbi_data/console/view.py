@@ -16,7 +16,7 @@ from rpbi_data.episodes.errors import EpisodeError
 from rpbi_data.episodes.folder import EpisodeFolder
 
 MAX_CPU_S = 600
-"""Processor time for a page, by default [s]."""
+"""Default limit of the processor time for making a page [s]."""
 
 
 def view(
@@ -54,7 +54,7 @@ def view(
         raise UsageError(f"--max-cpu: expected at least 1, got {max_cpu}")
 
     def draw() -> tuple[str, float, list[str]]:
-        """Returns the page, the seconds that it shows, and its notes."""
+        """Returns the HTML text of the page, the duration that the page shows [s], and notes for the user."""
         try:
             if number is not None:
                 scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)

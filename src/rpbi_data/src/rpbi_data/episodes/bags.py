@@ -1,4 +1,4 @@
-"""Bags of episodes: their topics, tables of several episodes, and repair after the recorder was killed."""
+"""Bags of episodes: report on topics, tables of several episodes, and repair after a recorder was killed."""
 
 from __future__ import annotations
 
@@ -25,28 +25,30 @@ from .errors import DISK_FULL, EpisodeError
 from .folder import BAG, FACTS, FARM, SEAL, SET_BACK, UNREADABLE, Episode, EpisodeFolder, file_in, hold, read_part
 
 REINDEX_BYTES = 2**31
-"""Address space of the process that indexes a bag [bytes]."""
+"""Largest address space of the process that indexes a bag [bytes]."""
 MAX_CLOSE_S = 2.0
-"""Longest time to wait for a process that closes the bag of a recorder that was killed [s]."""
+"""After a recorder was killed, longest time to wait until its writing process has closed the bag [s]."""
 
 EPISODE = "episode"
-"""Name of the first level of the index of tables of all episodes."""
+"""Name of the first index level in tables of several episodes."""
 
 _log = logging.getLogger(__name__)
 
 
 def measure_topics(bag: Path, *, any_size: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns type, messages, mean rate [Hz] and longest gap [s] of each topic of a bag; a rate of 0 is unknown.
-
-    The seal of a topic is the SHA-256 of its messages and their times of recording. A topic whose clock was set back by
-    more than 1 s has `set_back_s` [s], too.
+    """Measures the topics of a bag, for the attribute `topics` of an `Episode`.
 
     Args:
-        bag: The bag.
-        any_size: Whether it may exceed the limits on bags, see `BagReader`.
+        bag: Path of the bag.
+        any_size: Whether the bag may exceed the limits of `BagReader`.
+
+    Returns:
+        Properties of each topic, indexed by topic: `type`, number of `messages`, mean rate `rate_hz` [Hz] (0 if it is
+        unknown), longest gap `max_gap_s` [s], and `sha256`, see `seals_of`. A topic whose clock was set back by more
+        than 1 s also has `set_back_s` [s].
 
     Raises:
-        BagError: If it cannot be read.
+        BagError: If the bag cannot be read.
     """
     report, seals = topic_report(bag, any_size=any_size), seals_of(bag, any_size=any_size)
     return {
@@ -63,10 +65,14 @@ def measure_topics(bag: Path, *, any_size: bool = True) -> dict[str, dict[str, A
 
 
 def seals_of(bag: Path, *, any_size: bool = True) -> dict[str, str]:
-    """Returns the seal of each topic of a bag, see `measure_topics`, with the same arguments.
+    """Returns the seal of each topic in a bag: the SHA-256 of all messages and their recording times.
+
+    Args:
+        bag: Path of the bag.
+        any_size: Whether the bag may exceed the limits of `BagReader`.
 
     Raises:
-        BagError: If it cannot be read.
+        BagError: If the bag cannot be read.
     """
     digests: dict[str, Any] = {}
     with BagReader(bag, any_size) as opened:
@@ -80,21 +86,21 @@ def seals_of(bag: Path, *, any_size: bool = True) -> dict[str, str]:
 def episodes_to_dataframes(
     path: str | Path, topics: str | Iterable[str] | None = None, *, images: bool = False, any_size: bool = False
 ) -> dict[str, pd.DataFrame]:
-    """Reads all episodes of a folder into tables, one a topic.
+    """Reads all episodes of a folder into tables, one per topic.
 
     Args:
-        path: The folder.
-        topics: Names of topics, or one name; by default all without binary data.
-        images: Whether to include those with binary data.
+        path: The folder of episodes.
+        topics: Topics to read: names, or one name. By default all topics without binary data.
+        images: Whether the default includes topics with binary data.
         any_size: See `rpbi_utils.bag_to_dataframes`.
 
     Returns:
-        Tables as `bag_to_dataframes` returns them, with the index (`episode`, `time`). An episode without a topic has
-        no rows in its table. One that cannot be read is left out, with a warning.
+        Tables as from `bag_to_dataframes`, but with the index (`episode`, `time`). If an episode lacks a topic, the
+        topic's table has no rows of this episode. Episodes that cannot be read are left out, with a warning.
 
     Raises:
-        EpisodeError: If there is no such folder, or no episode can be read.
-        UnknownNameError: If no episode has a topic that was named.
+        EpisodeError: If the folder does not exist, or no episode can be read.
+        UnknownNameError: If a given topic is in no episode.
     """
     folder = EpisodeFolder(path)
     wanted = None if topics is None else {topics} if isinstance(topics, str) else set(topics)
@@ -127,12 +133,12 @@ def episodes_to_dataframes(
 
 
 def repair_all(folder: EpisodeFolder) -> Iterator[str]:
-    """Completes all episodes whose recorder was killed, and yields a sentence for each.
+    """Completes all episodes whose recorder was killed, and yields a message for each of these episodes.
 
-    Episodes that another process records are skipped.
+    Episodes that another process is recording are skipped.
 
     Raises:
-        EpisodeError: If they are of a farm, which makes them again itself.
+        EpisodeError: If the folder belongs to a farm, which makes missing episodes again itself.
     """
     if os.path.lexists(folder.path / FARM):
         message = "expected episodes of a recorder, these are of a farm: it makes them again itself"
@@ -156,14 +162,20 @@ def repair_all(folder: EpisodeFolder) -> Iterator[str]:
 
 
 def repair(folder: EpisodeFolder, part: Path) -> Episode:
-    """Completes the episode in a temporary folder whose recorder was killed, and gives it its name.
+    """Completes an episode whose recorder was killed, and renames its temporary folder to the final name.
+
+    After an error, the episode stays in the temporary folder.
+
+    Args:
+        folder: The folder of episodes.
+        part: Temporary folder of the episode.
 
     Returns:
-        The episode, `recovered` with the number of messages, or `incomplete` if there is no message.
+        The episode. Its state is `recovered`, or `incomplete` if no message could be recovered.
 
     Raises:
-        OSError: If it cannot be written; it stays in the temporary folder.
-        EpisodeError: If its bag is a link, a pipe or a device, or has another name outside of the folder; likewise.
+        OSError: If the episode cannot be written.
+        EpisodeError: If the bag is a link, a pipe or a device, or has several hard links.
     """
     episode = read_part(part)
     fault = f"; {episode.note}" if episode.state == UNREADABLE else ""
@@ -220,11 +232,11 @@ except Exception as error:
 
 
 def _reindex(bag: Path) -> None:
-    """Writes the index of a bag, in a separate process with limits, since rosbag trusts the sizes in a broken bag.
+    """Writes the index of a bag. A separate process with limits does so, since rosbag trusts the sizes in a broken bag.
 
     Raises:
-        BagError: If it cannot be indexed, or needs too much memory or time.
-        OSError: If it cannot be written.
+        BagError: If the bag cannot be indexed, or indexing needs too much memory or time.
+        OSError: If the index cannot be written.
     """
     seconds = BASE_TIME_S + TIME_PER_MB_S * bag.stat().st_size / 1e6
     words = [str(bag), str(REINDEX_BYTES), str(math.ceil(seconds))]

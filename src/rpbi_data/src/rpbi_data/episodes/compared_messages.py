@@ -1,4 +1,4 @@
-"""Comparison of recorded messages with those of a replay."""
+"""Compares recorded messages with the messages of a replay."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from rpbi_data.bags.topic_report import message_time_ns
 from .sample_messages import SampleMessages
 
 WINDOW_NS = 2 * PER_SECOND
-"""Longest time from the stamp of a message to its recording; later ones are not compared [ns]."""
+"""Longest time from a message's stamp to its recording [ns]; messages recorded later are not compared."""
 
 
 class TopicDifference(NamedTuple):
-    """The first message of a topic that differs from that of the replay.
+    """The first difference between the recorded messages of a topic and the messages of the replay.
 
     Attributes:
         topic: The topic.
         stamp_ns: Stamp of the message [ns].
-        place: Path of the value in the message.
-        expected: The value of the replay.
+        place: Path of the different value in the message.
+        expected: The value in the replay.
         recorded: The value in the bag.
-        is_certain: Whether the message depends on the state of the world alone, so that only a change explains it.
+        is_certain: Whether the message depends only on the state of the world. If so, the bag must have been changed.
     """
 
     topic: str
@@ -58,9 +58,9 @@ class Compared(NamedTuple):
     """Result of a comparison.
 
     Attributes:
-        differences: The first difference of each topic.
-        different: Number of messages or transforms that differ, by topic.
-        compared: Number of those that were compared, by topic.
+        differences: The first difference of each topic, indexed by topic.
+        different: Number of messages or transforms that differ, indexed by topic.
+        compared: Number of messages or transforms that were compared, indexed by topic.
     """
 
     differences: dict[str, TopicDifference]
@@ -77,17 +77,17 @@ class Compared(NamedTuple):
 
 
 class Comparison:
-    """Compares the messages of an episode with the samples of a replay, as a context that closes the bag.
+    """Compares the messages of an episode with the samples of a replay. Used as a context manager that closes the bag.
 
-    Messages are compared by topic and stamp, transforms by frame, too. Messages without a header, images, and those at
-    stamps of a world that stood still are not compared.
+    Messages with the same topic and stamp are compared, and transforms with the same frame. Messages without a header,
+    images, and messages whose stamp does not occur in the replay are not compared.
 
     Args:
-        bag: The recording.
+        bag: Path of the recorded bag.
         namespace: Namespace of the simulator.
 
     Attributes:
-        result: The result so far.
+        result: Result of the comparison so far.
     """
 
     def __init__(self, bag: Path, namespace: str) -> None:
@@ -114,7 +114,13 @@ class Comparison:
         self._bag.__exit__()
 
     def observe(self, world: World, resets: int, samples: Sequence[Any]) -> None:
-        """Compares the samples of a tick of the replay; `resets` is the number of resets in the recording before."""
+        """Compares the samples of one tick of the replay with the recording.
+
+        Args:
+            world: The world of the replay.
+            resets: Number of resets in the recording before this tick.
+            samples: Samples of the tick.
+        """
         if self._samples is None or self._stamps is None:
             use_prefix(world.config.tf_prefix)
             use_own_frames(world.frames())
@@ -148,10 +154,10 @@ class Comparison:
                 self.result.differences[full] = TopicDifference(full, stamp_ns, place, ours, theirs, is_certain)
 
     def _read_until(self, time_ns: int) -> None:
-        """Reads the messages recorded up to a time, and drops those that waited too long."""
+        """Reads the messages recorded up to a time [ns], and drops messages whose stamps are too old."""
         oldest = time_ns - 5 * WINDOW_NS
         while self._coming is not None and self._coming.record_time_ns <= time_ns:
-            if self._coming.record_time_ns > oldest:  # a replay may begin at a keyframe, hours after the first message
+            if self._coming.record_time_ns > oldest:  # older messages are not needed: a replay may begin at a keyframe
                 self._keep(self._coming)
             self._coming = next(self._messages, None)
         if oldest > self._swept_ns:
@@ -178,10 +184,10 @@ _NOT_COMPARED = {"sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msg
 
 
 class _Stamps:
-    """Stamps of the ticks of a recording.
+    """Finds the stamp of each tick in a recording.
 
     Args:
-        states: Its states.
+        states: The recorded states.
         dt_ns: Length of a tick [ns].
     """
 
@@ -195,7 +201,12 @@ class _Stamps:
             self._by_tick.setdefault((each.resets, each.tick), set()).add(stamp_ns)
 
     def of(self, resets: int, tick: int) -> int | None:
-        """Returns the stamp of a tick [ns]; None in wall time unless exactly one state has the tick."""
+        """Returns the stamp of a tick [ns]; None if it is unknown, for instance if the world stood still in wall time.
+
+        Args:
+            resets: Number of resets before the tick.
+            tick: Number of the tick since the reset.
+        """
         starts = self._starts.get(resets, set())
         if len(starts) == 1:  # simulated time, in which stamps follow the ticks
             return (min(starts) + tick) * self._dt_ns
@@ -204,7 +215,7 @@ class _Stamps:
 
 
 def _parsed(kind: type, raw: bytes) -> Any:
-    """Returns the message in bytes; None if they are not of this type."""
+    """Deserialises a message; returns None if the bytes are not a message of this type."""
     message = kind()
     try:
         message.deserialize(raw)
@@ -214,14 +225,14 @@ def _parsed(kind: type, raw: bytes) -> Any:
 
 
 def _as_sent(message: Any) -> Any:
-    """Returns a message with numbers in the precision of serialisation."""
+    """Serialises and deserialises a message, so that its numbers have the precision of sent messages."""
     data = BytesIO()
     message.serialize(data)
     return _parsed(type(message), data.getvalue())
 
 
 def _difference(expected: Any, recorded: Any, place: str) -> tuple[str, Any, Any] | None:
-    """Returns the path of the first value that differs, but for `seq`, and both values; None if there is none."""
+    """Returns the path of the first different value, and both values; None without a difference. Ignores `seq`."""
     if isinstance(expected, genpy.Message):
         names = [name for name in expected.__slots__ if name != "seq"]
         parts = [(getattr(expected, name), getattr(recorded, name), f"{place}.{name}".lstrip(".")) for name in names]

@@ -13,7 +13,7 @@ DEFAULT_TOPICS = (
 """Topics of replays, joint states and targets, commands after a guard, wrenches, contacts, TF and the clock."""
 
 _Index = Annotated[Count, Field(strict=False)]
-"""Index as a key of a ROS parameter, which is text."""
+"""Index that is a key in a ROS parameter, where keys are text."""
 
 
 class RecordParameters(ConfigModel):

@@ -7,7 +7,7 @@ from pathlib import Path
 from custom_ros_tools.errors import InterfaceError
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Numbers of the errors of a disk that takes no more."""
+"""Error numbers that mean that the disk is full, or a quota or file size is exceeded."""
 
 
 @dataclass(eq=False)

@@ -1,4 +1,4 @@
-"""Content of an untrusted `episode.yaml`: types, limits, and texts that are safe on a terminal."""
+"""Validation of an untrusted `episode.yaml`: types, limits, and texts that are safe to print on a terminal."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from custom_ros_tools.foreign import MAX_PATH_BYTES, printable
 from custom_ros_tools.schema import ConfigModel, Count, Expects, NonNegative, Text
 
 MAX_BYTES = 2_000_000
-"""Largest size of the file [bytes]."""
+"""Largest size of `episode.yaml` [bytes]."""
 MAX_LABEL, MAX_NOTE = 100, 2_000
-"""Characters of a label, and of a note."""
+"""Largest number of characters of a label, and of a note."""
 MAX_FILES = 2_000
-"""Number of files of a world that are stored with an episode."""
+"""Largest number of a world's files that are stored with an episode."""
 MAX_TOPICS = 10_000
 MAX_NUMBER = 10**12 - 1
-"""Largest number of an episode."""
+"""Largest value of an episode's number."""
 
 Line = Annotated[str, AfterValidator(printable)]
-"""A text in one line; characters that a terminal may act on are escaped."""
+"""A text in one line, in which characters that a terminal may interpret are escaped."""
 
 
 Digest = Annotated[str, Field(pattern="^([0-9a-f]{64})?$"), Expects("64 hex digits")]
-"""SHA-256 of a content; empty for none."""
+"""SHA-256 in 64 hexadecimal digits, or an empty text."""
 
 
 def _path(text: str) -> str:
-    """Returns an absolute path without `..`; rejects paths above the root."""
+    """Returns an absolute path with `..` resolved; raises a ValueError if the path is relative or leaves its root."""
     parts: list[str] = []
     for part in text.split("/"):
         if part == ".." and not parts:
@@ -46,7 +46,7 @@ def _path(text: str) -> str:
 
 
 Path = Annotated[Text, AfterValidator(_path)]
-"""Absolute path of a file as it was recorded; readers lay it out below a folder, see `path_below`."""
+"""Absolute path of a file on the recording machine; readers place the file below a folder, see `path_below`."""
 
 
 class TopicFacts(ConfigModel):
@@ -87,20 +87,24 @@ class EpisodeFacts(ConfigModel):
 
 
 def facts_in(text: str, file: str) -> dict[str, Any]:
-    """Returns the attributes of an `Episode` in a YAML text, which messages call `file`.
+    """Returns the attributes of an `Episode` from a YAML text.
+
+    Args:
+        text: The YAML text.
+        file: Name of the text's file, for error messages.
 
     Raises:
-        ConfigError: If it is no YAML, or a value has another type than expected or is outside of its limits.
+        ConfigError: If the text is not YAML, or a value has the wrong type or is outside of its limits.
     """
     facts = EpisodeFacts.parse(load_configs(text, file, MAX_BYTES), file)
     return facts.model_dump(exclude_unset=True)
 
 
 def checked_label(label: str) -> str:
-    """Returns a checked label of an episode.
+    """Returns a label of an episode unchanged, if the label is valid.
 
     Raises:
-        InterfaceError: If it is too long, or has control characters.
+        InterfaceError: If the label is too long, or has control characters.
     """
     if printable(label, MAX_LABEL) != label:
         given = printable(label, MAX_LABEL)

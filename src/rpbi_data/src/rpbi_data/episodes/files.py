@@ -1,4 +1,4 @@
-"""Copies by content of the files that a world names, and worlds that read these copies."""
+"""Stores copies of the files that a world names, called by their hash, and makes worlds that read these copies."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ URDF = ".urdf"
 MAX_FILE_BYTES = 2**29
 """Largest size of a file that is stored with an episode [bytes]."""
 MAX_ALL_BYTES = 2**31
-"""Largest size of all files of an episode together [bytes]."""
+"""Largest total size of the files of an episode [bytes]."""
 _NAMED = 5
-"""Number of files that are not stored and named in a note; the others are counted."""
+"""Largest number of files that a note about missing copies names; further files are only counted."""
 
 
 def store_files(
@@ -41,16 +41,18 @@ def store_files(
     """Copies the files that a world's description names, and the meshes of its URDFs, into a folder.
 
     Args:
-        description: JSON, as on `rpbi/world_description`.
-        store: The folder; a file is `HASH.EXTENSION` there. Copies that exist are kept.
-        is_own: Whether a file may be copied, by its path without links; see `files_of_world`.
+        description: The world's description as JSON, as on the topic `rpbi/world_description`.
+        store: The folder, in which a copy is called `HASH.EXTENSION`. Existing copies are kept.
+        is_own: Decides from a file's path, with symbolic links resolved, if the file may be copied; see
+            `files_of_world`.
 
     Returns:
-        For each file its `path`, its `sha256`, and for a URDF `meshes`, their paths by the names in it; and sentences
-        on files that are not as they were when the world was loaded, cannot be read, or are not copied.
+        A dictionary for each file, and messages. A dictionary has the file's `path` and `sha256`; for a URDF, `meshes`
+        maps mesh names in the URDF to paths. Messages are about files that cannot be read, are not copied, or have
+        changed since the world was loaded.
 
     Raises:
-        ConfigError: If it is no description.
+        ConfigError: If `description` is not the description of a world.
     """
     data = _described(description)
     copies = _Copies(store, is_own)
@@ -70,13 +72,18 @@ def store_files(
 
 
 def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[Path], bool]:
-    """Returns whether a file may belong to a world with an untrusted description.
+    """Returns a function that decides whether a file may belong to a world with an untrusted description.
 
-    These are the files in ROS packages, in the folder of the main file if one is there, in the data of robots, and in
-    further folders. In the former, names of files and folders that begin with a dot are left out.
+    Allowed are files in ROS packages, in installed robot data, in the folder of the world's main file, and in further
+    folders. The main file counts only if its keys are those of a main file. Hidden files and files in hidden folders
+    are only allowed in further folders.
+
+    Args:
+        description: The world's description as JSON.
+        further: Further folders.
 
     Raises:
-        ConfigError: If it is no description.
+        ConfigError: If `description` is not the description of a world.
     """
     main = _described(description).get("file")
     folders = [*_package_folders(), *([Path(main).parent] if isinstance(main, str) and _is_main_file(main) else ())]
@@ -103,7 +110,7 @@ class _Copies:
 
     @property
     def all_faults(self) -> list[str]:
-        """The faults, with one on files that are not copied."""
+        """All messages, including a message about files that must not be copied."""
         if not self._foreign:
             return self.faults
         more = f" and {len(self._foreign) - _NAMED} more" if len(self._foreign) > _NAMED else ""
@@ -111,7 +118,7 @@ class _Copies:
         return [*self.faults, f"not copied, since they are in no folder of the world or of copy_from: {names}{more}"]
 
     def add(self, path: str) -> str:
-        """Copies a file, and returns its hash; empty if it cannot be read, or is not to be copied."""
+        """Copies a file, and returns its SHA-256; empty if the file cannot be read or must not be copied."""
         if path in self.stored:
             return str(self.stored[path]["sha256"])
         if not _is_plain(path) or not self._is_own(Path(os.path.realpath(path))):
@@ -138,8 +145,8 @@ class _Copies:
         """Copies the meshes of a URDF.
 
         Args:
-            urdf: Its name in the description.
-            source: The file to read.
+            urdf: Path of the URDF in the world's description, relative to which meshes are found.
+            source: Path of the file from which the URDF is read.
         """
         meshes: dict[str, str] = {}
         try:
@@ -150,7 +157,7 @@ class _Copies:
         for name in document.meshes:
             try:
                 found = found_mesh(name, Path(urdf))
-            except (ConfigError, OSError):  # the world was loaded without it
+            except (ConfigError, OSError):  # the world was loaded without this mesh
                 continue
             path = str(found.resolve() if ".." in found.parts else found.absolute())
             if self.add(path):
@@ -160,12 +167,12 @@ class _Copies:
 
 
 def _is_plain(path: str) -> bool:
-    """Returns whether a path is absolute, and can be stored in a description of an episode."""
+    """Returns whether a path is absolute, without `..`, and can be stored in `episode.yaml`."""
     return path.startswith("/") and ".." not in path.split("/") and printable(path, MAX_PATH_BYTES) == path
 
 
 def _described(description: str) -> dict[str, Any]:
-    """Returns a world's description, whose files, descriptions and configurations have the types of `describe`."""
+    """Parses a world's description; raises a ConfigError if files or configurations have other types than expected."""
     data = load_foreign_json(description, "rpbi/world_description")
     try:
         texts = [*data["files"].items(), *data["descriptions"].items()]
@@ -189,8 +196,8 @@ def _package_folders() -> tuple[Path, ...]:
 
 
 def _is_main_file(path: str) -> bool:
-    """Returns whether a file has keys of a main file, and no others."""
-    from rpbi.config.world import main_file_model  # these load the simulator, which readers of episodes do not need
+    """Returns whether a file is the main file of a world: all keys are keys of a main file, and one defines objects."""
+    from rpbi.config.world import main_file_model  # loads the simulator, which readers of episodes do not need
     from rpbi.world.objects import object_sections
 
     try:
@@ -201,16 +208,21 @@ def _is_main_file(path: str) -> bool:
 
 
 def stored_path(store: Path, path: str, digest: str) -> Path:
-    """Returns the copy of a file with a hash.
+    """Returns the path of the copy of a file.
+
+    Args:
+        store: Folder of the copies.
+        path: Path of the file.
+        digest: SHA-256 of the file.
 
     Raises:
-        ConfigError: If it is a link.
+        ConfigError: If the copy is a symbolic link.
     """
     return path_below(store.parent, f"{store.name}/{digest}{Path(path).suffix}")
 
 
 def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[str]:
-    """Yields a sentence for each copy that is missing or was changed since it was stored."""
+    """Yields a message for each copy in `store` that is missing, or was changed since it was stored."""
     known: dict[str, str] = {}
     for each in files:
         if not each["sha256"]:
@@ -228,35 +240,35 @@ def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[s
 
 
 def newer_files(files: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Yields a sentence for each existing file whose content differs from the stored copy."""
+    """Yields a message for each original file whose content now differs from the stored copy."""
     for each in files:
-        with suppress(OSError):  # it is not there any more
+        with suppress(OSError):  # the original file no longer exists
             data = read_file(each["path"], MAX_FILE_BYTES)
             if each["sha256"] and hashlib.sha256(data).hexdigest() != each["sha256"]:
                 yield f"{each['path']} differs from its copy in the episode"
 
 
 def stored_names(files: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, str]:
-    """Returns the paths of the copies that `with_stored_files` creates, by the paths of the files.
+    """Returns the paths of the files that `with_stored_files` creates in a folder, indexed by original path.
 
     Raises:
-        ConfigError: If the name of a file leaves the folder.
+        ConfigError: If a path would be outside of the folder.
     """
     return {each["path"]: str(path_below(folder, each["path"])) for each in files if each["sha256"]}
 
 
 def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], store: Path, folder: Path) -> str:
-    """Returns a world's description that reads the copies instead of the files themselves.
+    """Writes the stored files into a folder, and returns a world's description that names these files.
 
     Args:
-        description: JSON, as on `rpbi/world_description`.
-        files: As `store_files` returned them.
-        store: The folder of the copies.
-        folder: An empty folder, in which the files are laid out as they were. URDFs name the meshes there.
+        description: The world's description as JSON, as on the topic `rpbi/world_description`.
+        files: The files, as returned by `store_files`.
+        store: Folder of the copies.
+        folder: An empty folder, in which files get their original paths. URDFs there name the meshes in this folder.
 
     Raises:
-        ConfigError: If it is no description, or the name of a file leaves the folder.
-        EpisodeError: If a copy cannot be read, or all together are too large.
+        ConfigError: If `description` is not the description of a world, or a path would be outside of the folder.
+        EpisodeError: If a copy cannot be read, or the files together are too large.
     """
     data = _described(description)
     files = list(files)
@@ -292,7 +304,7 @@ _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 
 
 def _with_meshes(urdf: str, meshes: Mapping[str, str]) -> str:
-    """Returns a URDF whose attributes `filename` name other files."""
+    """Returns a URDF in which mesh file names are replaced; `meshes` maps names in the URDF to new paths."""
 
     def renamed(match: re.Match[str]) -> str:
         path = meshes.get(unescape(match[3], _QUOTES))

@@ -29,15 +29,15 @@ from .errors import EpisodeError
 from .facts import MAX_BYTES, MAX_LABEL, MAX_NOTE, MAX_NUMBER, checked_label, facts_in
 
 BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
-"""Files of an episode: the recording, its description, and commands that the topic no longer sends."""
+"""Files of an episode: bag, description, and early commands that the topic does not send to late subscribers."""
 FARM = "farm.yaml"
-"""File of a folder of episodes with the job of the farm that they belong to."""
+"""File in a folder of episodes that contains the job of the farm that makes the episodes."""
 FILES, DISCARDED = "files", "discarded"
 SET_BACK = "set_back_s"
 STAMPED = ("joint_states", "base_state", "contacts", "ft_sensor")
-"""Last words of topics whose messages have the world's time."""
+"""Last parts of the names of topics whose stamps are in the world's time."""
 SEAL = "sha256"
-"""Key of a topic with the SHA-256 of its messages."""
+"""Key of the SHA-256 of a topic's messages, in `Episode.topics`."""
 UNREADABLE = "cannot be read"
 """State of an episode whose description cannot be read."""
 _POLL_S = 0.05
@@ -50,21 +50,20 @@ class Episode:
     """Description of an episode, as in its `episode.yaml`.
 
     Attributes:
-        number: Its number in the folder.
-        state: `recording`, `complete`, `incomplete` (ended by a fault, which `note` names) or `recovered` (the recorder
-            was killed).
-        label: Word of the user for the outcome, such as `success`.
-        note: Reason of a state other than `complete`, and whatever else a user should read.
+        number: Number of the episode in its folder.
+        state: `recording`, `complete`, `incomplete` (ended by a fault, which `note` names), `recovered` (after the
+            recorder was killed), or `UNREADABLE`.
+        label: The user's label for the outcome, such as `success`.
+        note: Reason of a state other than `complete`, and further messages for the user.
         started: Wall time of the start, ISO 8601.
-        seconds: Length in wall time, or in the world's time if it comes from a farm [s].
+        seconds: Duration in wall time, or in the world's time if a farm made the episode [s].
         namespace: Namespace of the simulator.
-        seeds: Seeds, as the node's parameter gives them.
-        versions: Versions of this workspace, PyBullet, Python and numpy.
-        git: Commit of the workspace, and whether files were changed since; empty without git.
+        seeds: Text about random seeds, from the recorder's parameter `seeds` or from the farm.
+        versions: Versions of this workspace, PyBullet, Python and numpy, indexed by name.
+        git: Commit of the workspace, followed by ` changed` if files differ from the commit; empty without git.
         files: Files that the world names, see `rpbi_data.episodes.files`.
-        published: Messages that publishers sent to the recorder, by topic.
-        topics: By topic the type, messages, mean rate [Hz] and longest gap [s] in the bag; `set_back_s` if its clock
-            was set back [s].
+        published: Number of messages that publishers sent to the recorder, indexed by topic.
+        topics: Properties of the topics in the bag, indexed by topic; see `rpbi_data.episodes.bags.measure_topics`.
     """
 
     number: int
@@ -83,7 +82,7 @@ class Episode:
 
     @property
     def name(self) -> str:
-        """Name of its folder."""
+        """Name of the episode's folder."""
         return f"episode_{self.number:06d}"
 
     @property
@@ -93,8 +92,9 @@ class Episode:
 
     @property
     def lost(self) -> dict[str, int]:
-        """Numbers of messages by topic that were sent to the recorder but are missing in the bag; topics without loss
-        are left out.
+        """Number of messages that were sent to the recorder but are not in the bag, indexed by topic.
+
+        Topics without loss are left out.
         """
         recorded = {topic: each["messages"] for topic, each in self.topics.items()}
         lost = {topic: sent - recorded.get(topic, 0) for topic, sent in self.published.items()}
@@ -102,12 +102,12 @@ class Episode:
 
     @property
     def set_back_s(self) -> float:
-        """Largest time by which the clock of a topic was set back [s]; 0 if none was."""
+        """Largest time by which the clock of a topic was set back [s]; 0 if this never happened."""
         return max((float(each.get(SET_BACK, 0.0)) for each in self.topics.values()), default=0.0)
 
     @property
     def simulated_s(self) -> float | None:
-        """Length by the stamps of joint states or other samples of bodies [s]; None without two of any."""
+        """Duration according to the stamps of topics in `STAMPED` [s]; None if no such topic has a known rate."""
         spans = [
             (each["messages"] - 1) / each["rate_hz"]
             for topic, each in self.topics.items()
@@ -116,7 +116,7 @@ class Episode:
         return max(spans, default=None)
 
     def joint_rhythm(self) -> tuple[float, float] | None:
-        """Returns the lowest rate [Hz] and longest gap [s] of joint states; None without any."""
+        """Returns the lowest mean rate [Hz] and the longest gap [s] of joint state topics; None without such topics."""
         found = [each for topic, each in self.topics.items() if topic.endswith("/joint_states")]
         if not found:
             return None
@@ -124,12 +124,14 @@ class Episode:
 
 
 class EpisodeFolder:
-    """A folder of episodes: `episode_000000/` and so on, `files/` that they share, and `discarded/`.
+    """A folder of episodes.
 
-    An episode that is being recorded is in `.episode_000000.part` and gets its name when it is complete.
+    The folder contains a folder for each episode, `episode_000000/` and so on, `files/` with the worlds' files, and
+    `discarded/`. While an episode is being recorded, its folder is `.episode_000000.part`, which is renamed when the
+    episode is complete.
 
     Args:
-        path: The folder; it need not exist.
+        path: Path of the folder, which need not exist.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -137,14 +139,14 @@ class EpisodeFolder:
 
     @property
     def files(self) -> Path:
-        """Folder of copies of files by content."""
+        """Folder with copies of the worlds' files, which all episodes share."""
         return self.path / FILES
 
     def numbers(self) -> list[int]:
         """Returns the numbers of all finished episodes, ascending.
 
         Raises:
-            EpisodeError: If there is no such folder.
+            EpisodeError: If the folder does not exist.
         """
         if not self.path.is_dir():
             raise EpisodeError(self.path, "expected a folder of episodes, there is none")
@@ -155,7 +157,7 @@ class EpisodeFolder:
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
-        """Yields all finished episodes; the note of one that is `UNREADABLE` has the reason."""
+        """Yields all finished episodes; one whose description cannot be read has the state `UNREADABLE` and a note."""
         for number in self.numbers():
             try:
                 yield read_facts(self.folder_of(number))
@@ -163,10 +165,10 @@ class EpisodeFolder:
                 yield Episode(number, UNREADABLE, note=error.message.removeprefix(f"{UNREADABLE}: "))
 
     def read(self, number: int) -> Episode:
-        """Returns an episode.
+        """Reads the description of a finished episode.
 
         Raises:
-            EpisodeError: If it does not exist, or its description cannot be read.
+            EpisodeError: If the episode does not exist, or its description cannot be read.
         """
         if number not in self.numbers():
             known = printable(", ".join(map(str, self.numbers())), MAX_LABEL) or "none"
@@ -185,15 +187,15 @@ class EpisodeFolder:
         """Creates the temporary folder of a new episode.
 
         Args:
-            number: Its number; by default the next one. Numbers of discarded episodes are not used again.
+            number: Number of the episode; by default, the next number. Numbers of discarded episodes are not reused.
             facts: Further attributes of the episode.
 
         Returns:
-            The episode and the folder.
+            The episode and its temporary folder.
 
         Raises:
-            EpisodeError: If the number is used.
-            OSError: If it cannot be written; there is no folder then.
+            EpisodeError: If the number is in use, or is too large.
+            OSError: If the description cannot be written; no folder is left then.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         while True:
@@ -204,7 +206,7 @@ class EpisodeFolder:
             try:
                 self.part_of(chosen).mkdir()
                 break
-            except FileExistsError:  # another process has just begun it
+            except FileExistsError:  # another process has just created the folder
                 continue
         episode, part = Episode(chosen, **facts), self.part_of(chosen)
         try:
@@ -215,7 +217,7 @@ class EpisodeFolder:
         return episode, part
 
     def complete(self, part: Path, episode: Episode) -> Path:
-        """Gives an episode its final name and returns its folder."""
+        """Writes an episode's description, renames its temporary folder to the final name, and returns the path."""
         write_facts(part, episode)
         return part.rename(self.folder_of(episode.number))
 
@@ -224,11 +226,11 @@ class EpisodeFolder:
         return sorted(map(self.part_of, _numbers(self.path, _PARTIAL)))
 
     def discard(self, number: int) -> Path:
-        """Moves an episode into `discarded` and returns its new folder.
+        """Moves an episode into the folder `discarded`, and returns the new path.
 
         Raises:
-            EpisodeError: If it does not exist.
-            ConfigError: If `discarded` is a link.
+            EpisodeError: If the episode does not exist.
+            ConfigError: If `discarded` is a symbolic link.
         """
         self.read(number)
         target = path_below(self.path, f"{DISCARDED}/{self.folder_of(number).name}")
@@ -236,10 +238,10 @@ class EpisodeFolder:
         return self.folder_of(number).rename(target)
 
     def relabel(self, number: int, label: str) -> Episode:
-        """Changes the label of an episode and returns it.
+        """Changes the label of an episode, and returns the episode.
 
         Raises:
-            EpisodeError: If it does not exist.
+            EpisodeError: If the episode does not exist.
             InterfaceError: If the label is too long, or has control characters.
         """
         episode = self.read(number)
@@ -248,16 +250,16 @@ class EpisodeFolder:
         return episode
 
     def free_mb(self) -> float:
-        """Returns the free space of the disk that the folder is on, or will be on [MB]."""
+        """Returns the free space of the disk on which the folder is or will be [MB]."""
         folder = next(each for each in (self.path.absolute(), *self.path.absolute().parents) if each.is_dir())
         return shutil.disk_usage(folder).free / 1e6
 
 
 def read_facts(folder: Path) -> Episode:
-    """Reads the description of an episode in its folder, whose name has its number.
+    """Reads the description of an episode from its folder; the number is taken from the folder's name.
 
     Raises:
-        EpisodeError: If it cannot be read.
+        EpisodeError: If the description cannot be read.
     """
     path = folder / FACTS
     try:
@@ -272,7 +274,10 @@ def read_facts(folder: Path) -> Episode:
 
 
 def read_part(part: Path) -> Episode:
-    """Reads the description of an episode in its temporary folder; one without it has its number and state alone."""
+    """Reads the description of an episode from its temporary folder.
+
+    If the description cannot be read, the result has only the number, the state `UNREADABLE` and a note.
+    """
     try:
         return read_facts(part)
     except EpisodeError as error:
@@ -282,17 +287,21 @@ def read_part(part: Path) -> Episode:
 
 
 def write_facts(folder: Path, episode: Episode) -> None:
-    """Writes the description of an episode into its folder; the former one stays until the new one is complete."""
+    """Writes the description of an episode into its folder; replaces an existing description atomically."""
     episode.note = printable(episode.note, MAX_NOTE)
     with atomic_file(folder / FACTS) as part:
         part.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
 
 
 def file_in(place: Path, name: str) -> Path | None:
-    """Returns a file of an episode; None if there is none.
+    """Returns the path of an episode's file; None if the file does not exist.
+
+    Args:
+        place: Folder of the episode.
+        name: Name of the file.
 
     Raises:
-        EpisodeError: If it is a link, a pipe, a device or a folder.
+        EpisodeError: If the file is a link, a pipe, a device or a folder.
     """
     try:
         path = path_below(place.parent, f"{place.name}/{name}")
@@ -309,18 +318,18 @@ def file_in(place: Path, name: str) -> Path | None:
 
 
 def hold(part: Path, wait_s: float = 0.0) -> int:
-    """Locks a temporary folder, so that no other process repairs it.
+    """Locks the temporary folder of an episode, so that other processes do not repair the episode.
 
     Args:
-        part: The folder.
-        wait_s: Longest time to wait until another process releases it [s].
+        part: The temporary folder.
+        wait_s: Longest time to wait until another process releases the lock [s].
 
     Returns:
-        A file handle. The lock ends when it is closed, here and in child processes that have inherited it.
+        A file handle. The lock ends when this process, and all child processes that inherited the handle, close it.
 
     Raises:
-        BlockingIOError: If another process records into the folder.
-        OSError: If it is no folder, or a link to one.
+        BlockingIOError: If another process holds the lock.
+        OSError: If `part` is not a folder, or is a symbolic link.
     """
     handle, deadline = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW), time.monotonic() + wait_s
     while True:
@@ -335,12 +344,12 @@ def hold(part: Path, wait_s: float = 0.0) -> int:
 
 
 def is_held(part: Path) -> bool:
-    """Returns whether a process records into a temporary folder."""
+    """Returns whether a process holds the lock of a temporary folder, and thus is recording."""
     try:
         os.close(hold(part))
     except BlockingIOError:
         return True
-    except OSError:  # it is complete by now
+    except OSError:  # the episode has been completed meanwhile
         pass
     return False
 
@@ -362,7 +371,7 @@ def versions() -> dict[str, str]:
 
 
 def git_state(folder: Path | None = None) -> str:
-    """Returns the commit of a workspace, with ` changed` if files differ from it; empty without git."""
+    """Returns the commit of a workspace, followed by ` changed` if files differ from the commit; empty without git."""
 
     def git(*words: str) -> str:
         done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Episodes as text."""
+"""Formats episodes as text."""
 
 from collections.abc import Iterable
 
@@ -40,12 +40,12 @@ def _simulated(episode: Episode) -> str:
 
 
 def clock_note(set_back_s: float) -> str:
-    """Returns the end of a sentence on a clock that was set back [s]; empty for 0."""
+    """Returns the end of a message about a clock that was set back by `set_back_s` [s]; empty for 0."""
     return f", a clock was set back by {set_back_s:.3g} s" if set_back_s else ""
 
 
 def details_of(episode: Episode) -> str:
-    """Returns all stored data of an episode, except for the list of its files."""
+    """Returns a text with all stored data of an episode, except for the list of the world's files."""
     lines = [f"{episode.name}: {episode.state}{f', {episode.note}' if episode.note else ''}"]
     lines += [
         f"label    {episode.label or '-'}",

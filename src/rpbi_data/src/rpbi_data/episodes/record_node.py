@@ -1,4 +1,4 @@
-"""`record_node.py`: records episodes on request of services, keys and buttons."""
+"""The node `record_node.py`, which records episodes; services, keys and buttons control the node."""
 
 from __future__ import annotations
 
@@ -42,23 +42,26 @@ from .folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, hold, versi
 from .listing import clock_note
 
 CHECK_HZ = 1.0
-"""Rate of checks of disk, recorder and counters, and of the status [Hz]."""
+"""Rate at which disk and recorder are checked, and the status is published [Hz]."""
 MAX_HASH_WAIT_S = 1.5
-"""Longest time to wait for the hash of a state at the end of an episode [s]."""
+"""Longest time to wait for a state hash at the end of an episode [s]."""
 MAX_LOCK_WAIT_S = 1.0
-"""Longest time to wait for the lock of a new episode, which a listing holds for a moment [s]."""
+"""Longest time to wait for the lock of a new episode, which a listing of episodes may hold for a moment [s]."""
 MAX_RESET_WAIT_S = 10.0
 """Longest time to wait for the state after a reset [s]."""
 POLL_S = 0.01
 KEPT_COMMANDS = 4_000
-"""Number of commands in a world's life beyond which a late subscriber may miss the first ones; it gets 5,000."""
+"""Number of commands since a reset above which they are also stored in a file.
+
+A late subscriber gets at most 5,000 earlier commands.
+"""
 
 _Trigger = TypeVar("_Trigger", str, int)
 _log = logging.getLogger(__name__)
 
 
 class _Simulator:
-    """Receives the data of the simulator that a replay needs, beginning before the first episode."""
+    """Receives the simulator's data that a replay needs, from the start of the node."""
 
     def __init__(self, namespace: str) -> None:
         self._prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
@@ -78,7 +81,7 @@ class _Simulator:
         return f"{self._prefix}rpbi/commands"
 
     def reset(self) -> None:
-        """Resets the world and returns when its new state has arrived; raises an InterfaceError if it is refused."""
+        """Resets the world, and waits for the first state after the reset; raises an InterfaceError if either fails."""
         before = self.state.resets if self.state else 0
         service = f"{self._prefix}rpbi/reset"
         try:
@@ -95,7 +98,7 @@ class _Simulator:
             time.sleep(POLL_S)
 
     def wait_for_hash(self) -> None:
-        """Waits for the next hash of a running world, so that the end of an episode can be compared."""
+        """Waits for the next state hash of a running world, so that the end of an episode can be verified."""
         before, deadline = self.hashes, time.monotonic() + MAX_HASH_WAIT_S
         while self.state is not None and self.state.running and self.hashes == before:
             if time.monotonic() > deadline:
@@ -103,10 +106,10 @@ class _Simulator:
             time.sleep(POLL_S)
 
     def write_commands(self, path: Path) -> str:
-        """Writes the commands since the world was built or reset to a bag, if they are too many for a late subscriber.
+        """Writes the commands since the world was built or reset to a bag, if a late subscriber may miss some.
 
         Returns:
-            A sentence if the first ones are missing, else nothing.
+            A message if the first commands are missing; otherwise an empty text.
         """
         with self._lock:
             messages = [self._commands[first] for first in sorted(self._commands)]
@@ -137,7 +140,7 @@ class _Simulator:
 
 
 class RecordNode:
-    """Records episodes into the folder of its parameters, see `RecordParameters`.
+    """Records episodes into a folder, as the node's parameters require; see `RecordParameters`.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -168,7 +171,7 @@ class RecordNode:
         self._publish_status()
 
     def start(self) -> str:
-        """Starts an episode; returns a sentence for the user, and raises an InterfaceError if it cannot start."""
+        """Starts an episode; returns a message for the user, or raises an InterfaceError if this is impossible."""
         with self._lock:
             if self._recorder is not None:
                 raise EpisodeError(self._folder.path, f"episode {self._episode.number} is being recorded")
@@ -182,14 +185,14 @@ class RecordNode:
             return f"episode {self._episode.number} is being recorded: {len(topics)} topics"
 
     def stop(self) -> str:
-        """Ends the episode that is recorded and returns a sentence; raises an InterfaceError if none is recorded."""
+        """Ends the current episode; returns a message, or raises an InterfaceError if no episode is being recorded."""
         with self._lock:
             self._require_recording()
             self._simulator.wait_for_hash()
             return self._end("complete", "")
 
     def discard(self) -> str:
-        """Discards the episode that is recorded, else the last one; returns a sentence."""
+        """Discards the current episode, or else the last one; returns a message for the user."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "discarded while it was recorded")
@@ -198,7 +201,7 @@ class RecordNode:
             return f"episode {self._episode.number} is in {self._folder.discard(self._episode.number)}"
 
     def label(self, label: str) -> str:
-        """Labels the episode that is recorded, else the last one; returns a sentence."""
+        """Labels the current episode, or else the last one; returns a message for the user."""
         with self._lock:
             if self._episode.number < 0:
                 raise EpisodeError(self._folder.path, "nothing to label: this node has not recorded an episode")
@@ -210,7 +213,7 @@ class RecordNode:
             return f"episode {self._episode.number}: {label}"
 
     def end(self) -> None:
-        """Ends the current recording when the node ends."""
+        """Ends the current episode, if there is one, when the node shuts down."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "the node was ended while it was recorded")
@@ -247,7 +250,7 @@ class RecordNode:
         self._recorder, self._part_lock, self._begin_s = recorder, part_lock, time.monotonic()
 
     def _end(self, state: str, note: str) -> str:
-        """Ends the episode that is recorded, and returns a sentence."""
+        """Ends the current episode with a state and a note; returns a message for the user."""
         try:
             return self._ended(state, note)
         finally:
@@ -285,7 +288,7 @@ class RecordNode:
         return text
 
     def _repair(self, fault: BagError) -> str:
-        """Repairs the episode from the files that its recorder has left, and returns a sentence."""
+        """Repairs the episode from the files that the recorder has left; returns a message for the user."""
         try:
             write_facts(self._part, self._episode)
             self._episode = repaired = repair(self._folder, self._part)
@@ -295,13 +298,13 @@ class RecordNode:
         return f"episode {repaired.number} is {repaired.state}: {repaired.note}"
 
     def _leave(self, fault: OSError) -> str:
-        """Leaves the episode in its temporary folder, for a later repair, and returns a sentence."""
+        """Leaves the episode in its temporary folder for a later repair; returns a message for the user."""
         text = f"episode {self._episode.number} stays in {self._part} until it is repaired: {fault}"
         rospy.logerr("%s", text)
         return text
 
     def _check(self) -> None:
-        """Ends the episode if its recorder was killed, or the disk is nearly full; publishes the status."""
+        """Ends the current episode if the recorder has ended or the disk is nearly full; publishes the status."""
         with self._lock:
             if self._recorder is not None:
                 self._episode.published = self._recorder.published() or self._episode.published
@@ -315,7 +318,7 @@ class RecordNode:
             self._publish_status()
 
     def _write_facts(self) -> None:
-        """Writes the description of the episode that is recorded, or ends it if that fails."""
+        """Writes the description of the current episode; ends the episode if writing fails."""
         try:
             write_facts(self._part, self._episode)
         except OSError as error:
@@ -356,7 +359,7 @@ class RecordNode:
     def _actions(
         self, start: _Trigger | None, discard: _Trigger | None, labels: Mapping[_Trigger, str]
     ) -> dict[_Trigger, Callable[[], None]]:
-        """Returns the actions of keys or buttons; None for neither."""
+        """Returns the actions, indexed by key or button; an action whose key or button is None is left out."""
         actions = [(start, self._toggle), (discard, self.discard)]
         actions += [(each, partial(self.label, label)) for each, label in labels.items()]
         return {each: partial(_do, action) for each, action in actions if each is not None}
@@ -396,7 +399,7 @@ def _do(action: Callable[[], str]) -> None:
 
 
 def _matcher(topics: tuple[str, ...] | str, also: tuple[str, ...]) -> Callable[[str], bool] | tuple[str, ...]:
-    """Returns the names of topics, or the function that decides whether one is recorded."""
+    """Returns the full names of the topics to record, or a function that decides whether a topic is recorded."""
     further = tuple(rospy.resolve_name(each) for each in also)
     if not isinstance(topics, str):
         return (*(rospy.resolve_name(each) for each in topics), *further)
@@ -408,7 +411,7 @@ def _matcher(topics: tuple[str, ...] | str, also: tuple[str, ...]) -> Callable[[
 
 
 def _existing_topics(wanted: Callable[[str], bool] | tuple[str, ...]) -> list[str]:
-    """Returns the topics to record that are published or subscribed to by others."""
+    """Returns the topics to record: listed topics, or all existing topics that `wanted` accepts."""
     if isinstance(wanted, tuple):
         return sorted(wanted)
     publishers, subscribers, _ = rosgraph.Master(rospy.get_name()).getSystemState()

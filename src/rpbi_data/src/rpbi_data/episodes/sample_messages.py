@@ -1,4 +1,4 @@
-"""Messages of a world's samples, as its node publishes them, without a ROS master."""
+"""Converts a world's samples to the messages that the simulator node publishes, without a ROS master."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rpbi.world import World
 
 
 class SampleMessages:
-    """Converts samples to messages, except those of cameras, which the renderer draws.
+    """Converts samples to messages, except samples of cameras, whose images the renderer draws.
 
     Args:
         world: The world.
-        is_wanted: Returns whether messages of a topic are wanted, by its name without namespace.
+        is_wanted: Decides from a topic's name, without namespace, if messages of the topic are needed.
     """
 
     def __init__(self, world: World, is_wanted: Callable[[str], bool]) -> None:
@@ -29,7 +29,7 @@ class SampleMessages:
         self._transforms = TransformCollector()
 
     def of(self, samples: Iterable[Any], stamp_ns: int) -> Iterator[tuple[str, Any]]:
-        """Yields topic and message of samples of a stamp; all poses of links are one message at the end."""
+        """Yields topic and message for samples with a stamp [ns]. All link poses form one message, which comes last."""
         for sample in samples:
             if isinstance(sample, LinkPoseSample):
                 self._transforms.collect(sample, stamp_ns)
@@ -39,7 +39,7 @@ class SampleMessages:
             yield TF.name, transforms
 
     def keeps_state(self, topic: str) -> bool:
-        """Returns whether a sensor of a topic depends on more than the present state, such as a zero or a mean."""
+        """Returns whether a topic's sensor has an internal state, such as a zero offset or a moving average."""
         return any(each.keeps_state for each in self._sensors() if self._name(each, sample_topic(each)) == topic)
 
     def _message(self, sample: Any, stamp_ns: int) -> Iterator[tuple[str, Any]]:
@@ -52,7 +52,7 @@ class SampleMessages:
                 self._transforms.collect(*topic.on_tf(sample, stamp_ns))
 
     def _topic(self, sample: Any) -> Topic | None:
-        """Returns the topic of a sample's sensor; None without one."""
+        """Returns the topic of a sample's sensor; None if there is no such topic, or the topic is not needed."""
         key = type(sample), sample.name
         if key not in self._routes:
             for sensor in self._sensors():

@@ -1,4 +1,4 @@
-"""Reads the recorded session of a simulator from a bag, or from an episode with the files that are stored with it."""
+"""Reads the recorded session of a simulator from a bag, or from an episode with its stored files."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -24,15 +24,15 @@ from .files import stored_names, with_stored_files
 from .folder import BAG, EARLIER, Episode, EpisodeFolder, file_in
 
 MAX_TICKS = 20_000_000
-"""Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+"""Default limit on the number of ticks in a recording: 5.5 hours of a world at 1 kHz."""
 _TYPES: dict[str, Any] = {
     "rpbi/world_description": String,
     "rpbi/state": SimulationState,
     "rpbi/commands": WorldCommands,
 }
-"""Message type of each topic of a session, by its name relative to the namespace of the simulator."""
+"""Message types of a session's topics, indexed by topic name relative to the simulator's namespace."""
 _Commands = dict[int, dict[int, RecordedCommand]]
-"""Commands by number of resets and index."""
+"""Commands, indexed by the number of preceding resets and then by the command's index."""
 
 
 def read_recording(
@@ -45,19 +45,19 @@ def read_recording(
     names: Mapping[str, str] = MappingProxyType({}),
     needs_states: bool = True,
 ) -> Recording:
-    """Returns the session of one simulator that a bag holds.
+    """Reads the session of one simulator from a bag.
 
     Args:
-        path: The bag. It holds one session; the simulator was not restarted during the recording.
+        path: Path of the bag, in which the simulator was not restarted.
         namespace: Namespace of the simulator; other simulators in the bag are ignored.
-        any_size: Whether to read a bag that exceeds the limit on unpacked bytes, see `BagReader`.
-        earlier: A bag of `rpbi/commands` before the recording, if there is one.
-        relocate: Returns the world's description with other names for its files.
-        names: These names, for the files in keyframes, by their own.
-        needs_states: Whether states to compare have to be in the bag, as for a replay.
+        any_size: Whether the bag may exceed the limits of `BagReader`.
+        earlier: Bag with the `rpbi/commands` before the recording; None if it does not exist.
+        relocate: Replaces the file names in the world's description.
+        names: New names of files in keyframes, indexed by recorded name.
+        needs_states: Whether the bag must contain state hashes to compare, as for a replay.
 
     Raises:
-        BagError: If there is no such bag, it is damaged, or it lacks a topic that is needed.
+        BagError: If the bag does not exist, is damaged, contains several sessions, or lacks a required topic.
     """
     prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
     topics = {f"{prefix}{name}": message_type for name, message_type in _TYPES.items()}
@@ -97,17 +97,20 @@ def read_recording(
 def recorded_episode(
     folder: EpisodeFolder, episode: Episode, any_size: bool = False, *, is_replayed: bool = True
 ) -> Iterator[tuple[Path, Recording]]:
-    """Yields the bag of an episode and its session, whose files are copies in a folder until the end of the context.
+    """Context manager that yields the bag of an episode, and the session in the bag.
+
+    The session's world reads copies of its files in a temporary folder, which exists until the end of the context.
 
     Args:
-        folder: The folder of the episode.
+        folder: The folder of episodes.
         episode: The episode.
-        any_size: As for `read_recording`.
-        is_replayed: Whether it is simulated again: it needs states to compare, and its keyframes name the copies.
+        any_size: See `read_recording`.
+        is_replayed: Whether the session is simulated again: the bag must contain state hashes then, and keyframes name
+            the copies, too.
 
     Raises:
-        EpisodeError: If it has no bag, or a stored file cannot be read.
-        BagError: If its bag cannot be read.
+        EpisodeError: If the episode has no bag, or a stored file cannot be read.
+        BagError: If the bag cannot be read.
     """
     place = folder.folder_of(episode.number)
     bag = file_in(place, BAG)
@@ -135,15 +138,15 @@ def _rename(commands: _Commands, names: Mapping[str, str]) -> None:
 
 
 def require_few_ticks(path: Path, recording: Recording, max_ticks: int) -> int:
-    """Returns the number of ticks of a recording, all its resets together.
+    """Checks the number of ticks of a recording, summed over all resets, and returns this number.
 
     Args:
-        path: Its bag, for the message.
+        path: Path of the bag, for the error message.
         recording: The recording.
-        max_ticks: The largest number.
+        max_ticks: Largest allowed number of ticks.
 
     Raises:
-        BagError: If it has more.
+        BagError: If the recording has more than `max_ticks` ticks.
     """
     last_ticks = {each.resets: each.tick for each in sorted(recording.checkpoints)}
     ticks = sum(last_ticks.values())
@@ -171,7 +174,7 @@ def _add_commands(message: WorldCommands, commands: _Commands) -> None:
 
 
 def _check(bag: BagReader, topics: dict[str, Any], prefix: str, needs_states: bool) -> None:
-    """Raises a BagError if the bag lacks a topic or holds one with the message definition of another version."""
+    """Raises a BagError if the bag lacks a required topic, or a topic's message definition is of another version."""
     needed = [f"{prefix}rpbi/world_description", *([f"{prefix}rpbi/state"] if needs_states else ())]
     missing = [topic for topic in needed if not bag.counts.get(topic)]
     if missing:

@@ -1,4 +1,4 @@
-"""Simulates episodes again and compares them with their recordings."""
+"""Simulates episodes again, and compares states and messages with the recordings."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ _PROGRAM = "import sys; from rpbi_data.episodes.verified_messages import main; m
 
 
 MAX_CPU_S = 3600
-"""Processor time of an episode, by default [s]."""
+"""Default limit of the processor time for an episode [s]."""
 
 
 class ReplayLimits(NamedTuple):
-    """Limits on a recording, as those of `replay`.
+    """Limits on the verification of an episode.
 
     Attributes:
         max_ticks: Largest number of ticks.
-        any_size: Whether its bag may exceed the limits of `BagReader`.
-        cpu_s: Processor time of each process that simulates it [s].
+        any_size: Whether the bag may exceed the limits of `BagReader`.
+        cpu_s: Largest processor time of each process that simulates the episode [s].
     """
 
     max_ticks: int = MAX_TICKS
@@ -53,11 +53,11 @@ class Verdict(NamedTuple):
     """Result of the verification of an episode.
 
     Attributes:
-        number: The episode.
-        is_same: Whether all states agree and all files are as stored.
-        text: The comparison in words.
-        label: Label of the episode; empty if it cannot be read.
-        notes: Sentences on files that have changed on the disk.
+        number: Number of the episode.
+        is_same: Whether all states and messages agree, and the stored files are unchanged.
+        text: Result of the comparison in words.
+        label: Label of the episode; empty if the episode cannot be read.
+        notes: Messages about changed original files, and about differences that do not count.
     """
 
     number: int
@@ -70,16 +70,16 @@ class Verdict(NamedTuple):
 def verify_all(
     folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str], limits: ReplayLimits = USUAL_LIMITS
 ) -> Iterator[Verdict]:
-    """Simulates episodes again, each in a process of its own, and yields the results in order.
+    """Simulates episodes again, each in a separate process, and yields the results in the order of `numbers`.
 
     Args:
-        folder: The folder.
-        numbers: The episodes.
-        jobs: Number of processes at once.
-        trust: Python packages that the episodes may import, for types of the user's own.
+        folder: The folder of episodes.
+        numbers: Numbers of the episodes.
+        jobs: Largest number of simultaneous processes.
+        trust: Python packages that the episodes may import, for user-defined types.
         limits: Limits on each episode.
     """
-    each = max(1, jobs // max(1, len(numbers)))  # for episodes with keyframes
+    each = max(1, jobs // max(1, len(numbers)))  # processes per episode, for episodes with keyframes
     with ThreadPoolExecutor(jobs) as pool:
         yield from pool.map(partial(_verify_in_process, folder, trust, limits, each), numbers)
 
@@ -103,7 +103,7 @@ def main(words: Sequence[str]) -> None:
     """Verifies one episode and prints the result as JSON.
 
     Args:
-        words: Folder, number, limits as JSON, number of processes, and packages to trust.
+        words: Folder, number of the episode, limits as JSON, number of processes, and trusted packages.
     """
     path, number, limits, jobs, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
@@ -114,13 +114,13 @@ def main(words: Sequence[str]) -> None:
 
 
 def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS, jobs: int = 1) -> Verdict:
-    """Simulates an episode again, with the files that are stored with it.
+    """Simulates an episode again with its stored files, and compares the result with the recording.
 
     Args:
-        folder: The folder.
-        number: The episode.
-        limits: Limits on it.
-        jobs: Number of processes at once if it has keyframes; with 1, it is this process.
+        folder: The folder of episodes.
+        number: Number of the episode.
+        limits: Limits on the episode.
+        jobs: Largest number of simultaneous processes, for an episode with keyframes.
     """
     try:
         episode = folder.read(number)
@@ -140,7 +140,7 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
 
 
 def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
-    """Returns whether an episode is the same, the comparison in words, and notes."""
+    """Simulates an episode; returns whether it equals the recording, the result in words, and notes."""
     with recorded_episode(folder, episode, limits.any_size) as (bag, recording):
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)
@@ -160,10 +160,10 @@ def _compare(
 
 
 def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
-    """Returns sentences on changed topics, and notes on topics that differ in the replay only.
+    """Returns messages about changed topics, and notes about topics that only differ in the replay.
 
-    The messages of a sensor with a memory, such as a zero that a service has set, may differ from those of the replay.
-    They are a fault unless the seal of their topic is whole.
+    A sensor may have an internal state, such as a zero offset set by a service. The sensor's messages may then differ
+    in the replay. Such a difference is a fault only if the topic's messages do not match a stored SHA-256.
     """
     seals = {topic: each[SEAL] for topic, each in episode.topics.items() if SEAL in each}
     found = seals_of(bag, any_size=any_size) if seals else {}

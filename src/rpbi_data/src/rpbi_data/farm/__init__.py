@@ -1,4 +1,4 @@
-"""Episodes made by a policy in many worlds at once."""
+"""Farm: makes many episodes at once, in each of which a policy acts in a simulated world."""
 
 from .policy import Policy
 

@@ -36,7 +36,7 @@ class FarmJob:
         seed: Seed of the farm; the seed of episode n is `(seed, n)`.
         ticks: Number of ticks after which an episode ends if its policy has not ended it.
         world_sha256: SHA-256 of the description of the world, see `World.describe`.
-        policy_sha256: SHA-256 of the file that defines the policy; empty if there is no such file.
+        policy_sha256: SHA-256 of the file that defines the policy; empty if the policy has no file.
         images: Whether the colour images of cameras are recorded.
         python_path: Additional folders in which the module of the policy is searched for.
         facts: Further attributes of each `Episode`; they are not part of the identity of the job.
@@ -115,7 +115,7 @@ def digest(text: str) -> str:
 
 
 def policy_digest(policy: type[Policy]) -> str:
-    """Returns the SHA-256 of the file that defines a policy, or an empty string if there is no such file."""
+    """Returns the SHA-256 of the file that defines a policy, or an empty string if the policy has no file."""
     file = inspect.getsourcefile(policy)
     return hashlib.sha256(read_file(file)).hexdigest() if file else ""
 

@@ -31,7 +31,7 @@ class Child:
     """A child process that makes episodes. It is killed when the present process ends.
 
     Args:
-        module: Module that the child process runs; it gets the number of a file handle, from which it reads the job.
+        module: Module that the child process runs; its first argument is the file handle from which it reads the job.
         job: Job that determines the episodes.
         folder: Folder of the episodes.
         slots: Maximum number of episodes requested from the child process at the same time.
@@ -112,7 +112,7 @@ class Pool:
         folder: Folder of the episodes.
         new_child: Function that starts a process.
         size: Maximum number of processes.
-        is_replaced: Whether a process that dies is replaced; if not, its death ends `run` with an error.
+        is_replaced: Whether a process that dies is replaced; otherwise, `run` ends with an error.
     """
 
     def __init__(

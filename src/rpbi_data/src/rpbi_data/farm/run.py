@@ -1,4 +1,4 @@
-"""The run of one episode."""
+"""Runs one episode: a policy acts in a world until the episode ends."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WORD = re.compile(r"\w[\w.-]{0,59}")
 
 
 class EpisodeWriter(Protocol):
-    """Writes the messages of a world."""
+    """Interface of objects that write the messages of an episode's world."""
 
     def start(self) -> None:
         """Writes the world before its first tick."""

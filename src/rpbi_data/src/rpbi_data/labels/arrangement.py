@@ -83,7 +83,7 @@ class Arrangement:
     def settle(self, random: np.random.Generator) -> None:
         """Resets the world, lets the objects fall from random poses, and simulates until they are at rest.
 
-        An object counts as at rest when it is farther than two radii of the area from the middle of the area.
+        An object that is farther than two radii of the area from the middle of the area counts as at rest, too.
 
         Raises:
             InterfaceError: If the objects do not come to rest in any of `ATTEMPTS` attempts.
@@ -123,7 +123,7 @@ class Arrangement:
 
     def _line_of_sight(self, random: np.random.Generator, intrinsics: Intrinsics) -> tuple[Array, Array]:
         """Returns a random position of a camera, and the point that the camera looks at, each of shape (3,) [m]."""
-        sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # so that all directions are equally likely
+        sine = random.uniform(*np.sin(np.radians(ELEVATION_DEG)))  # makes all directions equally likely
         azimuth = random.uniform(-math.pi, math.pi)
         cosine = math.sqrt(1.0 - sine**2)
         direction = np.array([cosine * math.cos(azimuth), cosine * math.sin(azimuth), sine])
@@ -145,9 +145,7 @@ class Arrangement:
         return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
-        """Puts the objects at random places of the area in random orientations, each at the first height without
-        contact.
-        """
+        """Puts each object at a random place of the area with a random orientation, as low as possible without contact."""
         names = [str(name) for name in random.permutation(list(self.models))]
         there = [body for body in self._world.bodies.values() if body.name not in self.models]
         for name in names:
@@ -169,9 +167,7 @@ class Arrangement:
         return bool(self._world.pb.getClosestPoints(body.body_id, other.body_id, GAP_M))
 
     def _motion(self, name: str) -> float:
-        """Returns the speed of an object relative to the limit below which an object is at rest; 0 if it is
-        far away.
-        """
+        """Returns an object's speed as a multiple of the speed limit for rest; 0 if the object is far away."""
         body = self._world.bodies[name]
         if np.linalg.norm(np.subtract(body.base_pose().position, self.middle)) > 2.0 * self._radius:
             return 0.0

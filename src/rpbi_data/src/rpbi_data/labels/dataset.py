@@ -92,7 +92,7 @@ def write_labelled_images(
 
 
 def _opened(file: str | Path) -> World:
-    import pybullet  # after rpbi, which keeps its greeting quiet
+    import pybullet  # after rpbi, which suppresses the greeting of PyBullet
 
     return World.from_file(str(file), connection_mode=pybullet.DIRECT)
 

@@ -72,9 +72,7 @@ class ObjectModel(NamedTuple):
         return text.getvalue()
 
     def _normals(self) -> Array:
-        """Returns the unit normal at each corner: the area-weighted mean of adjacent triangles' normals, shape
-        (n, 3).
-        """
+        """Returns the unit normal at each corner, shape (n, 3): the area-weighted mean over adjacent triangles."""
         a, b, c = (self.points[self.triangles[:, corner]] for corner in range(3))
         across = np.cross(b - a, c - a)
         normals = np.zeros_like(self.points)

@@ -22,7 +22,7 @@ Commands = Mapping[int, Mapping[int, RecordedCommand]]
 
 
 def add_later_bodies(world: World, commands: Commands) -> list[str]:
-    """Adds to a world the bodies that were added after the start of the recording, so that their shapes are known.
+    """Adds the bodies that were added after the start of the recording to a world, so that their shapes are known.
 
     Returns:
         Messages about bodies that cannot be added.
@@ -51,7 +51,7 @@ def links_of(
         world: The world, with all bodies that were in it at any time of the recording.
         at_start: Names of the bodies that were in the world at the start of the recording.
         commands: The recorded commands.
-        states: Table of `rpbi/state`, which has the times of ticks.
+        states: Table of `rpbi/state`, which contains the times of ticks; None without this topic.
         frames: TF frames at the times of the scene.
         joints: Tables of joint states, indexed by body name, for links that are not on TF.
 

@@ -36,7 +36,7 @@ def first_view(
     """Returns the camera that the world configures, or a camera that sees all links at their initial poses.
 
     Args:
-        own: Configured camera of PyBullet's window. The default counts as not configured, as it is below a floor.
+        own: Camera of PyBullet's window in the world's configuration. The default values count as not configured.
         links: Links to be seen.
         meshes: Meshes of the shapes that are meshes.
     """

@@ -1,4 +1,4 @@
-"""TF of a recording at the times of a page."""
+"""Poses of TF frames in a recording, at the times of a page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Frames:
 
     Args:
         tables: Tables of a bag, of which only `/tf` and `/tf_static` are read.
-        own: Frames of the simulator without their TF prefix. The prefix with which most of them are on TF is used.
+        own: Frames of the simulator, without TF prefix. The prefix with which most of these frames are on TF is used.
         times: Times of the poses, ascending, shape (n,) [s].
     """
 

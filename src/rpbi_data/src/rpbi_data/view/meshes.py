@@ -1,4 +1,4 @@
-"""Meshes of a page, with few enough triangles."""
+"""Reads the meshes of a page, and simplifies them if they have too many triangles."""
 
 from __future__ import annotations
 

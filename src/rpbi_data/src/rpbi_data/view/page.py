@@ -27,7 +27,7 @@ except ImportError as error:
 MAX_BYTES = 2_000_000
 """Size above which a page is made again with fewer times [bytes]."""
 MIN_TIMES = 10
-"""Number of times below which a page is not reduced."""
+"""Smallest number of times to which a page is reduced."""
 STILL = 1e-5
 """Change of a position component [m] or a quaternion component above which it is shown."""
 POSE_STEP, ARROW_STEP = 2.0**-15, 2.0**-12
@@ -180,7 +180,7 @@ def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
             for title, lines in scene.panels.items()
         ],
     }
-    content = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")  # a text may hold </script>
+    content = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")  # a text may contain </script>
     text = text.replace("<title>Viser</title>", f"<title>{html.escape(scene.title)}</title>", 1)
     text = text.replace("</head>", f"{HEAD}</head>", 1)
     end = text.rindex("</body>")

@@ -1,4 +1,4 @@
-"""The bag of an episode, written from its world without a ROS master."""
+"""Writes the bag of an episode directly from the episode's world, without a ROS master."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from rpbi_data.episodes.sample_messages import SampleMessages
 
 
 class EpisodeBag:
-    """The bag of an episode, with the topics that the recorder records by default.
+    """Writes the bag of an episode, with the topics that the recorder records by default.
 
-    It is a context manager that closes the bag. Rates that are configured in wall time apply to simulated time here.
+    Used as a context manager, which closes the bag. Rates in wall time are applied to simulated time here.
 
     Args:
         path: Path of the new bag file.
@@ -75,7 +75,7 @@ class EpisodeBag:
         self._write_images()
 
     def before_step(self) -> None:
-        """Writes the new commands, and writes targets also on the topics on which the node would receive them.
+        """Writes the new commands; targets are also written to the topics on which the node would receive them.
 
         Raises:
             InterfaceError: If a command cannot be recorded.
@@ -94,7 +94,7 @@ class EpisodeBag:
                         self._write(topic, target)
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes the samples of a tick, and those of its clock, images and state that are due."""
+        """Writes the samples of a tick, and clock, images and state if they are due at this tick."""
         tick = self._world.clock.tick
         if self._clock.is_due(tick):
             self._write_clock()
@@ -167,7 +167,7 @@ class _Images:
             raise InterfaceError(f"camera '{name}' has no image: {where}")
 
     def close(self) -> None:
-        """Ends the renderer."""
+        """Closes the renderer."""
         self._drawn.close()
 
 

@@ -47,7 +47,7 @@ class Cluster:
             self._require_head()
         try:
             ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
-        except Exception as error:  # Ray has many kinds
+        except Exception as error:  # Ray raises many kinds of errors
             raise ClusterError(address, f"cannot be used: {' '.join(str(error).split())}") from error
         self._address = ray.get_runtime_context().gcs_address
         self._job = ray.put(job)
@@ -59,7 +59,7 @@ class Cluster:
         self._numbers[self._task.remote(self._job, number)] = number
 
     def outcomes(self) -> Iterator[EpisodeOutcome]:
-        """Yields the outcome of an episode that is complete or becomes complete within `POLL_S`, if there is one.
+        """Waits at most `POLL_S` until an episode is complete, and yields the outcome of this episode.
 
         Raises:
             ClusterError: If the head node does not answer.

@@ -64,9 +64,7 @@ class Farm:
         self.job = FarmJob(path, policy, seed, length, world_sha256, policy_sha256, images, (here,))
 
     def missing(self, folder: EpisodeFolder, count: int) -> list[int]:
-        """Returns the numbers below `count` of the episodes that a folder lacks; it does not lack discarded
-        episodes.
-        """
+        """Returns the numbers below `count` that no episode in a folder has, including discarded episodes."""
         return sorted(set(range(count)) - folder.taken())
 
     @contextmanager

@@ -1,7 +1,7 @@
 """Makes episodes of a job, in this process, on a node of a Ray cluster, or in a child process.
 
-`python -m rpbi_data.farm.ros.maker FD` is the child process: it makes the episodes requested over the connection with
-file handle FD.
+The child process is started with `python -m rpbi_data.farm.ros.maker FD`. It makes the episodes that are requested over
+the connection with the file handle FD.
 """
 
 from __future__ import annotations
@@ -149,9 +149,7 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
 
 @lru_cache(maxsize=1)
 def _maker(job: FarmJob) -> EpisodeMaker:
-    """Returns the maker of a job; the last maker is cached, since a process on a node mostly gets the same job
-    again.
-    """
+    """Returns the maker of a job, and caches it, since a process on a node mostly gets the same job again."""
     return EpisodeMaker(job)
 
 
