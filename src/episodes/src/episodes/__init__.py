@@ -1,6 +1,4 @@
-"""Former names of episodes. The names in `__all__` are defined in `rpbi_data`, and are loaded from there when they are
-used.
-"""
+"""Former package of episodes, kept for existing imports. The names in `__all__` are loaded from `rpbi_data` on use."""
 
 from typing import Any
 

@@ -86,7 +86,7 @@ class Braking:
 
     A joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
     linear in the joint's velocity and acceleration at the start. The factors are precomputed for several lengths N, so
-    a braking is one matrix product. The shortest of these lengths that keeps the limits is used.
+    that a braking takes one matrix product. The shortest of these lengths that keeps the limits is used.
 
     Args:
         max_velocity: Largest speeds, shape (n,) [rad/s or m/s]; inf for a joint without a limit.

@@ -1,1 +1,1 @@
-"""Modules named as in the package `dmp` of the authors' release; see `motion_primitives`."""
+"""Modules with the names of the package `dmp` in the authors' original release; see `motion_primitives`."""

@@ -1,3 +1,3 @@
-"""Learning and planning through the services of the authors' release, with the release's class names."""
+"""Learns and plans motions through the services, and with the class name, of the authors' original release."""
 
 from motion_primitives.ros.dmp_services import DMPProcessor as DMPProcessor

@@ -1,4 +1,4 @@
-"""Former names of `rpbi_data.datasets.format`."""
+"""Former name of the module `rpbi_data.datasets.format`, kept for existing imports."""
 
 from rpbi_data.datasets.format import (
     IMAGES as IMAGES,

@@ -1,3 +1,3 @@
-"""Former names of `rpbi_data.farm`."""
+"""Former name of the package `rpbi_data.farm`, kept for existing imports."""
 
 from rpbi_data.farm import Policy as Policy

@@ -1,3 +1,3 @@
-"""Former names of `rpbi_data.farm.policy`."""
+"""Former name of the module `rpbi_data.farm.policy`, kept for existing imports."""
 
 from rpbi_data.farm.policy import Policy as Policy

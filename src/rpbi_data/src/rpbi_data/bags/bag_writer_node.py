@@ -64,7 +64,7 @@ class BagWriter:
     def end(self) -> None:
         """Makes `run` write the received messages, close the bag, and return.
 
-        Signal handlers may call this method, since it does not take a lock. It puts an item into the queue, because
+        Signal handlers may call this method, since it does not take a lock. The method puts an item into the queue:
         `SimpleQueue.get` of Python 3.11 may block forever if a signal interrupts it shortly before its timeout.
         """
         self._is_ended = True

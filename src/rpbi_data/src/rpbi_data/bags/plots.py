@@ -103,7 +103,7 @@ def _by_last_name(table: pd.DataFrame) -> Lines:
 
 
 def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
-    """Returns the components x, y and z of a vector, for the first prefix for which the table has them; or none."""
+    """Returns the columns x, y and z of a vector, with the first prefix that the table has; empty without a vector."""
     for prefix in prefixes:
         if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
             return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}

@@ -1,4 +1,4 @@
-"""Coarse images, which the export stores with videos, and checks that compare videos with them."""
+"""Coarse images, which the export stores with videos, and checks that compare videos with these images."""
 
 from __future__ import annotations
 

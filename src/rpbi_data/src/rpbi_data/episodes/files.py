@@ -1,4 +1,4 @@
-"""Stores copies of the files that a world names, called by their hash, and makes worlds that read these copies."""
+"""Stores copies of the files that a world names, and makes worlds that read these copies."""
 
 from __future__ import annotations
 

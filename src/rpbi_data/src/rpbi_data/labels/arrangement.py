@@ -145,7 +145,7 @@ class Arrangement:
         return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
-        """Puts each object at a random place of the area with a random orientation, as low as possible without contact."""
+        """Puts each object at a random place of the area, in a random orientation, above all contacts."""
         names = [str(name) for name in random.permutation(list(self.models))]
         there = [body for body in self._world.bodies.values() if body.name not in self.models]
         for name in names:

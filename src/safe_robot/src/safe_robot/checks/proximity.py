@@ -131,10 +131,10 @@ class Proximity:
             motion: The motion.
             suspects: Indices of the s pairs.
             rows: Indices of the k rows of the motion.
-            chosen: Indices of the rows to examine, in the array `rows`.
-            moved: Path length of each pair's relative motion from row 0 to each row, at most, shape (k, s) [m].
-            spare: Lower bounds of distance minus margin, shape (k, s) [m]; updated in place. A measured pair and row
-                has inf.
+            chosen: Indices into `rows` of the rows to examine.
+            moved: Upper bound of each pair's path length from row 0 to each row, shape (k, s) [m].
+            spare: Lower bounds of distance minus margin, shape (k, s) [m]; updated in place. inf marks the pairs and
+                rows that have been measured.
         """
         least_m = self._margin_m + ROUNDING_M
         frames = self._distances.frames(motion.position[rows[chosen]])
@@ -248,7 +248,7 @@ def _spread_bounds(bounds: np.ndarray, rows: np.ndarray, moved: np.ndarray) -> N
     Args:
         bounds: Lower bounds for s pairs, shape (k, s) [m]. Values of inf are not used for other rows.
         rows: Indices of the rows whose bounds are used, in ascending order.
-        moved: Path length of each pair's relative motion from row 0 to each row, at most, shape (k, s) [m].
+        moved: Upper bound of each pair's path length from row 0 to each row, shape (k, s) [m].
     """
     known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
     after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)

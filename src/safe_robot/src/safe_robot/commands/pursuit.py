@@ -39,10 +39,10 @@ def pursue(
     stop: np.ndarray,
     acceleration: np.ndarray | None = None,
 ) -> Pursuit:
-    """Returns the command for the next period that is nearest to a target from which all joints can still stop.
+    """Returns the range of commands for the next period, one end of which is the command nearest to the targets.
 
-    After the command, each joint can brake without passing its target. A joint that cannot avoid passing its target
-    gets the slowest command. The command respects the joint limits, but safety checks have not examined it.
+    After this command, each joint can still brake without passing its target. A joint that cannot avoid passing its
+    target gets the slowest command. Commands respect the joint limits, but are not yet examined by safety checks.
 
     The shortest braking from a new state may be longer than the rest of the present braking. It may then pass a target
     that the present braking does not pass. In this case, the joint continues the present braking.

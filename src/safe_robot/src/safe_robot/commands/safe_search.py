@@ -100,7 +100,7 @@ class SafeCommandSearch:
                 yield found
 
     def _add_missed(self, detour: CommandQP, command: np.ndarray, state: State) -> bool:
-        """Adds to `detour` the bounds that the braking after a command violates; returns whether there are any."""
+        """Adds to `detour` the bounds that the braking after a command violates; returns whether bounds were added."""
         stop = StoppingTrajectory(command, state, self._braking, self._period_s)
         at = stop.of(command)
         missed = [bound for bound in self._bounds(at, np.zeros_like(command), state) if bound.room < 0.0]

@@ -31,7 +31,7 @@ class ShapingConfig(ConfigModel):
 
 
 class Shaper:
-    """Follows the targets of n joints within their limits of velocity, acceleration and jerk.
+    """Computes commands that follow targets of n joints within the limits of velocity, acceleration and jerk.
 
     Targets within these limits are passed on unchanged. After a target that violates them, commands follow the targets
     like a critically damped second-order filter, within limits and without overshoot, until all joints have caught up.
@@ -52,8 +52,8 @@ class Shaper:
     def shaped(self, target: tuple[float, ...], state: State, stop: np.ndarray) -> tuple[float, ...]:
         """Returns the next command towards a target, n positions [rad or m].
 
-        A target that the joints can follow is returned, moved to the position limits. A target that jumps by more than
-        the option `reach`, or exceeds a position limit by more than `OVERSHOOT`, is returned unchanged.
+        A target that the joints can follow is returned, clipped to the position limits. A target that jumps by more
+        than the option `reach`, or exceeds a position limit by more than `OVERSHOOT`, is returned unchanged.
 
         Args:
             target: n positions [rad or m].

@@ -29,7 +29,7 @@ class GuardStatus:
 
     Args:
         guard: The guard.
-        subject: Topic of the targets, with which warnings begin.
+        subject: Name of the target topic; warnings begin with this name.
         as_diagnostic: Whether the status is a `DiagnosticStatus`; otherwise a `safe_robot/Status`.
     """
 
