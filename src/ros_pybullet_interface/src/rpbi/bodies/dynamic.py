@@ -23,7 +23,7 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class DynamicObjectConfig(BodyConfig):
-    """A dynamic object: physics moves it."""
+    """A dynamic object, which physics moves."""
 
     createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")

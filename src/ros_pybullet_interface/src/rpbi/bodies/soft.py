@@ -29,7 +29,7 @@ from .dynamics import link_index
 
 
 class SoftObjectConfig(BodyConfig):
-    """A soft body: it deforms."""
+    """A soft body, which deforms."""
 
     loadSoftBody: LoadSoftBody | None = Field(None, description="Its mesh and what it is made of; this or loadURDF.")
     loadURDF: LoadURDF | None = Field(None, description="A URDF with a `<deformable>`; this or loadSoftBody.")

@@ -43,7 +43,7 @@ class AttachmentPublisher:
 
 
 def attach(node: Any, request: AttachRequest) -> Answer:
-    """Attaches a link of an object to one of another, as a magnet or a tool changer does.
+    """Attaches a link of an object to a link of another object, as a magnet or a tool changer does.
 
     Raises:
         ConfigError: If a number in the request is invalid; the error lists all problems.
@@ -55,13 +55,13 @@ def attach(node: Any, request: AttachRequest) -> Answer:
 
 
 def detach(node: Any, request: SetStringRequest) -> Answer:
-    """Ends the attachment of that name."""
+    """Removes the attachment with a given name."""
     node.ask(lambda: node.simulation.world.detach(request.data))
     return Answer(True, f"detached '{request.data}'")
 
 
 def apply_wrench(node: Any, request: ApplyWrenchRequest) -> Answer:
-    """Has a force and a torque act on an object or a link, for a time or until replaced.
+    """Applies a force and a torque to an object or a link, for a given time or until the next request.
 
     Raises:
         ValueError: If the frame is unknown, or a number in the request is invalid.

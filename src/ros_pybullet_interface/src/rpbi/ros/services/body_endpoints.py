@@ -66,7 +66,7 @@ LONGEST_ZEROING_S = 60.0
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
-    """Sets the URDF frame of the base link to a pose in the world, at rest, even where other bodies are.
+    """Puts the base link's URDF frame at a pose in the world, at rest, even if other bodies are in the way.
 
     Raises:
         ValueError: If the pose is not finite, or the body follows a TF frame.
@@ -86,7 +86,7 @@ def force_torque_sensors(body: Body) -> list[str]:
 
 
 def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
-    """Zeroes that force-torque sensor to the mean of its next 100 samples.
+    """Zeroes a force-torque sensor to the mean of its next 100 samples.
 
     Raises:
         InterfaceError: If the simulation is stopped, the sensor is off, the robot is removed, or the samples take more

@@ -121,14 +121,14 @@ def _stop(node: NodeContext, _: Any) -> Answer:
 
 
 def _step(node: NodeContext, _: Any) -> Answer:
-    """Advances by a tick, if the world is stopped; the message is `tick N, stamp S` [s]."""
+    """Advances a stopped world by one tick; the message is `tick N, stamp S`, with the stamp in seconds."""
     tick, stamp_ns = node.ask(node.simulation.step)
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
     return Answer(True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
 
 
 def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances by many ticks, a million at most, as fast as possible, if the world is stopped."""
+    """Advances a stopped world by up to a million ticks, as fast as possible."""
     try:
         if request.steps > MAX_STEPS:
             raise InterfaceError(f"steps: expected at most {MAX_STEPS}, got {request.steps}; ask again for more")
@@ -140,7 +140,7 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
 
 
 def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances by many ticks as `rpbi/step_n` does, with inputs at ticks, for controllers in step with the world."""
+    """Advances by many ticks as `rpbi/step_n` does, and applies each input of the request before its tick."""
     waiting = sorted(map(planned_input, request.inputs), key=lambda each: each.tick)
     if waiting and waiting[-1].tick >= max(request.steps, 1):
         raise InterfaceError(f"{waiting[-1].slot}: expected a tick below {request.steps}, got {waiting[-1].tick}")
@@ -163,7 +163,7 @@ def _reset(node: NodeContext, _: Any) -> Answer:
 
 
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
-    """Returns a text that is the same for worlds in the same state."""
+    """Returns a hash of the world's state, which is the same for worlds in the same state at the same tick."""
     world, clock = node.simulation.world, node.simulation.world.clock
     return node.ask(
         lambda: (True, "", clock.tick, to_ros_time(clock.stamp_ns), world.resets, world.state_hash()), even_if_busy=True
@@ -171,7 +171,7 @@ def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, 
 
 
 def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
-    """Adds an object from a YAML file or text; the message has all problems of it."""
+    """Adds an object from a YAML file or text; if the YAML is wrong, the message lists all its problems."""
     asked = request.pybullet_object
     try:
         section = OBJECT_TYPES.get(asked.object_type)
@@ -223,7 +223,7 @@ def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], 
 
 
 def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Adds a camera: the keys of `rgbd_sensor` as YAML text, or `file` and the keys that differ."""
+    """Adds a camera from YAML text: the keys of `rgbd_sensor`, or `file` and keys that override those of the file."""
     data, file, _ = _read_text(node, request.data, "data")
     config = RgbdSensorConfig.parse(data, file)
     node.objects.add_camera(config, file)
@@ -244,7 +244,7 @@ def _find(node: NodeContext, name: str, key: str) -> str:
 
 
 def _remove_object(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Removes the object or camera of that name."""
+    """Removes the object or camera with a given name."""
     node.objects.remove(request.data)
     return Answer(True, f"removed '{request.data}'")
 
@@ -258,13 +258,13 @@ def _list_objects(node: NodeContext, _: Any) -> tuple[list[str], list[str]]:
 
 
 def _get_dynamics(node: NodeContext, request: GetObjectDynamicsRequest) -> tuple[bool, str, ObjectDynamics]:
-    """Returns mass, friction and the like of an object or a link."""
+    """Returns the dynamics of an object or a link, such as mass and friction."""
     present = node.ask(lambda: node.simulation.world.dynamics(request.object_name))
     return True, "", ObjectDynamics(**present._asdict())
 
 
 def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequest) -> Answer:
-    """Changes the values that differ from those of `get_dynamics`."""
+    """Changes the dynamics of an object or a link: all values that differ from the present ones."""
     world, asked = node.simulation.world, request.object_dynamics
     wanted = LinkDynamics(*(getattr(asked, field) for field in LinkDynamics._fields))
 
@@ -279,7 +279,7 @@ def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequ
 
 
 def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
-    """Changes the keys of `changeDynamics` that the YAML text in it has."""
+    """Changes the dynamics of an object or a link, by YAML text with keys of `changeDynamics`."""
     change = ChangeDynamics.parse(load_configs(request.config, "config", MAX_BYTES), "config")
     keys = ", ".join(change.kwargs())
     if not keys:
@@ -289,7 +289,7 @@ def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answe
 
 
 def _set_real_time_factor(node: NodeContext, request: SetRealTimeFactorRequest) -> Answer:
-    """Changes how fast the world runs; a reset leaves that as it is."""
+    """Changes the requested real-time factor; a reset keeps it."""
     before = node.simulation.real_time_factor
     node.ask(lambda: node.simulation.set_real_time_factor(request.real_time_factor))
     stamps = "" if node.simulation.world.clock.simulated else "; stamps are wall time and do not show it"
@@ -305,7 +305,7 @@ def _set_gravity(node: NodeContext, request: SetGravityRequest) -> Answer:
 
 
 def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Changes the keys of `setPhysicsEngineParameter` that the YAML text in it has, until the next reset."""
+    """Changes physics parameters until the next reset, by YAML text with keys of `setPhysicsEngineParameter`."""
     data = load_configs(request.data, "data", MAX_BYTES)
     if "fixedTimeStep" in data:
         raise InterfaceError("data: fixedTimeStep: cannot change while the world runs; write timeStep in the main file")
@@ -318,7 +318,7 @@ def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answe
 
 
 def _set_sensor_rate(node: NodeContext, request: SetSensorRateRequest) -> Answer:
-    """Changes how often a sensor is read, until the next reset; 0 is off."""
+    """Changes the rate of a sensor [Hz] until the next reset; 0 is off."""
     world, wanted = node.simulation.world, request.sensor.removeprefix("/").removeprefix("rpbi/")
 
     def change() -> float:

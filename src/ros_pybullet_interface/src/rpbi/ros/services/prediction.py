@@ -149,7 +149,7 @@ class Predictor:
 
 
 def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.Time, list[PredictionMessage]]:
-    """Predicts the motion from the present state with each of some candidates; the world continues."""
+    """Predicts the motion from the present state for several candidates (sequences of inputs); the world continues."""
     job = _job(node, request)
     candidates = [[planned_input(each) for each in candidate.inputs] for candidate in request.candidates]
     tick, stamp_ns, predictions = node.predictor.predict(candidates, job)
@@ -160,7 +160,7 @@ def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.T
 
 
 def cancel_prediction(node: Any, _: Any) -> Answer:
-    """Ends the predictions that are under way or wait; `success` is false if there are none."""
+    """Ends the running and waiting predictions; `success` is false if no prediction is running."""
     has_cancelled = node.predictor.cancel()
     return Answer(has_cancelled, "cancelled" if has_cancelled else "no prediction is under way")
 

@@ -29,7 +29,7 @@ from .robot_ik import arrival, solve_for_robot
 
 
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """Moves the joints that are named, in `duration` [s]; answers at the end.
+    """Moves the named joints to positions in `duration` [s], and answers at the end of the motion.
 
     A joint whose target is beyond its limits stops at the limit, and `success` is false.
     """
@@ -40,7 +40,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
 
 
 def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """Moves all joints to where they started, in `duration` [s]; answers at the end.
+    """Moves all joints to their start positions in `duration` [s], and answers at the end of the motion.
 
     The state in the request is ignored.
     """
@@ -48,12 +48,12 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
 
 
 def move_to_init_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """The same as `move_to_initial_joint_state`, by its name in the documentation of the authors' release."""
+    """Does the same as `move_to_initial_joint_state`, under the name in the documentation of the authors' release."""
     return move_to_initial_joint_state(context, request)
 
 
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
-    """Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.
+    """Moves a link to a pose by inverse kinematics in `duration` [s], and answers at the end of the motion.
 
     Without a solution, the robot does not move.
     """
@@ -69,7 +69,7 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
 
 
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
-    """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
+    """Switches the motors to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
 
     An empty text keeps the mode; the answer then has the present mode.
 
@@ -94,7 +94,7 @@ def stop_motion(context: BodyContext, _: Any) -> Answer:
 
 
 def set_motor_gains(context: BodyContext, request: SetMotorGainsRequest) -> Answer:
-    """Changes position and velocity gains of the joints that are named.
+    """Changes the position and velocity gains of the named joints.
 
     Raises:
         UnknownNameError: If the robot lacks one of the joints.
@@ -120,7 +120,7 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
 
 
 def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
-    """Sets targets as the topic `joint_states/target` does; it answers when they count from the next tick on.
+    """Sets joint targets as the topic `joint_states/target` does, and answers once the next tick will use them.
 
     It is for controllers that step the world: a message on the topic could arrive after the next requested step.
 
@@ -144,7 +144,7 @@ def controllers(body: Body) -> list[str]:
 
 
 def switch_controllers(context: BodyContext, request: SwitchControllersRequest) -> Answer:
-    """Stops and starts controllers of the robot, all at one tick.
+    """Stops and starts controllers of the robot at the same tick.
 
     Joints that are no longer driven by a controller hold their present positions.
 
@@ -161,7 +161,7 @@ def switch_controllers(context: BodyContext, request: SwitchControllersRequest) 
 
 
 def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
-    """Changes keys of that controller, such as `{stiffness: 200}`; the others stay.
+    """Changes keys of a controller, such as `{stiffness: 200}`; its other keys stay the same.
 
     An active controller starts again from the robot's present state.
 

@@ -35,7 +35,7 @@ def moved_by_ik(body: Body) -> tuple[str, ...]:
 def inverse_kinematics(
     context: BodyContext, request: CalculateInverseKinematicsRequest
 ) -> tuple[bool, str, JointState]:
-    """Returns joint positions that bring a link to a pose; moves nothing.
+    """Returns joint positions that bring a link to a pose, without moving the robot.
 
     The answer has the positions of all joints that a motor can move. If the pose is out of reach, they bring the link
     as near as possible; that is a success unless the robot is configured as `strict`.

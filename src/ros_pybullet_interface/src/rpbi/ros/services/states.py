@@ -32,12 +32,12 @@ def state_folder() -> Path:
 
 
 def save(node: Any, request: SetStringRequest) -> Answer:
-    """Saves the state of the world in a file, from which it can be restored."""
+    """Saves the state of the world in a file, which `rpbi/restore` reads."""
     return _write(node, request.data, lambda: node.ask(node.simulation.world.save))
 
 
 def save_keyframe(node: Any, request: SetStringRequest) -> Answer:
-    """Makes a keyframe, and saves the state there: the file has no commands, and is restored at once."""
+    """Makes a keyframe and saves it in a file, which is restored at once, without simulating again."""
     return _write(node, request.data, lambda: node.ask.wait_for(node.ask(node.keyframes.save)))
 
 
@@ -54,7 +54,7 @@ def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
 
 
 def restore(node: Any, request: SetStringRequest) -> Answer:
-    """Restores the state of a file of this world, by simulating again from its start or keyframe; stamps continue.
+    """Restores a saved state of this world by simulating again from the file's start or keyframe; stamps continue.
 
     The node answers other requests meanwhile. `rpbi/stop` aborts the restoration and resets the world.
     """

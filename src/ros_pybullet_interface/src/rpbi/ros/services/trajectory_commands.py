@@ -51,7 +51,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Returns where joints will be at a time."""
+    """Returns the desired positions, velocities and accelerations of the follower's joints at a given time."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 

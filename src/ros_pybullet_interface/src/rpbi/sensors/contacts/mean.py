@@ -12,7 +12,7 @@ from .contacts import ContactsSensor
 
 
 class MeanContactsSensor(ContactsSensor):
-    """Contacts of a body as means over all ticks since the last sample, one for each two links that touched."""
+    """Contacts of a body, averaged over all ticks since the last sample, with one point for each pair of links."""
 
     keeps_state = True
 

@@ -22,7 +22,7 @@ class ViconConfig(TrackingSensorConfig):
 
 
 class ViconSensor(BodySensor):
-    """Pose of a link in the world, as a motion capture system measures it; no samples while it is occluded.
+    """Pose of a link in the world, as a motion capture system measures it, without samples during occlusions.
 
     Attributes:
         tf_frames: The TF frame that is reported.
