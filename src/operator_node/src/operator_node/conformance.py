@@ -1,4 +1,4 @@
-"""Tests that every device passes, for pytest; derive from `DeviceConformance` to test a device of your own."""
+"""Tests for pytest that every device must pass. To test your own device, derive a class from `DeviceConformance`."""
 
 import contextlib
 import random
@@ -14,19 +14,19 @@ from .device import Device, DeviceClosedError, DeviceError, Reading
 from .devices import DEVICES
 
 PATIENCE_S = 60.0
-"""Longest time to wait for an expected event on a busy computer [s]; the test fails after it."""
+"""Longest time to wait for an expected event on a busy computer [s]. Afterwards the test fails."""
 STEP_S = 0.01
 READINGS_TO_SEE = 20
 """Number of feed steps that are checked for jumps after a device has come back."""
 
 
 class Reader:
-    """A feed with a device that records all published readings.
+    """Runs a `DeviceFeed` with a device, and records all published readings.
 
     Attributes:
         device: The device.
-        feed: The feed.
-        readings: The readings, the newest last.
+        feed: The feed that reads the device.
+        readings: All published readings, the newest last.
     """
 
     def __init__(self, name: str, device: Device) -> None:
@@ -58,7 +58,7 @@ class Reader:
         return [*self.device.axes].index(axis) in self.feed.free_axes
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Steps the feed until a condition holds; fails after `PATIENCE_S`."""
+        """Steps the feed until a condition holds. Fails after `PATIENCE_S`; `what` describes the condition."""
         end_s = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < end_s, f"timed out waiting until {what}; the last readings: {self.readings[-5:]}"
@@ -66,20 +66,20 @@ class Reader:
 
 
 class DeviceConformance:
-    """Tests that every device passes.
+    """Base class with the tests that every device must pass.
 
-    A subclass names the device and moves it from outside, either the real one or an emulator of its hardware, never
-    through its Python object. A subclass leaves out whatever its device cannot do: `moves`, `can_be_unplugged`,
-    `garbage`.
+    A subclass names the device and implements how to move it. The motion must come from the real hardware or from an
+    emulator of the hardware, not from the device's Python object. A subclass does not override what its device cannot
+    do, such as `moves`, `presses` or `garbage`.
 
     Attributes:
-        device_name: Name of the device: one of the table, or `"their_package.module:Class"`.
+        device_name: Name of a device in the table `DEVICES`, or `"their_package.module:Class"`.
         options: Options of the device.
-        moves: Names of axes that move in both directions.
+        moves: Names of axes that can move in both directions.
         presses: Names of buttons that can be pressed.
         can_be_unplugged: Whether `unplug` and `plug` are implemented.
-        pieces_of_garbage: Number of invalid inputs to send.
-        shows_what_is_held: Whether the device reports axes that are held while it is plugged in.
+        pieces_of_garbage: Number of invalid inputs that the test sends.
+        shows_what_is_held: Whether the device reports an axis that is held while the device is plugged in.
     """
 
     device_name: ClassVar[str]
@@ -90,14 +90,14 @@ class DeviceConformance:
     pieces_of_garbage: ClassVar[int] = 100
     shows_what_is_held: ClassVar[bool] = False
 
-    # --- Overridden by a subclass.
+    # --- Methods that a subclass overrides.
 
     def make(self) -> Device:
-        """Returns a new device; whatever moves it is ready."""
+        """Returns a new device. A subclass also starts the emulator that moves the device."""
         return DEVICES.make(self.device_name, self.options)
 
     def move(self, axis: str, share: float) -> None:
-        """Holds an axis at a share of its full range, in [-1, 1]; all other axes are at rest."""
+        """Moves an axis to a share of its full range, in [-1, 1], and holds it there. All other axes are at rest."""
         raise NotImplementedError
 
     def press(self, button: str, is_down: bool) -> None:
@@ -116,11 +116,11 @@ class DeviceConformance:
     def clean_up(self) -> None:
         """Releases everything that `make` has started."""
 
-    # --- Used by the tests.
+    # --- Fixtures and helper of the tests.
 
     @pytest.fixture
     def device(self) -> Iterator[Device]:
-        """A new device; it is closed after the test."""
+        """Yields a new device, and closes the device after the test."""
         device = self.make()
         try:
             yield device
@@ -130,14 +130,14 @@ class DeviceConformance:
 
     @pytest.fixture
     def reader(self, device: Device) -> Reader:
-        """A reader with an open device whose axes are known to be at rest."""
+        """Returns a reader with an open device that has reported its axes at rest."""
         reader = Reader(self.device_name, device)
         reader.until(lambda: bool(reader.readings), "the device is open")
         self.settle(reader)
         return reader
 
     def settle(self, reader: Reader) -> None:
-        """Steps the feed until all axes are known to be at rest."""
+        """Steps the feed until the device has reported all axes in `moves` at rest."""
         for axis in self.moves:
             reader.until(lambda: reader.is_free(axis), f"axis '{axis}' is known to be at rest")  # noqa: B023
 
@@ -152,9 +152,7 @@ class DeviceConformance:
 
     @pytest.mark.parametrize("share", (1.0, -1.0))
     def test_each_axis_moves_in_both_directions_and_back(self, reader: Reader, share: float) -> None:
-        """The axis has the sign of the motion, all others stay at rest, and the axis returns to rest when it is
-        released.
-        """
+        """Each axis has the sign of its motion, and returns to rest when released. All other axes stay at rest."""
         rest = reader.device.at_rest().axes
         for axis in self.moves:
             self.move(axis, share)
@@ -165,7 +163,7 @@ class DeviceConformance:
             reader.until(lambda: reader.last.axes == rest, f"axis '{axis}' is at rest")
 
     def test_each_button_goes_down_and_up(self, reader: Reader) -> None:
-        """No other button changes."""
+        """Each button can be pressed and released, and no other button changes."""
         for button in self.presses:
             index = [*reader.device.buttons].index(button)
             self.press(button, True)
@@ -175,7 +173,7 @@ class DeviceConformance:
             reader.until(lambda: not any(reader.last.buttons), f"button '{button}' is up")
 
     def test_it_may_be_closed_twice_and_opened_again(self, device: Device) -> None:
-        """A device that was never open may be closed, too."""
+        """A device can be closed repeatedly, even before it is opened. A closed device raises an error when read."""
         for _ in range(2):
             device.close()
             device.close()
@@ -185,13 +183,13 @@ class DeviceConformance:
             device.read(0.0)
 
     def test_device_at_rest_reports_nothing(self, reader: Reader) -> None:
-        """An untouched device reports nothing new, and reading with a timeout of 0 does not wait."""
+        """An untouched device stops reporting new readings, so that `read(0.0)` returns None."""
         end_s = time.monotonic() + PATIENCE_S
         while any(reader.device.read(0.0) is not None for _ in range(3)):
             assert time.monotonic() < end_s, "it keeps reporting readings at rest"
 
     def test_when_it_is_closed_the_last_reading_is_at_rest(self, reader: Reader) -> None:
-        """Holds for any input that is held; closing again publishes no further reading."""
+        """Closing publishes one last reading at rest, even if an axis is held. Closing again publishes nothing."""
         for axis in self.moves[:1]:
             self.move(axis, 1.0)
             reader.until(lambda: not reader.is_at_rest, "it moves")
@@ -201,7 +199,7 @@ class DeviceConformance:
             assert len(reader.readings) == count + 1 and reader.is_at_rest
 
     def test_missing_device_raises_an_error_with_a_reason(self, device: Device) -> None:
-        """The error is a plain DeviceError, since the device may appear later."""
+        """An absent device raises a DeviceError with a reason, not a DeviceClosedError, since it may appear later."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")
         self.unplug()
@@ -212,7 +210,7 @@ class DeviceConformance:
         device.open()
 
     def test_device_rests_while_unplugged_and_returns_without_a_jump(self, reader: Reader) -> None:
-        """The device is unplugged and plugged in while an axis is held; the axis moves again once it was released."""
+        """A device is unplugged and plugged in while an axis is held. The axis is at rest until it is released."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")
         axis = self.moves[0]
@@ -238,12 +236,12 @@ class DeviceConformance:
         reader.until(lambda: reader.axis(axis) > 0.5, "it moves again")
 
     def test_garbage_is_refused_and_counted(self, reader: Reader) -> None:
-        """No exception escapes, every reading is valid, and refusals are counted by reason."""
+        """Invalid inputs raise no exception and cause no invalid reading. They are counted, keyed by reason."""
         if type(self).garbage is DeviceConformance.garbage:
             pytest.skip(f"garbage cannot be sent to '{self.device_name}' from outside")
         generator = random.Random(1)
         for _ in range(self.pieces_of_garbage):
-            with contextlib.suppress(OSError):  # it has closed the connection
+            with contextlib.suppress(OSError):  # the device has closed the connection
                 self.garbage(generator)
             reader.feed.step(0.0)
         reader.until(lambda: sum(reader.feed.refused.values()) > 0, "something is refused")

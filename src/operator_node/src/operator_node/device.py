@@ -1,4 +1,4 @@
-"""Interface of all input devices."""
+"""Interface of the input devices."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from custom_ros_tools.schema import ConfigModel
 
 @dataclass(eq=False)
 class DeviceError(InterfaceError):
-    """A device is absent, has disconnected or sends invalid data; `reason` states which, and a remedy."""
+    """A device is absent, has disconnected or sends invalid data. `reason` describes the problem, and a remedy."""
 
     device: str
     reason: str
@@ -21,7 +21,7 @@ class DeviceError(InterfaceError):
 
 
 class DeviceClosedError(DeviceError):
-    """The user has closed the device, for example its window; it must not be opened again."""
+    """The user has closed the device, for example its window. It must not be opened again."""
 
 
 class Reading(NamedTuple):
@@ -30,8 +30,8 @@ class Reading(NamedTuple):
     Attributes:
         axes: A number in [-1, 1] for each axis of the device.
         buttons: 1 for each button that is held, 0 for the others.
-        events: Native events of the device since the last reading, in order; for topics of its own.
-        refused: Reason for each invalid input since the last reading.
+        events: Device-specific events since the last reading, in order, for the topics of `Device.ros_topics`.
+        refused: Reason for each invalid input that was refused since the last reading.
     """
 
     axes: tuple[float, ...]
@@ -41,19 +41,19 @@ class Reading(NamedTuple):
 
 
 class Device(ABC):
-    """An input device; one thread, the main thread, opens, reads and closes it.
+    """Base class of the input devices. The same thread, the main thread, opens, reads and closes a device.
 
-    Its options are its `Config`, read from YAML or from parameters of its node; they are the only argument of its
-    constructor. A device only reports the state of its hardware. `DeviceFeed` does the rest: it retries, repeats,
-    stamps and publishes the last reading when a device has gone; it checks that values are finite and within [-1, 1],
-    and prevents jumps.
+    The constructor of a device has one argument, the options of type `Config`, which come from YAML or from the
+    parameters of the device's node. A device only reports the state of its hardware. `DeviceFeed` does the rest: it
+    opens the device again after failures, checks that values are finite and within [-1, 1], repeats readings, and
+    prevents jumps. When a device disconnects, `DeviceFeed` publishes a last reading at rest.
 
     Attributes:
-        Config: Model of its options.
-        axes: Names of its axes, in the order of the message; some devices know them only once they are open.
-        buttons: Names of its buttons, likewise.
-        ros_topics: `module:Class` that publishes its events on topics of their own and subscribes to its inputs; empty
-            if the device has no topics other than `sensor_msgs/Joy`.
+        Config: Model of the device's options.
+        axes: Names of the axes, in the order of `Reading.axes`. Some devices know the axes only after `open`.
+        buttons: Names of the buttons, in the order of `Reading.buttons`. Some devices know them only after `open`.
+        ros_topics: `module:Class` of a subclass of `DeviceTopics`, which publishes the device's events and subscribes
+            to its inputs; empty if the device has no topics other than `sensor_msgs/Joy`.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -63,25 +63,25 @@ class Device(ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Connects to the device; reconnects after `close`.
+        """Connects to the device. May be called again after `close`.
 
         Raises:
-            DeviceError: If it is absent. It may appear later: the caller tries again.
-            MissingDependency: If it needs a library that is not installed.
+            DeviceError: If the device is absent. The caller tries again later.
+            MissingDependency: If the device needs a library that is not installed.
         """
 
     @abstractmethod
     def read(self, timeout_s: float) -> Reading | None:
-        """Returns the next new reading, or None if there is none within the timeout.
+        """Waits for a new reading and returns it; None if no new reading arrives within the timeout.
 
-        The first reading after `open` is the present state, as soon as it is known.
+        The first reading after `open` is the present state, as soon as the device knows it.
 
         Args:
             timeout_s: Longest time to wait [s]; 0 does not wait.
 
         Raises:
-            DeviceError: If the device has gone; the caller closes it then.
-            DeviceClosedError: If the user has closed it.
+            DeviceError: If the device has disconnected. The caller then closes the device.
+            DeviceClosedError: If the user has closed the device.
         """
 
     @abstractmethod
@@ -89,9 +89,10 @@ class Device(ABC):
         """Releases the device; may be called at any time, and repeatedly."""
 
     def at_rest(self) -> Reading:
-        """Returns the reading of an untouched device: 0 everywhere, unless its hardware differs.
+        """Returns the reading of an untouched device. All values are 0, unless the hardware differs.
 
-        It is published last when the device goes or is closed; its events release all keys and buttons that are held.
+        This reading is published last when the device disconnects or is closed. Its events report the release of all
+        held keys.
         """
         return Reading((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
@@ -99,5 +100,5 @@ class Device(ABC):
         """Renders a force as well as the device can, for example by rumbling.
 
         Args:
-            force: x, y, z, each in [-1, 1], as a share of the largest force of the device.
+            force: Components x, y, z, each in [-1, 1], as shares of the device's largest force.
         """

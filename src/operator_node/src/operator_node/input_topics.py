@@ -1,4 +1,4 @@
-"""Topics of user input: stamps, and subscriptions that detect that their input has ceased."""
+"""Stamps for user input, and subscriptions that detect when their input ceases."""
 
 import time
 from collections.abc import Callable
@@ -11,20 +11,21 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.schema import ConfigModel, Unit
 
 SecondsOrOff = Annotated[float, Field(ge=0), Unit("s")]
-"""A time [s]; 0 means forever."""
+"""Type of a time-out [s]; 0 means no time-out."""
 QUEUE_SIZE = 10
-"""Largest number of queued messages; older input is useless."""
+"""Largest number of queued messages. Older input is useless, and dropped."""
 
 
 def stamp() -> rospy.Time:
-    """Returns the present ROS time; wall time if simulated time has not started."""
+    """Returns the present ROS time, or wall time if simulated time has not started."""
     now = rospy.Time.now()
     return rospy.Time.from_sec(time.time()) if now.is_zero() else now
 
 
 def has_begun() -> bool:
-    """Returns whether ROS time has started; for TF, transforms with earlier wall stamps would be newer than all later
-    ones.
+    """Returns whether ROS time has started.
+
+    Before, transforms must not be sent: with stamps in wall time, TF would prefer them to all later transforms.
     """
     return not rospy.Time.now().is_zero()
 
@@ -42,13 +43,13 @@ class InputParameters(ConfigModel):
 class WatchedInput:
     """Subscribes to a topic, and detects when its input has ceased.
 
-    It has ceased when the topic has no publisher any more, or no message has arrived within the timeout.
+    The input has ceased when the topic has no publisher any more, or no message has arrived within the timeout.
 
     Args:
-        topic: The topic.
-        message_type: Its type.
-        on_message: Called with each message.
-        timeout_s: The timeout [s]; 0 disables it.
+        topic: Name of the topic.
+        message_type: Message type of the topic.
+        on_message: Function that is called with each message.
+        timeout_s: The timeout [s]; 0 disables the timeout.
     """
 
     def __init__(
@@ -65,7 +66,10 @@ class WatchedInput:
         return str(self._subscriber.resolved_name)
 
     def has_ceased(self, consequence: str) -> bool:
-        """Returns whether the input has ceased; False before its first message. If so, warns about the consequence."""
+        """Returns whether the input has ceased, and logs a warning with the consequence if so.
+
+        Returns False before the first message.
+        """
         if self._last_s is None:
             return False
         if self._subscriber.get_num_connections() == 0:

@@ -1,4 +1,4 @@
-"""`interactive_target_node.py`: a TF frame that is dragged and turned in RViz."""
+"""`interactive_target_node.py`: broadcasts a TF frame that the user drags and rotates in RViz."""
 
 import math
 
@@ -17,7 +17,7 @@ NAMESPACE = "ik_target"
 """Namespace of the topics: RViz's display InteractiveMarkers expects `/ik_target/update`."""
 HALF_TURN = math.sqrt(0.5)
 AXES = {"x": (HALF_TURN, 0.0, 0.0), "y": (0.0, 0.0, HALF_TURN), "z": (0.0, HALF_TURN, 0.0)}
-"""For each axis, x, y, z of the quaternion that turns a handle's own x axis there; w equals HALF_TURN."""
+"""For each axis, components x, y, z of the quaternion that orients a handle along this axis. w equals HALF_TURN."""
 
 
 class InteractiveTargetConfig(ConfigModel):
@@ -32,7 +32,7 @@ class InteractiveTargetConfig(ConfigModel):
 
 
 class InteractiveTarget:
-    """Shows handles and broadcasts the frame at their pose.
+    """Shows handles in RViz, and broadcasts the frame at the pose of the handles.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -57,7 +57,7 @@ class InteractiveTarget:
 
 
 def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
-    """Returns handles that move the frame along, and rotate it about, each of its axes."""
+    """Returns an interactive marker with handles that translate the frame along its axes and rotate it about them."""
     marker = InteractiveMarker(name=config.child_frame_id, scale=config.size_m)
     marker.header.frame_id = config.parent_frame_id
     marker.pose = as_pose(transform_message(config.position, config.quat_xyzw))

@@ -1,4 +1,4 @@
-"""Public import path of the node that maps a device; users derive from it."""
+"""Public import path of `OperatorNode`, from which users derive nodes that map a device to signals."""
 
 from operator_node.mappings.operator_node import OperatorNode, main
 

@@ -1,4 +1,4 @@
-"""`teleop_tf_node.py`: a TF frame that a user moves."""
+"""`teleop_tf_node.py`: moves and broadcasts a TF frame by the velocity signals of a user."""
 
 import threading
 import time
@@ -37,7 +37,9 @@ class TeleopParameters(StartParameters):
 
 
 class TeleopTf:
-    """Moves a frame by `operator_node/signal` while it is switched on; broadcasts it meanwhile, and at each reset.
+    """Moves a frame by `operator_node/signal`, and broadcasts the frame, while the teleoperation is switched on.
+
+    A reset broadcasts the frame in any case.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.
@@ -102,7 +104,7 @@ class TeleopTf:
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
-        """Broadcasts unless ROS time is paused: TF ignores a second transform with the same stamp, and warns."""
+        """Broadcasts the frame unless ROS time is paused. TF warns about a second transform with the same stamp."""
         if rospy.Time.now() != self._broadcast_at:
             self._broadcast()
 
@@ -122,7 +124,7 @@ class TeleopTf:
             roll, pitch, yaw = rpy_of(quat_in(transform)).tolist()
             with self._lock:
                 self._teleop.reset(TeleopPose((x, y, z), (roll, pitch, yaw)))
-                if self._is_on or self._config.broadcast_always:  # otherwise no other follows soon
+                if self._is_on or self._config.broadcast_always:  # a periodic broadcast follows if the stamp is not new
                     self._broadcast_once_a_stamp()
                 else:
                     self._broadcast()

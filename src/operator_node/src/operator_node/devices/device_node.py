@@ -27,7 +27,7 @@ DIAGNOSTICS_HZ = 1.0
 LAST_READING_S = 2.0
 """Longest time that a node waits at shutdown until its last reading is published [s]."""
 SENDING_S = 0.1
-"""Time that the node then waits until the last reading is sent [s]."""
+"""Time that the node waits afterwards, so that ROS can send the last reading [s]."""
 
 
 class DeviceParameters(ConfigModel):
@@ -74,7 +74,7 @@ class DeviceNode:
         rospy.on_shutdown(self._end)
 
     def run(self) -> None:
-        """Reads the device until ROS shuts down or the user closes the device; the latter shuts down the node."""
+        """Reads the device until ROS shuts down or the user closes the device, and then shuts down the node."""
         try:
             self._feed.run(self._is_ending.is_set)
         finally:

@@ -1,7 +1,7 @@
 """Topics of devices in addition to `joy`: the base class, and the topics of joystick, keyboard and 6-D mouse.
 
-Most topics are named as in ROS's `joy_node`, as in the keyboard driver that the authors' release uses, and as in
-`spacenav_node`, respectively.
+Most topics of the joystick are named as in ROS's `joy_node`, those of the 6-D mouse as in `spacenav_node`. The topics
+of the keyboard are named as in the keyboard driver that the authors' release uses.
 """
 
 import math
@@ -31,14 +31,14 @@ class DeviceTopics:
 
     Args:
         device: The device, which may only be changed through `post`.
-        post: Schedules an action in the thread that reads the device.
+        post: Function that schedules an action in the thread that reads the device.
     """
 
     def __init__(self, device: Device, post: Callable[[Callable[[], None]], None]) -> None:
         self.device, self.post = device, post
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes what the device's own topics need from a reading; publishes nothing in this base class."""
+        """Publishes the device-specific data of a reading. The base class publishes nothing."""
 
 
 class JoystickTopics(DeviceTopics):

@@ -1,4 +1,4 @@
-"""A joystick or gamepad."""
+"""Input device joystick or gamepad, read through SDL."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""A keyboard, whose keys act as axes and buttons."""
+"""Input device keyboard, whose keys act as axes and buttons."""
 
 import sys
 import time

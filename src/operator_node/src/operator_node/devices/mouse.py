@@ -1,4 +1,4 @@
-"""A mouse that is dragged in a window."""
+"""Input device mouse, which is dragged in a window."""
 
 import math
 import time
@@ -16,7 +16,7 @@ RADIUS_PX = 12
 BUTTONS = {1: 0, 2: 1, 3: 2}
 """Maps X's number of each button to the index of the button in a reading."""
 WHEEL_STEPS = {4: 1.0, 5: -1.0}
-"""Maps X's button number for each direction of the wheel to the sign of the motion."""
+"""Maps X's button number of each direction of the wheel to the sign of the wheel's motion."""
 DRAGGING = 0x100
 """Bit of an event's state that is set while the left button is held."""
 HELP = "drag: x, y    wheel: z    release: stop"

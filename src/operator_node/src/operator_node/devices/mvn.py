@@ -1,4 +1,4 @@
-"""Motion capture with Xsens MVN as an input device, whose axes are the hand displacements of the first person."""
+"""Input device for motion capture with Xsens MVN. Its axes are the hand displacements of person 0."""
 
 import errno
 import logging
@@ -21,9 +21,9 @@ logger = logging.getLogger(__name__)
 
 
 class HandAxes:
-    """Displacements of both hands, forward, left and up, since the frame in which they were engaged.
+    """Computes the displacements of both hands, forward, left and up, since the frame in which they were engaged.
 
-    The displacements are measured relative to the pelvis and its heading, in arm lengths.
+    The displacements are relative to the pelvis and its heading. Their unit is the arm's length.
     """
 
     def __init__(self) -> None:
@@ -35,9 +35,7 @@ class HandAxes:
         self._engaged = None
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
-        """Returns the values of `AXES`, each in [-1, 1]; if the hands are disengaged, engages them and returns
-        zeros.
-        """
+        """Returns the values of `AXES`, each in [-1, 1]. Disengaged hands are engaged, and their values are 0."""
         places = _places(frame)
         if self._engaged is None:
             lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)
@@ -56,9 +54,11 @@ class Mvn(Device):
     """People whose motion MVN streams.
 
     The axes are the displacements of the right and the left hand of person 0, forward, left and up, since the first
-    frame. They are measured relative to the pelvis and its heading, in arm lengths. The events are those of
-    `Receiver.poll` except `Refused`. The device is open as soon as it listens, whether or not there is a sender. When
-    the stream ceases, the device reports a `Silence` and a reading at rest; the next frame is then the new first frame.
+    frame. They are relative to the pelvis and its heading, and their unit is the arm's length. The events are those of
+    `Receiver.poll` except `Refused`. The device is open as soon as it listens, even without a sender.
+
+    When the stream ceases, the device reports a `Silence` and a reading at rest. The next frame is then the new first
+    frame.
     """
 
     Config = MvnConfig

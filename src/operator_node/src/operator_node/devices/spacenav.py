@@ -1,4 +1,4 @@
-"""A 6-D mouse that is read from spacenavd or from another daemon with the same protocol."""
+"""Input device 6-D mouse, read from spacenavd or from another daemon with the same protocol."""
 
 import contextlib
 import math
@@ -36,7 +36,7 @@ MAX_BUTTONS = 64
 MAX_REFUSED = 8
 """Number of consecutive invalid packets after which the protocol counts as unknown."""
 POLL_S = 0.001
-"""Time that one unit of `static_count_threshold` stands for [s]."""
+"""Time that corresponds to one unit of `static_count_threshold` [s]."""
 
 Scale = Annotated[float | Vec3, Field()]
 
@@ -137,7 +137,7 @@ class Spacenav(Device):
     # --- The connection.
 
     def _negotiate(self) -> int:
-        """Requests version 1 of the protocol and returns the version in use: 0 if the daemon does not answer."""
+        """Requests version 1 of the protocol, and returns the version in use. It is 0 if the daemon does not answer."""
         self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while len(self._received) < WORD.size:
@@ -176,7 +176,7 @@ class Spacenav(Device):
             raise DeviceError("spacenav", f"spacenavd has gone: {error.strerror or error}") from None
 
     def _receive(self, timeout_s: float) -> bool:
-        """Waits for bytes, appends them to the receive buffer, and returns whether there were any."""
+        """Waits for bytes and appends them to the receive buffer. Returns whether bytes arrived."""
         assert self._socket is not None
         if not select.select([self._socket], [], [], timeout_s)[0]:
             return False

@@ -1,4 +1,4 @@
-"""A virtual gamepad in this process, which SDL treats like a real gamepad."""
+"""Creates a virtual gamepad in this process, which SDL treats like a real gamepad."""
 
 import ctypes
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A small window of a device."""
+"""A small window through which a device receives input."""
 
 import contextlib
 import gc
@@ -18,10 +18,10 @@ class DeviceWindow:
         device: Name of the device in messages.
         title: Title of the window.
         width: Initial width of the drawing area [px].
-        height: Its initial height [px].
+        height: Initial height of the drawing area [px].
 
     Attributes:
-        canvas: The drawing area; it fills the window.
+        canvas: Drawing area, which fills the window.
 
     Raises:
         DeviceError: If there is no display.
@@ -40,11 +40,11 @@ class DeviceWindow:
         self.canvas.pack(fill="both", expand=True)
 
     def bind(self, sequence: str, callback: Any) -> None:
-        """Binds a function to events, by their tkinter names, anywhere in the window."""
+        """Calls a function for each event with the tkinter name `sequence`, anywhere in the window."""
         self._root.bind(sequence, callback)
 
     def show(self) -> None:
-        """Shows the window; events of the user are kept for `wait`, which shows it otherwise."""
+        """Shows the window at once, without processing events of the user, which `wait` does."""
         self._root.update_idletasks()
 
     def focus(self) -> None:
@@ -52,16 +52,16 @@ class DeviceWindow:
         self._root.focus_force()
 
     def wait(self, timeout_s: float) -> None:
-        """Processes the queued events; if there are none, the next one.
+        """Processes the queued events. If no events are queued, waits for the next event and processes it.
 
         Args:
-            timeout_s: Longest time to wait for it [s]; 0 does not wait.
+            timeout_s: Longest time to wait for an event [s]; 0 does not wait.
 
         Raises:
             DeviceClosedError: If the user has closed the window.
-            DeviceError: If the window has gone for another reason.
+            DeviceError: If the window was destroyed for another reason.
         """
-        # An error that a caller stores must not reference a frame that references the interpreter, see `close`.
+        # Raised here because a stored error must not keep a stack frame that references the interpreter, see `close`
         failure = self._failure_of_waiting(timeout_s)
         if failure:
             raise DeviceError(self._device, f"its window has gone: {failure}")
@@ -69,7 +69,7 @@ class DeviceWindow:
             raise DeviceClosedError(self._device, "its window was closed")
 
     def _failure_of_waiting(self, timeout_s: float) -> str:
-        """Processes events; returns why this failed, or the empty string."""
+        """Processes events as `wait` does. Returns the reason of a failure, or an empty text."""
         interpreter = self._root.tk
         try:
             is_over: list[bool] = []
@@ -86,10 +86,10 @@ class DeviceWindow:
 
     def close(self) -> None:
         """Closes the window; may be called once."""
-        with contextlib.suppress(tkinter.TclError):  # it has gone already
+        with contextlib.suppress(tkinter.TclError):  # the window is destroyed already
             self._root.destroy()
         del self._root, self.canvas
-        gc.collect()  # here: Tcl aborts the process if another thread happens to free its objects
+        gc.collect()  # Tcl aborts the process if another thread frees its objects
 
     def _note_closed(self) -> None:
         self._is_closed = True

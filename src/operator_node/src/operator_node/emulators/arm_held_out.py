@@ -1,4 +1,4 @@
-"""A person who swings the right arm forward, holds it out and sways a little, as 23 segments."""
+"""Motion of a person who swings the right arm forward, holds the arm out and sways a little, as 23 segments."""
 
 import math
 
@@ -9,21 +9,21 @@ from operator_node.avatar.joints import segment_frame
 from operator_node.mvn.segments import SegmentFrame
 
 RAISING_S = 3.0
-"""Time of lowering the arm from the T-pose, swinging it forward and raising it, a third each [s]."""
+"""Time in which the arm is lowered from the T-pose, swung forward, and raised. Each phase takes a third [s]."""
 ARMS_DOWN_RAD = 1.3
 SWAY_RAD, SWAY_HZ = 0.02, 0.4
-"""Amplitude and frequency of the sway of a held arm."""
+"""Amplitude and frequency of the held arm's sway."""
 LEVEL = np.array((0.0, 0.0, 0.0, 1.0))
 
 
 class ArmHeldOut:
-    """Motion of a person as a function of time, facing x; the pose of the held arm is random.
+    """Motion of a person, who faces x, as a function of time. The pose in which the arm is held is random.
 
     Args:
         height_m: Body height [m].
-        seed: Seed of the random pose.
-        start: Place of the person, x and y [m].
-        t_pose_s: Time that the person first stands in the T-pose [s].
+        seed: Seed of the arm's random pose.
+        start: Position of the person, x and y [m].
+        t_pose_s: Time for which the person stands in the T-pose at the start [s].
     """
 
     def __init__(
@@ -35,13 +35,13 @@ class ArmHeldOut:
         self._held = np.radians((random.uniform(-8, 8), random.uniform(74, 86), random.uniform(5, 25)))
         self._phase = random.uniform(0.0, 2.0 * math.pi)
         self.t_pose: Array = segment_frame(self._offsets, self._hips, LEVEL, {}).positions
-        """Origins of the segments in the T-pose (23 x 3) [m]; all have the orientation of the world."""
+        """Origins of the segments in the T-pose (23 x 3) [m]. All segments then have the orientation of the world."""
 
     def frame(self, time_s: float) -> SegmentFrame:
         """Returns the segments at a time [s]."""
         since_s = time_s - self._t_pose_s
         thirds = 3.0 * since_s / RAISING_S
-        # forward before up: on a path to the side, the hand would hit anybody who stands there
+        # The arm swings forward before it is raised: raised sideways, the hand could hit anybody beside the person
         lowered, forward, raised = (_smooth(thirds - begun) for begun in range(3))
         lowered = lowered if self._t_pose_s else 1.0
         up, ahead, elbow = self._held
@@ -55,12 +55,12 @@ class ArmHeldOut:
         return segment_frame(self._offsets, self._hips, LEVEL, hinges)
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
-        """Returns origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, of the segments at a time [s]."""
+        """Returns the segments' origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, at a time [s]."""
         frame = self.frame(time_s)
         return frame.positions, frame.quats_xyzw
 
 
 def _smooth(share: float) -> float:
-    """Returns 0 before 0, 1 after 1, and a smooth step between."""
+    """Returns a smooth step from 0 to 1 between the arguments 0 and 1."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)

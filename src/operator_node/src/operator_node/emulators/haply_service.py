@@ -1,4 +1,4 @@
-"""Emulated service of a Haply Inverse3 with a hand on it: the same messages on the same port."""
+"""Emulates the service of a Haply Inverse3, with a hand on the device. Messages and port are those of the service."""
 
 from __future__ import annotations
 
@@ -20,27 +20,28 @@ from robot_model.geometry import ZERO, Vector, plus
 
 DEVICE_ID = "04BA"
 CONTINUED_S = 0.02
-"""Longest time for which a force acts without a further message [s]."""
+"""Longest time for which a force acts if no further message arrives [s]."""
 STEP_S = 0.001
 PATIENCE_S = 20.0
-"""Longest duration of start and end [s]."""
+"""Longest time to wait for the start and the end of the server [s]."""
 
 
 class HaplyEmulator:
-    """Answers each message of a client with one state, after a full one at connection; a force acts until the next
-    message.
+    """Sends a full state to each new client, and one state in answer to each message of a client.
+
+    A force acts until the next message, for at most `CONTINUED_S`.
 
     Args:
-        goal: Position to which the hand pulls the handle over time, in the device's axes: x right, y forward, z up
-            [m].
-        key: Key of a force's vector; other keys are ignored.
-        port: 0 for any free one.
-        mangle: Modifies sent messages, to test clients.
+        goal: Function of time [s] that returns the position to which the hand pulls the handle [m], in the device's
+            axes: x right, y forward, z up.
+        key: JSON key of forces. Forces under other keys are ignored.
+        port: Port to listen at; 0 selects a free port.
+        mangle: Function that modifies each sent message, to test clients.
 
     Attributes:
-        port: The port in use.
+        port: Port in use.
         force: Force on the hand now [N].
-        hand: The hand.
+        hand: The simulated hand.
     """
 
     def __init__(
@@ -57,10 +58,10 @@ class HaplyEmulator:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self) -> None:
-        """Serves in a thread of its own, until `stop`.
+        """Serves in a separate thread until `stop` is called. Returns when clients can connect.
 
         Raises:
-            OSError: If it cannot listen, for instance because another program uses the port.
+            OSError: If the port is not available, for instance because another program uses it.
         """
         ready: Future[None] = Future()
 
@@ -82,7 +83,7 @@ class HaplyEmulator:
             self._loop = None
 
     async def serve(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serves until it is stopped."""
+        """Serves until `stop` is called. Calls `ready` when clients can connect."""
         self._ended = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         async with serve(self._serve, "localhost", self.port, ping_interval=None, close_timeout=0.1) as server:
@@ -99,7 +100,7 @@ class HaplyEmulator:
         self.force = ZERO
 
     def _obey(self, message: str | bytes) -> None:
-        """Simulates the time since the last message, and applies the sum of the forces of this one."""
+        """Simulates the time since the last message, and then applies the sum of the forces in this message."""
         self._pass_time()
         force = ZERO
         for device in json.loads(message).get("inverse3", []):
@@ -151,7 +152,7 @@ def _named(vector: Vector) -> dict[str, float]:
 
 
 def main() -> None:
-    """Serves until it is interrupted; the hand presses down again and again."""
+    """Runs the emulator until Ctrl-C. The hand presses down again and again."""
     parser = argparse.ArgumentParser(description="Emulates the service of a Haply Inverse3 with a hand on it.")
     parser.add_argument("--port", type=int, default=10001, help="port to listen at (10001)")
     parser.add_argument("--key", default="vector", choices=("vector", "values"), help="key of forces (vector)")

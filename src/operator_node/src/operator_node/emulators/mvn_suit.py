@@ -1,4 +1,4 @@
-"""`mvn_emulator.py`: streams people who walk and reach, as MVN's network streamer does."""
+"""`mvn_emulator.py`: streams the motion of people who walk and reach, in the format of MVN's network streamer."""
 
 import argparse
 import random
@@ -20,25 +20,25 @@ from .arm_held_out import ArmHeldOut
 from .walking_person import WalkingPerson
 
 KINDS = (1, 2, 12, 13, 20, 21, 22, 24, 25)
-"""Types that it can send."""
+"""Message types that the emulator can send."""
 NOISE_RAD = 2e-4
-"""Standard deviation of the sensor noise of orientations [rad]."""
+"""Standard deviation of the noise of orientations [rad]."""
 INFO_PERIOD = 60
-"""Period of types 12 and 13, in samples."""
+"""Period of the message types 12 and 13, in samples."""
 SPACING_M = 1.2
 _CM = 100.0
 
 
 class Suit:
-    """Creates the datagrams of one person, byte for byte as in the protocol.
+    """Creates the datagrams of one person, byte for byte as the protocol defines them.
 
     Args:
         person: Number of the person, from 0.
         moves: Motion of the person over time.
-        kinds: Types to send, of `KINDS`.
-        items: Largest number of items per datagram; with fewer than 23, a frame has several datagrams.
-        noise_rad: Standard deviation of orientations [rad].
-        hz: Sample rate, for the velocities of types 21 and 22.
+        kinds: Message types to send, from `KINDS`.
+        items: Largest number of items per datagram. With fewer than 23 items, a frame needs several datagrams.
+        noise_rad: Standard deviation of the noise of orientations [rad].
+        hz: Sample rate, for the velocities and accelerations of type 21 [Hz].
         seed: Seed of the noise.
     """
 
@@ -57,16 +57,16 @@ class Suit:
         self._name = f"Person{person}"
 
     def datagrams(self, sample: int, time_s: float) -> list[bytes]:
-        """Returns the datagrams of a sample at a time [s]."""
+        """Returns the datagrams of the sample with a number, taken at a time [s]."""
         positions, quats = self.pose(time_s)
         return [datagram for kind in self._kinds for datagram in self._of_kind(kind, sample, time_s, positions, quats)]
 
     def frame(self, sample: int, time_s: float, positions: Array, quats: Array) -> list[bytes]:
-        """Returns the datagrams of type 02 for given poses: origins (23 x 3) [m], orientations (23 x 4), x, y, z, w."""
+        """Returns the datagrams of type 02 for given origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w."""
         return self._split(2, sample, time_s, self._numbered(positions, quats[:, [3, 0, 1, 2]]))
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
-        """Returns the measurement of its sensors at a time [s]: origins [m] and orientations, x, y, z, w."""
+        """Returns origins (23 x 3) [m] and noisy orientations (23 x 4), x, y, z, w, of the segments at a time [s]."""
         positions, quats = self._moves.pose(time_s)
         if self._noise_rad:
             noise = Rotation.from_rotvec(self._random.normal(0.0, self._noise_rad, (len(SEGMENTS), 3)))
@@ -136,17 +136,24 @@ class Suit:
 
 
 class Sent(NamedTuple):
-    """A datagram that is sent, and its fault: none, `duplicate` or `truncated`."""
+    """A datagram that is sent, and its fault: `duplicate`, `truncated`, or empty without a fault."""
 
     data: bytes
     fault: str = ""
 
 
 class BadNetwork:
-    """Loses, repeats, cuts and swaps datagrams, each with some probability, by a seed.
+    """Emulates network faults: drops, repeats, truncates and reorders datagrams at random.
+
+    Args:
+        lost: Probability that a datagram is dropped.
+        duplicate: Probability that a datagram is sent twice.
+        truncated: Probability that a datagram is cut off.
+        reordered: Probability that a datagram is sent after the next datagram.
+        seed: Seed of the random numbers.
 
     Attributes:
-        done: Number of datagrams by result.
+        done: Number of datagrams, keyed by fault, or by `sent` without a fault.
     """
 
     def __init__(
@@ -158,7 +165,7 @@ class BadNetwork:
         self._held: Sent | None = None
 
     def transmit(self, datagrams: Iterable[bytes]) -> Iterator[Sent]:
-        """Yields the datagrams that are sent in place of the given ones; a swapped one follows the next."""
+        """Yields the datagrams that the faulty network delivers in place of the given datagrams."""
         for data in datagrams:
             number, fault = self._random.random(), ""
             for name, chance in self._chances.items():
@@ -183,7 +190,7 @@ class BadNetwork:
 
 
 def stream(suits: Sequence[Suit], hz: float, first_sample: int = 0) -> Iterator[tuple[float, list[bytes]]]:
-    """Yields the datagrams of each sample of some people, with its time [s], forever."""
+    """Yields time [s] and datagrams of each sample of all suits, without end."""
     number = 0
     while True:
         time_s = number / hz
@@ -192,7 +199,7 @@ def stream(suits: Sequence[Suit], hz: float, first_sample: int = 0) -> Iterator[
 
 
 def main() -> int:
-    """Runs the command until Ctrl-C or the end of `--seconds`; returns its exit code."""
+    """Runs the command until Ctrl-C or the end of `--seconds`, and returns its exit code."""
     parser = sender_arguments("mvn_emulator.py", __doc__)
     parser.add_argument("--hz", type=float, default=60.0, help="samples a second, 1 to 240; by default 60")
     parser.add_argument("--people", type=int, default=1, help="number of people, 1 to 8")
@@ -252,7 +259,7 @@ def main() -> int:
 
 
 def _person(options: argparse.Namespace, number: int) -> WalkingPerson | ArmHeldOut:
-    """Returns one of the people, who is next to the previous one and a little smaller."""
+    """Returns the person with a number. Each person is beside the previous person, and a little smaller."""
     height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -SPACING_M * number)
     if options.arm_held_out:
         return ArmHeldOut(height_m, options.seed, start, options.t_pose)

@@ -1,4 +1,4 @@
-"""`spacenavd_emulator.py`: the daemon of 6-D mice, with a device that moves by itself."""
+"""`spacenavd_emulator.py`: emulates spacenavd, the daemon of 6-D mice, with a device that moves by itself."""
 
 import argparse
 import contextlib
@@ -26,24 +26,24 @@ from operator_node.devices.spacenav import (
 )
 
 FULL = 350
-"""Value of most devices at the end of an axis."""
+"""Raw value that most devices send at the end of an axis."""
 SET_NAME, SET_SENSITIVITY, SET_MASK, GET_NAME, GET_AXES = (
     REQUEST | number for number in (0x1000, 0x1001, 0x1003, 0x2000, 0x2002)
 )
 EVENT_BITS = {MOTION: 1, PRESS: 2, RELEASE: 2, DEVICE: 4}
 MASK_AT_FIRST = {0: 3, 1: 7}
-"""Events sent to a client that has not selected any, by the version of its protocol."""
+"""Bits of the events that a client receives before it selects events, keyed by the version of its protocol."""
 NAME, CHUNK = b"emulated 6-D mouse", 24
 CONTINUED = 0x10000
 REFUSED = -1
 PERIOD_S = 0.01
 HOLD_S = 1.0
 PATIENCE_S = 5.0
-"""Time without reading after which a client is disconnected [s]."""
+"""Time after which a client that does not read its socket is disconnected [s]."""
 
 
 class SpacenavClient:
-    """One client of the daemon."""
+    """State of one client of the daemon."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.socket = connection
@@ -52,15 +52,15 @@ class SpacenavClient:
 
 
 class SpacenavDaemon:
-    """Serves a 6-D mouse to any number of clients, until it is closed.
+    """Serves an emulated 6-D mouse to any number of clients, from the construction until `close`.
 
     Args:
-        path: The socket; an existing file is replaced.
+        path: Path of the daemon's socket. An existing file is replaced.
         protocol: Newest supported version of the protocol, 0 or 1.
         buttons: Number of buttons of the device.
 
     Attributes:
-        path: The socket.
+        path: Path of the daemon's socket.
     """
 
     def __init__(self, path: str | Path, protocol: int = 1, buttons: int = 2) -> None:
@@ -79,11 +79,11 @@ class SpacenavDaemon:
 
     @property
     def clients(self) -> int:
-        """Number of clients."""
+        """Number of connected clients."""
         return len(self._clients)
 
     def move(self, x: int, y: int, z: int, rx: int = 0, ry: int = 0, rz: int = 0) -> None:
-        """Sends the position of the cap: x right, y up, z away from the user, and rotations about them."""
+        """Sends raw displacements (x right, y up, z away from the user) and raw rotations of the mouse's cap."""
         self._broadcast(MOTION, x, y, z, rx, ry, rz, 0)
 
     def press(self, button: int, is_down: bool = True) -> None:
@@ -91,12 +91,12 @@ class SpacenavDaemon:
         self._broadcast(PRESS if is_down else RELEASE, button, int(is_down))
 
     def unplug(self) -> None:
-        """Unplugs the device."""
+        """Emulates that the device is unplugged."""
         self._is_plugged = False
         self._broadcast(DEVICE, 1, 0)
 
     def plug(self) -> None:
-        """Plugs the device in again."""
+        """Emulates that the device is plugged in again."""
         self._is_plugged = True
         self._broadcast(DEVICE, 0, 0)
 
@@ -107,7 +107,7 @@ class SpacenavDaemon:
                 self._send(client, data)
 
     def close(self) -> None:
-        """Closes all connections."""
+        """Closes all connections, and removes the socket."""
         os.write(self._wake_writer, b".")
         self._thread.join(2.0 * PATIENCE_S)
         for client in self._clients:
@@ -145,7 +145,7 @@ class SpacenavDaemon:
             pass
 
     def _answer(self, client: SpacenavClient) -> bool:
-        """Processes one request; returns whether there was one."""
+        """Processes the next complete request of a client. Returns whether there was a complete request."""
         if client.protocol == 1:
             if len(client.received) < PACKET.size:
                 return False
@@ -157,7 +157,7 @@ class SpacenavDaemon:
             return False
         (word,) = WORD.unpack_from(client.received)
         del client.received[: WORD.size]
-        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # otherwise it is a sensitivity
+        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # otherwise the word is a sensitivity
             client.protocol = min(word & 0xFF, self._protocol)
             client.mask = MASK_AT_FIRST[client.protocol]
             self._send(client, WORD.pack(PROTOCOL_TAG | client.protocol))
@@ -193,13 +193,13 @@ class SpacenavDaemon:
             self._drop(client)
 
     def _drop(self, client: SpacenavClient) -> None:
-        """Shuts a connection down; the serving thread, which may be waiting for the client, closes it then."""
+        """Shuts a connection down. The serving thread, which may be waiting for the client, closes the socket later."""
         with contextlib.suppress(OSError):
             client.socket.shutdown(socket.SHUT_RDWR)
 
 
 def main() -> None:
-    """Runs the daemon; its cap moves along each axis in turn, back and forth, until Ctrl-C."""
+    """Runs the daemon until Ctrl-C. The mouse's cap moves along each axis in turn, back and forth."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--socket", default=socket_path(), help="path of the socket; by default where clients expect it"
@@ -218,7 +218,7 @@ def main() -> None:
 
 
 def _hold(daemon: SpacenavDaemon, motion: Sequence[int]) -> None:
-    """Repeats the same values for a time, like a cap that a hand holds."""
+    """Sends the same motion for `HOLD_S`, like a hand that holds the cap."""
     end_s = time.monotonic() + HOLD_S
     while time.monotonic() < end_s:
         daemon.move(*motion)

@@ -1,4 +1,7 @@
-"""`touch_emulator.py`: the driver of a Touch with a hand on it; like the real one it holds the last force forever."""
+"""`touch_emulator.py`: emulates the driver of a Touch, with a hand on the device.
+
+Like the real driver, the emulator holds the last force forever.
+"""
 
 import threading
 import time
@@ -28,7 +31,7 @@ STEP_S = 0.001
 
 
 class TouchEmulator:
-    """Publishes states, and applies forces to the hand, without limits and without time-out."""
+    """Publishes the states of a simulated handle, and applies received forces to it, without limits and time-out."""
 
     def __init__(self) -> None:
         self._driver = rospy.get_param("~driver", "omni")
@@ -51,7 +54,7 @@ class TouchEmulator:
             self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, tcp_nodelay=True)
             self._twist = rospy.Publisher(f"{name}/twist", TwistStamped, queue_size=1, tcp_nodelay=True)
             rospy.Subscriber(f"{name}/cmd_force", Wrench, self._feel_touch_x, queue_size=1, tcp_nodelay=True)
-        # Force on the hand, for observers
+        # Publishes the force on the hand, for tests
         self._felt = rospy.Publisher(f"{name}/felt", Vector3, queue_size=1, tcp_nodelay=True)
         WallTimer(rospy.get_param("~hz", 500.0), self._publish)
 

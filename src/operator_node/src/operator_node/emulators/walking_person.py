@@ -1,4 +1,4 @@
-"""A person who walks in a circle and reaches with both hands, as 23 segments."""
+"""Motion of a person who walks in a circle and reaches forward with both hands in turn, as 23 segments."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,33 +23,34 @@ T_POSE = {
     "RightFoot": (0.0, -0.055, 0.039),
     "RightToe": (0.100, -0.055, 0.010),
 }
-"""Origins of the segments of the trunk and the right side, in parts of the height. Lengths of arms and legs and heights
-of joints are those of Drillis and Contini (1966), as in Winter, Biomechanics and Motor Control of Human Movement;
-joints of the back are spread between them.
+"""Origins of the segments of the trunk and the right side in the T-pose, as fractions of the body height.
+
+Lengths of arms and legs and heights of joints are those of Drillis and Contini (1966), as in Winter, Biomechanics and
+Motor Control of Human Movement. The joints of the back are distributed between hips and shoulders.
 """
 STANCE = 0.62
 """Share of a stride during which a foot is on the floor."""
 LIFT = 0.06
-"""Height to which a foot is lifted [heights]."""
+"""Height to which a foot is lifted, as a fraction of the body height."""
 REACHING_S, REACH_PERIOD_S = 2.5, 5.0
-"""Duration of a reach, and time until the next one begins, with the other hand [s]."""
+"""Duration of a reach, and time from its start to the start of the other hand's reach [s]."""
 SETTLING_S, CROUCHING_S = 1.5, 0.8
-"""Time in which the arms leave the T-pose, and the knees bend before the first step [s]."""
+"""Time in which the arms leave the T-pose, and time in which the knees bend before the first step [s]."""
 STRIDE_S = 1.2
 BOB = 0.006
-"""Amplitude of the pelvis' vertical motion [heights]."""
+"""Amplitude of the pelvis' vertical motion, as a fraction of the body height."""
 
 
 class WalkingPerson:
-    """Motion of a person as a function of time: feet do not slide, bones are rigid, and knees bend forwards.
+    """Motion of a walking person as a function of time. Feet do not slide, bones are rigid, and knees bend forwards.
 
     Args:
         height_m: Body height [m].
-        speed: Walking speed [heights/s]; 0 stands.
-        radius_m: Radius of the circle, to the left [m].
-        t_pose_s: Time that the person first stands in the T-pose [s].
-        start: Place of the T-pose, x and y [m].
-        reach: Whether the hands reach forward, in turns.
+        speed: Walking speed [body heights/s]; with 0, the person stands.
+        radius_m: Radius of the circle, which curves to the left [m].
+        t_pose_s: Time for which the person stands in the T-pose at the start [s].
+        start: Position of the person in the T-pose, x and y [m].
+        reach: Whether the hands reach forward in turn.
     """
 
     def __init__(
@@ -64,15 +65,15 @@ class WalkingPerson:
         self._speed_m_s, self._radius_m, self._t_pose_s = speed * height_m, radius_m, t_pose_s
         self._start, self._reaches, self._height_m = np.array((*start, 0.0)), reach, height_m
         self.t_pose = height_m * np.array([_origin(name) for name in SEGMENTS])
-        """Origins of the segments in the T-pose (23 x 3) [m]; all have the orientation of the world."""
+        """Origins of the segments in the T-pose (23 x 3) [m]. All segments then have the orientation of the world."""
         self._offsets = np.array([self.t_pose[i] - self.t_pose[max(parent, 0)] for i, parent in enumerate(PARENTS)])
         leg = T_POSE["RightUpperLeg"][2] - T_POSE["RightFoot"][2]
         longest_step = 0.5 * STANCE * STRIDE_S * speed
-        """Distance of a foot behind the hip at the end of its stance [heights]."""
+        """Distance of a foot behind the hip at the end of its stance, as a fraction of the body height."""
         self._crouch_m = height_m * (leg - (leg**2 - longest_step**2) ** 0.5 + BOB + 0.01)
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
-        """Returns origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, of the segments at a time [s]."""
+        """Returns the segments' origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, at a time [s]."""
         walking_s = time_s - self._t_pose_s
         ready = _smooth(walking_s / SETTLING_S)
         phase = 2.0 * np.pi * walking_s / STRIDE_S
@@ -110,14 +111,14 @@ class WalkingPerson:
             turns[f"{side}{segment}"] = turn
 
     def _reach(self, walking_s: float, sign: float) -> float:
-        """Returns the extension of a hand, from 0 to 1."""
+        """Returns how far a hand reaches forward, from 0 to 1. `sign` is -1 for the right hand, 1 for the left."""
         number, since_s = divmod(walking_s - SETTLING_S, REACH_PERIOD_S)
         if not self._reaches or number < 0 or number % 2 != (sign > 0) or since_s > REACHING_S:
             return 0.0
         return float(np.sin(np.pi * since_s / REACHING_S) ** 2)
 
     def _distance_m(self, walking_s: float) -> float:
-        """Returns the walked distance [m]; the speed grows smoothly."""
+        """Returns the distance walked so far [m]. The speed grows smoothly from 0."""
         walking_s = max(walking_s - CROUCHING_S, 0.0)
         return float(self._speed_m_s * (walking_s - SETTLING_S * -np.expm1(-walking_s / SETTLING_S)))
 
@@ -126,7 +127,13 @@ class WalkingPerson:
         return self._start + radius * np.array((np.sin(angle), 1.0 - np.cos(angle), 0.0))
 
     def _footprint(self, number: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns position [m] and direction [rad] of a foot's stance in one stride."""
+        """Returns position [m] and direction [rad] of the ankle while its foot is on the floor in a stride.
+
+        Args:
+            number: Index of the stride.
+            sign: -1 for the right foot, 1 for the left foot.
+            offset: Delay of the foot's strides, in strides.
+        """
         distance_m = self._distance_m((number + offset + STANCE / 2.0) * STRIDE_S)
         angle = distance_m / self._radius_m
         aside = -sign * self._height_m * T_POSE["RightUpperLeg"][1]
@@ -134,7 +141,7 @@ class WalkingPerson:
         return place + (0.0, 0.0, self._height_m * T_POSE["RightFoot"][2]), angle
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns position [m] and direction [rad] of an ankle."""
+        """Returns position [m] and direction [rad] of an ankle at a time. For the arguments see `_footprint`."""
         number, part = divmod(walking_s / STRIDE_S - offset, 1.0)
         here, direction = self._footprint(number, sign, offset)
         if part < STANCE:
@@ -149,7 +156,7 @@ class WalkingPerson:
     def _place_leg(
         self, positions: Array, quats: Array, side: str, hip: Array, ankle: Array, direction_rad: float
     ) -> None:
-        """Places thigh, shank and foot for a position of the ankle: law of cosines, knee forward."""
+        """Sets the poses of thigh, shank, foot and toe for positions of hip and ankle [m]. The knee bends forward."""
         upper, lower, foot, toe = (INDEX[f"{side}{name}"] for name in ("UpperLeg", "LowerLeg", "Foot", "Toe"))
         thigh_m, shank_m = (float(np.linalg.norm(self._offsets[each])) for each in (lower, foot))
         reach = ankle - hip
@@ -172,7 +179,7 @@ class WalkingPerson:
         quats[[foot, toe]] = flat.as_quat()
 
     def _forward(self, pelvis: Array, turns: dict[str, Rotation]) -> tuple[Array, Array]:
-        """Returns all segments but those of the legs, by forward kinematics."""
+        """Returns origins and orientations of all segments except the legs, by forward kinematics."""
         positions, quats = np.zeros((len(SEGMENTS), 3)), np.zeros((len(SEGMENTS), 4))
         for index, (name, parent) in enumerate(zip(SEGMENTS, PARENTS)):
             if name in turns:
@@ -183,13 +190,13 @@ class WalkingPerson:
 
 
 def _origin(name: str) -> Array:
-    """Returns the origin of a segment in the T-pose [heights]; left mirrors right."""
+    """Returns the origin of a segment in the T-pose, as fractions of the body height. The left side is mirrored."""
     if name in T_POSE:
         return np.array(T_POSE[name])
     return np.array(T_POSE[name.replace("Left", "Right")]) * (1.0, -1.0, 1.0)
 
 
 def _smooth(share: float) -> float:
-    """Returns 0 before 0, 1 after 1, and a smooth step between."""
+    """Returns a smooth step from 0 to 1 between the arguments 0 and 1."""
     share = min(max(share, 0.0), 1.0)
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)

@@ -1,4 +1,4 @@
-"""The mappings; a new one is a class in its own file and a line here."""
+"""Table of the mappings. A new mapping needs a class in a file of its own and a line in this table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 

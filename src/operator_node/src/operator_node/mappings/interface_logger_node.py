@@ -1,4 +1,4 @@
-"""`operator_interface_logger`: the most recent part of the operator's signal."""
+"""`operator_interface_logger`: publishes the operator's signals of the last seconds as one message."""
 
 import threading
 
@@ -15,7 +15,7 @@ from operator_node.parser import SignalWindow
 
 NAME = "operator_interface_logger"
 QUEUE_SIZE = 100
-"""Largest number of queued signals on a busy machine; the window must not miss any."""
+"""Largest number of queued signals. It is large so that no signal is lost on a busy machine."""
 
 
 class LoggerParameters(ConfigModel):
@@ -28,9 +28,10 @@ class LoggerParameters(ConfigModel):
 
 
 class InterfaceLogger:
-    """Publishes the recent signals of `operator_node/signal` on `operator_node/window`, with each signal or at a rate.
+    """Publishes the recent signals of `operator_node/signal` on `operator_node/window`.
 
-    The data are records `[t, s_1, ..., s_n]`, oldest first, where t is the ROS time of arrival [s].
+    A message is published with each signal, or at the rate `~hz`. Its data are records `[t, s_1, ..., s_n]`, oldest
+    first, where t is the signal's arrival in ROS time [s].
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -63,7 +64,7 @@ class InterfaceLogger:
         with self._lock:
             had_any = self._window.size > 0
             self._window.forget(stamp().to_sec())
-            if had_any:  # the last message is empty
+            if had_any:  # one empty message follows after the last signal has expired
                 self._publish()
 
     def _publish(self) -> None:

@@ -1,4 +1,4 @@
-"""All axes as one vector, so that diagonal motion is no faster than motion along an axis."""
+"""Mapping that treats all axes as one vector, so that diagonal motion is not faster than motion along an axis."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from .scale import ScaleConfig
 class IsometricMapping(Mapping):
     """Limits the vector a of the axes to length 1, then scales it: `scale * min(n, 1) / n * a`, where n is its length.
 
-    A list of factors multiplies axis by axis: `[-0.2, 0.2, 0.2]` reverses the first one.
+    A list has one factor for each axis. For example, `[-0.2, 0.2, 0.2]` reverses the first axis.
     """
 
     Config = ScaleConfig
@@ -20,7 +20,7 @@ class IsometricMapping(Mapping):
         self._scale = config.factors
 
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
-        """Returns the signal, see `Mapping`."""
+        """Returns the limited and scaled axes, see `Mapping.map`."""
         picked = self._config.pick(axes)
         length = max(math.hypot(*picked), 1.0)  # min(n, 1) / n, also for n = 0
         return tuple(scale * axis / length for scale, axis in zip(self._scale, picked))

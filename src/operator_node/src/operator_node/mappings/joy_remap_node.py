@@ -1,4 +1,4 @@
-"""`joy_remap`: repeats a device that reports changes only at a steady rate."""
+"""`joy_remap`: repeats the messages of a device at a steady rate, for devices that report only changes."""
 
 import copy
 import math
@@ -24,9 +24,10 @@ class JoyRemapParameters(InputParameters):
 
 
 class JoyRemap:
-    """Repeats the newest message of `joy_in` on `joy_out` with the present time, from the first one on.
+    """Repeats the newest message on `joy_in` at a steady rate on `joy_out`, with the present time as stamp.
 
-    When input ceases or is not finite, one message of zeros follows, and then nothing until there is input again.
+    When input ceases or is not finite, one message with zeros is published. Further messages follow when valid input
+    arrives again.
 
     Raises:
         ConfigError: If a parameter is wrong.

@@ -1,4 +1,4 @@
-"""`keyboard_to_joy.py`: maps held keys to axes and buttons."""
+"""`keyboard_to_joy.py`: maps held keys to the axes and buttons of `joy`."""
 
 import math
 import threading
@@ -21,7 +21,10 @@ from operator_node.input_topics import QUEUE_SIZE, SecondsOrOff, WatchedInput, s
 NAME = "keyboard_to_joy"
 FRAME_ID = "keyboard"
 DISORDER_S = 5.0
-"""Largest delay of a press behind its release [s]; beyond it, an earlier stamp means that the clock was set back."""
+"""Longest time by which a press may arrive after its release [s].
+
+If a press arrives later and has an earlier stamp than the release, the clock was set back.
+"""
 
 
 class KeyboardToJoyConfig(ConfigModel):
@@ -43,10 +46,11 @@ class KeyboardToJoyParameters(ConfigModel):
 
 
 class KeyboardToJoy:
-    """Publishes `joy` from `keyboard/keydown` and `keyboard/keyup`, at a rate and whenever a key changes.
+    """Publishes `joy` from `keyboard/keydown` and `keyboard/keyup`, at a fixed rate and whenever a key changes.
 
-    Repeated presses, and a release without a press, change nothing. Topics are not ordered relative to each other: a
-    press that arrives after its release, by the stamps, is ignored. When the keyboard has gone, no key is held.
+    Repeated presses, and releases without a press, change nothing. Messages on the two topics may arrive in wrong
+    order: a press whose stamp is earlier than that of an earlier received release is ignored. When the keyboard's node
+    ends, all keys count as released.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.

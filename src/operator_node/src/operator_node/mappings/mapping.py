@@ -1,4 +1,4 @@
-"""Interface of all mappings."""
+"""Interface of the mappings from the axes of a device to the operator's signal."""
 
 import math
 from abc import ABC, abstractmethod
@@ -25,10 +25,10 @@ class AxesConfig(ConfigModel):
     )
 
     def pick(self, axes: Sequence[float]) -> list[float]:
-        """Returns the selected axes after removal of their dead zone.
+        """Returns the values of the selected axes, after removal of the dead zone.
 
         Raises:
-            ValueError: If there are too few.
+            ValueError: If the device has too few axes.
         """
         largest = max(self.axes_idx)
         if largest >= len(axes):
@@ -41,13 +41,14 @@ class AxesConfig(ConfigModel):
 
 
 class Mapping(ABC):
-    """Maps the axes of a device to the operator's signal.
+    """Base class of the mappings from the axes of a device to the operator's signal.
 
-    Its options are its `Config`, the argument of its constructor. It has no state: equal axes result in equal signals.
+    The constructor of a mapping has one argument, the options of type `Config`. A mapping has no state: equal axes
+    result in equal signals.
 
     Attributes:
-        Config: Model of its options.
-        size: Number of values of its signal.
+        Config: Model of the mapping's options.
+        size: Number of values in the signal.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -55,8 +56,8 @@ class Mapping(ABC):
 
     @abstractmethod
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
-        """Returns the signal, `size` numbers, for the axes of a device, which are finite.
+        """Returns the signal, `size` numbers, for the finite axes of a device.
 
         Raises:
-            ValueError: If there are too few axes.
+            ValueError: If the device has too few axes.
         """

@@ -1,4 +1,4 @@
-"""`scale_node.py`, `isometric_node.py` and `mapping_node.py MAPPING`: nodes of the mappings."""
+"""Nodes that apply a mapping: `scale_node.py`, `isometric_node.py` and `mapping_node.py MAPPING`."""
 
 import sys
 
@@ -13,14 +13,14 @@ from .operator_node import NAME, OperatorNode
 
 
 class MappingNode(OperatorNode):
-    """Publishes the signal that a mapping computes from the axes.
+    """Publishes the signal that a mapping computes from the axes of `joy`.
 
     Args:
-        name: A name of the table `MAPPINGS`, or `"their_package.module:Class"`.
+        name: Name of a mapping in the table `MAPPINGS`, or `"their_package.module:Class"`.
 
     Raises:
-        UnknownNameError: If there is no such mapping.
-        ConfigError: If its options, `~config`, are wrong.
+        UnknownNameError: If the mapping is unknown.
+        ConfigError: If the mapping's options, `~config`, are wrong.
     """
 
     def __init__(self, name: str) -> None:
@@ -28,7 +28,7 @@ class MappingNode(OperatorNode):
         super().__init__()
 
     def callback(self, joy: Joy) -> None:
-        """Publishes the signal, see `OperatorNode`."""
+        """Publishes the mapping's signal, see `OperatorNode.callback`."""
         self.publish(self._mapping.map(joy.axes))
 
 
@@ -43,7 +43,7 @@ def isometric() -> None:
 
 
 def main() -> None:
-    """Runs the node with the mapping named by its argument."""
+    """Runs the node with the mapping that is named by the program's argument."""
 
     def make() -> MappingNode:
         arguments = rospy.myargv(sys.argv)[1:]

@@ -1,4 +1,4 @@
-"""Base of the nodes that map `joy` to `operator_node/signal`."""
+"""Base class of the nodes that map `joy` to `operator_node/signal`."""
 
 import math
 import threading
@@ -25,7 +25,7 @@ from operator_node.input_topics import QUEUE_SIZE, InputParameters, WatchedInput
 
 NAME = "operator_node"
 LOOK_HZ = 50.0
-"""Rate of the check for ceased input."""
+"""Rate of the check whether input still arrives [Hz]."""
 
 
 class OperatorParameters(StartParameters, InputParameters):
@@ -37,17 +37,17 @@ class OperatorParameters(StartParameters, InputParameters):
 
 
 class OperatorNode(ABC):
-    """Publishes a signal while it is switched on; `operator_node/toggle` switches it.
+    """Publishes a signal while the node is switched on. The service `operator_node/toggle` switches the node on or off.
 
-    A subclass computes the signal in `callback` and passes it to `publish`. It stays in force until the next one, and
-    is repeated `~repeat_hz` times a second unless it is zero, so that subscribers can distinguish a user who holds
-    still from a node that has gone. When the node is switched off, when input ceases (`~input_timeout_s`) or a message
-    is refused, the signal ends with one zero signal.
+    A subclass computes a signal in `callback` and passes the signal to `publish`. The signal is valid until the next
+    signal. A nonzero signal is repeated `~repeat_hz` times a second, so that subscribers can distinguish a user who
+    holds still from a node that has crashed. One zero signal is published when the node is switched off, when input
+    ceases (`~input_timeout_s`), and when a message is refused.
 
-    In a process that is no node yet, it makes the node `operator_node`; `run_node` is the alternative.
+    The constructor initialises the ROS node `operator_node`, unless the process is a ROS node already.
 
     Attributes:
-        config: The parameter `~config`, a mapping.
+        config: Content of the parameter `~config`, a dictionary.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -79,29 +79,29 @@ class OperatorNode(ABC):
             WallTimer(parameters.repeat_hz, self._repeat)
 
     def post_init(self) -> None:  # noqa: B027 (most need none)
-        """Prepares the subclass before the first message; `config` is available."""
+        """Hook for the initialisation of a subclass, called before the first message. `config` is already set."""
 
     @abstractmethod
     def callback(self, joy: Joy) -> None:
-        """Maps a message to a signal and publishes it; its numbers are finite.
+        """Maps a message to a signal, and publishes the signal by `publish`. The message's axes are finite.
 
         Raises:
-            ValueError: If it is invalid; states why.
+            ValueError: If the message is invalid. The text of the error is logged as the reason.
         """
 
     def start(self) -> tuple[bool, str]:
-        """Switches it on; returns whether that changed anything, and a message."""
+        """Switches the node on. Returns whether the node was off before, and a message."""
         return self._toggle.on()
 
     def stop(self) -> tuple[bool, str]:
-        """Switches it off; returns whether that changed anything, and a message."""
+        """Switches the node off. Returns whether the node was on before, and a message."""
         return self._toggle.off()
 
     def publish(self, signal: ArrayLike) -> None:
-        """Publishes a signal, one or more numbers.
+        """Publishes a signal of one or more numbers, if the node is switched on.
 
         Raises:
-            ValueError: If it is empty or not finite.
+            ValueError: If the signal is empty or not finite.
         """
         values = tuple(np.asarray(signal, dtype=float).ravel().tolist())
         if not values or not all(map(math.isfinite, values)):
@@ -138,7 +138,7 @@ class OperatorNode(ABC):
                 if not all(map(math.isfinite, joy.axes)):
                     raise ValueError(f"axes must be finite, got {', '.join(f'{v:g}' for v in joy.axes)}")
                 self.callback(joy)
-            except Exception as error:  # whatever fails in a user's class, the signal ends
+            except Exception as error:  # after any failure in a user's class, the signal must end
                 reason = str(error) if isinstance(error, ValueError) else cause_of(error)
                 self._warn(self._joy.topic, f"message refused: {reason}")
                 self._end_signal()
@@ -154,7 +154,7 @@ class OperatorNode(ABC):
                 self._send(self._in_force)
 
     def _send(self, values: Sequence[float]) -> None:
-        """Sends a signal before it returns: rospy's own thread might lose the last one of a node that ends."""
+        """Sends a signal, and returns after it was sent: rospy's own thread might lose the last signal at shutdown."""
         if self._sending is not None:
             self._sending.wrap_connections()
         self._publisher.publish(Float64MultiArray(data=values))
@@ -162,5 +162,5 @@ class OperatorNode(ABC):
 
 
 def main(node: type[OperatorNode]) -> None:
-    """Runs the node of a subclass until ROS shuts down."""
+    """Runs the node of a subclass of `OperatorNode` until ROS shuts down."""
     node().spin()

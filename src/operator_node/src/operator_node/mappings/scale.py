@@ -1,4 +1,4 @@
-"""Each axis multiplied by a factor."""
+"""Mapping that multiplies each axis by a factor."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ScaleConfig(AxesConfig):
 
     @property
     def factors(self) -> tuple[float, ...]:
-        """The factor of each of `axes_idx`."""
+        """Factor for each axis in `axes_idx`."""
         return tuple(self.scale) if len(self.scale) > 1 else tuple(self.scale) * len(self.axes_idx)
 
 
@@ -45,5 +45,5 @@ class ScaleMapping(Mapping):
         self._scale = config.factors
 
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
-        """Returns the signal, see `Mapping`."""
+        """Returns the scaled axes, see `Mapping.map`."""
         return tuple(scale * axis for scale, axis in zip(self._scale, self._config.pick(axes)))

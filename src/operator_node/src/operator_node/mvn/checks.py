@@ -1,4 +1,4 @@
-"""Diagnosis of streams whose datagrams are valid: wrong units, axes or order, and segments that stick or jump."""
+"""Diagnoses faults in valid frames: wrong units, axes or orders of numbers, and segments that get stuck or jump."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -11,14 +11,14 @@ from .orientations import inverse, rotate
 from .segments import BONES, INDEX, SEGMENTS, SegmentFrame
 
 SHAPE_PERIOD_S = 0.25
-"""Period of the checks of a person's shape [s]; motion is checked at each frame."""
+"""Period of the checks of a person's shape [s]. The motion is checked at each frame."""
 STUCK_S = 1.0
 MAX_SPEED_M_S, MAX_STEP_M = 25.0, 0.25
-"""Limits of motion between two frames; a segment that exceeds both the speed and the distance jumps."""
+"""Limits of speed and distance between two frames. A segment that exceeds both limits has jumped."""
 MAX_TURN_RAD, TURNING_S = np.radians(60.0), 0.1
-"""Limit of rotation; a segment that exceeds it within that time jumps."""
+"""Limit of rotation between two frames, and time in which it applies. A segment that turns further has jumped."""
 TRUNK_M = (0.15, 5.0)
-"""Range of the distance from pelvis to head; distances outside of it indicate a wrong unit."""
+"""Plausible range of the distance from pelvis to head [m]. Distances outside it indicate a wrong unit."""
 LENGTH_CHANGE, LENGTH_TOLERANCE_M = 0.2, 0.03
 _STRAIGHT = {
     "L5": (0, 0, 1),
@@ -40,21 +40,23 @@ _STRAIGHT = {
     "LeftFoot": (0, 0, -1),
     "LeftToe": (0.9, 0, -0.4),
 }
-"""Approximate direction from the origin of each segment's parent to its own, in the parent's frame, as in the T-pose.
+"""Approximate direction from the origin of a segment's parent to the segment's origin, in the parent's frame.
+
+The directions are those of the T-pose.
 """
 _ROWS = [row for row, (_, child) in enumerate(BONES) if SEGMENTS[child] in _STRAIGHT]
 _PARENTS, _CHILDREN = BONES[_ROWS].T
 _DIRECTIONS = np.array([_STRAIGHT[SEGMENTS[child]] for child in _CHILDREN], dtype=float)
 _DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
 FITTING = np.cos(np.radians(50.0))
-"""Cosine of the largest angle between a bone and that direction."""
+"""Cosine of the largest allowed angle between a bone and its direction in `_STRAIGHT`."""
 _SWAPPED_SIDES = [INDEX[name.replace("Right", "*").replace("Left", "Right").replace("*", "Left")] for name in SEGMENTS]
 
 _Pose = tuple[Array, Array]
 
 
 class Finding(NamedTuple):
-    """A probable fault: its subject and a message."""
+    """A probable fault of the stream: its subject, such as `jump`, and a message for the user."""
 
     subject: str
     message: str
@@ -73,7 +75,7 @@ def _picked(columns: list[int]) -> Callable[[Array], Array]:
 
 
 def _explanations() -> Iterator[tuple[str, Callable[[Array, Array], _Pose]]]:
-    """Yields possible faults of a stream and functions that undo them, the likelier first."""
+    """Yields possible faults of a stream, the most likely first. Each has a text and a function that undoes it."""
     y_up = "the stream is Y-up: set y_up: true, or choose Z-up in MVN"
     yield "quaternions come as x, y, z, w instead of w, x, y, z", _with_quats(_picked([3, 0, 1, 2]))
     yield y_up, lambda positions, quats: (positions[:, [2, 0, 1]], quats[:, [2, 0, 1, 3]])
@@ -94,7 +96,7 @@ def _explanations() -> Iterator[tuple[str, Callable[[Array, Array], _Pose]]]:
 
 
 class FrameChecks:
-    """Checks the frames of one person, one after the other; frames must be uncalibrated, to keep their orientations."""
+    """Checks successive frames of one person. The frames must have the original, uncalibrated orientations."""
 
     def __init__(self) -> None:
         self._before: SegmentFrame | None = None
@@ -104,11 +106,11 @@ class FrameChecks:
         self._lengths: Array | None = None
 
     def check(self, frame: SegmentFrame, now_s: float) -> list[Finding]:
-        """Returns the faults that this frame and the earlier ones reveal.
+        """Returns the faults that a frame and the earlier frames reveal.
 
         Args:
-            frame: The frame.
-            now_s: Time of arrival, by any steady clock [s].
+            frame: The newest frame.
+            now_s: Arrival of the frame, by any steady clock [s].
         """
         findings = [] if self._before is None else self._motion(self._before, frame, now_s)
         if self._before is None:
@@ -174,16 +176,14 @@ class FrameChecks:
 
 
 def _fits(positions: Array, quats: Array) -> Array:
-    """Returns the cosine of the angle between the actual and the expected direction of each bone, in its parent's
-    frame.
-    """
+    """Returns the cosine of the angle between each bone and its expected direction in `_STRAIGHT`."""
     bones = rotate(inverse(quats[_PARENTS]), positions[_CHILDREN] - positions[_PARENTS])
     lengths = np.maximum(np.linalg.norm(bones, axis=1), 1e-9)
     return np.asarray(np.einsum("ij,ij->i", bones, _DIRECTIONS) / lengths)
 
 
 def _explanation(frame: SegmentFrame) -> str | None:
-    """Returns the fault whose correction makes all bones fit best, or None."""
+    """Returns the fault whose correction makes all bones fit best; None if no correction makes all bones fit."""
     best, best_fit = None, -1.0
     for words, undo in _explanations():
         fits = _fits(*undo(frame.positions, frame.quats_xyzw))
@@ -193,7 +193,7 @@ def _explanation(frame: SegmentFrame) -> str | None:
 
 
 def _unit(trunk_m: float) -> tuple[str, float] | None:
-    """Returns the unit in which a person may have this length, and its factor to metres."""
+    """Returns the unit that would make a trunk length plausible, and the factor from this unit to metres, or None."""
     for name, scale in (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)):
         if 0.35 <= trunk_m * scale <= 1.1:
             return name, scale

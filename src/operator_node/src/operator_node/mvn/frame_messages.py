@@ -1,4 +1,4 @@
-"""Messages of frames: TF, poses and RViz markers of the segments of a person."""
+"""Converts frames of a person's segments to messages: TF, poses and RViz markers."""
 
 import struct
 from io import BytesIO
@@ -15,49 +15,49 @@ from .segments import BONES, SEGMENTS, SegmentFrame
 
 _COUNT = struct.Struct("<I")
 NORMS = (0.9, 1.1)
-"""Range of the length of a quaternion; others are rejected."""
+"""Allowed range of the norm of a quaternion."""
 LINE_M, HEAD_M = 0.035, 0.20
 COLOURS = ((0.16, 0.42, 0.72), (0.85, 0.45, 0.12), (0.20, 0.60, 0.35), (0.60, 0.30, 0.65))
-"""Colours of the people, in turn."""
+"""Colours of the people, red, green, blue. With more people, colours repeat."""
 _TIPS = {
     "RightHand": (0.0, -0.16, 0.0),
     "LeftHand": (0.0, 0.16, 0.0),
     "RightToe": (0.07, 0, 0),
     "LeftToe": (0.07, 0, 0),
 }
-"""Tip of segments without children, in their frames [m]."""
+"""Position of the tip of segments without children, in the segment's frame [m]."""
 _HEAD_M = 0.09
 """Height of the middle of the head above its joint [m]."""
 
 
 class SerializedTransforms(TFMessage):
-    """A serialised message for /tf; its `transforms` stay empty."""
+    """A message for /tf whose content is serialised already. Its field `transforms` stays empty."""
 
     packed: bytes
 
     def serialize(self, buff: BytesIO) -> None:
-        """Writes it to a buffer."""
+        """Writes the serialised message to a buffer."""
         buff.write(self.packed)
 
 
 class SerializedPoses(PoseArray):
-    """Serialised poses, with an ordinary header; its `poses` stay empty."""
+    """A message whose poses are serialised already, but not the header. Its field `poses` stays empty."""
 
     packed: bytes
 
     def serialize(self, buff: BytesIO) -> None:
-        """Writes it to a buffer."""
+        """Writes the header and the serialised poses to a buffer."""
         header = self.header
         buff.write(struct.pack("<3I", header.seq, header.stamp.secs, header.stamp.nsecs) + _text(header.frame_id))
         buff.write(self.packed)
 
 
 class FramePacker:
-    """Creates the messages of one person.
+    """Creates the TF and pose messages of one person.
 
     Args:
-        prefix: Prefix of the TF frames of the segments.
-        parent: Their parent TF frame.
+        prefix: Prefix of the segments' TF frames.
+        parent: Parent TF frame of all segments.
     """
 
     def __init__(self, prefix: str, parent: str) -> None:
@@ -66,7 +66,7 @@ class FramePacker:
         self._pack = struct.Struct("<I" + "".join(f"3I{len(text)}s7d" for text in self._texts)).pack
 
     def messages(self, frame: SegmentFrame, stamp: rospy.Time) -> tuple[TFMessage, PoseArray]:
-        """Returns the transforms and the poses of a frame."""
+        """Returns a TF message and a PoseArray with all segments of a frame."""
         rows = np.concatenate((frame.positions, frame.quats_xyzw), axis=1)
         numbers: list[object] = []
         for text, row in zip(self._texts, rows.tolist()):
@@ -84,10 +84,11 @@ def _text(text: str) -> bytes:
 
 
 def frame_in(message: PoseArray) -> SegmentFrame:
-    """Returns the segments in a message.
+    """Converts the poses in a message to a frame of segments.
 
     Raises:
-        ValueError: If there are not 23, a number is not finite or a quaternion has not length 1.
+        ValueError: If the number of poses is not 23, a number is not finite, or the norm of a quaternion is outside
+            `NORMS`.
     """
     if len(message.poses) != len(SEGMENTS):
         raise ValueError(f"expected {len(SEGMENTS)} poses, got {len(message.poses)}")
@@ -109,11 +110,11 @@ def frame_in(message: PoseArray) -> SegmentFrame:
 
 
 class PersonMarkers:
-    """The markers of one person, each locked to the TF frame of its segment, so that they move with it.
+    """Creates the RViz markers of one person. Each marker is locked to the TF frame of its segment and moves with it.
 
     Args:
-        number: Number of the person.
-        prefix: Prefix of the TF frames of the segments.
+        number: Number of the person, from 0.
+        prefix: Prefix of the segments' TF frames.
     """
 
     def __init__(self, number: int, prefix: str) -> None:
@@ -131,7 +132,7 @@ class PersonMarkers:
         head.pose.position.z = _HEAD_M
 
     def message(self, frame: SegmentFrame) -> MarkerArray:
-        """Returns the markers of the bones of a frame; bones are rigid, so that markers are sent rarely."""
+        """Returns the markers for the bones in a frame. Bones are rigid, so it is enough to send markers rarely."""
         parents, children = BONES.T
         vectors = frame.positions[children] - frame.positions[parents]
         ends = rotate(inverse(frame.quats_xyzw[parents]), vectors)
@@ -144,7 +145,7 @@ class PersonMarkers:
         return MarkerArray([each for name, each in self._markers.items() if each.points or name == "Head"])
 
     def removal(self) -> MarkerArray:
-        """Returns a message that removes the person."""
+        """Returns a message that removes the person's markers from RViz."""
         return MarkerArray(
             [
                 Marker(header=each.header, ns=each.ns, id=each.id, action=Marker.DELETE)
@@ -154,5 +155,5 @@ class PersonMarkers:
 
 
 def _line(end: np.ndarray) -> list[Point]:
-    """Returns a line from the origin."""
+    """Returns the two end points of a line from the origin to `end` (3) [m]."""
     return [Point(), Point(*end.tolist())]

@@ -1,4 +1,4 @@
-"""Orientations of segments: arrays of quaternions (n x 4, x, y, z, w), and the calibration in a T-pose."""
+"""Computes with orientations of segments as quaternions (n x 4), x, y, z, w, and calibrates them in a T-pose."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,38 +9,38 @@ from custom_ros_tools.transforms import Array
 from .segments import SEGMENTS, SegmentFrame
 
 MAX_OFFSET_RAD = np.radians(45.0)
-"""Largest offset of a segment; beyond it the pose is rejected as no T-pose."""
+"""Largest angle between a segment and its orientation in a T-pose [rad]. Beyond it, the calibration is refused."""
 
 
 def multiply(a: Array, b: Array) -> Array:
-    """Returns the products a b: rotation by b, then by a."""
+    """Returns the products a b of quaternions (n x 4): rotation by b, then by a."""
     return np.asarray((Rotation.from_quat(a) * Rotation.from_quat(b)).as_quat())
 
 
 def inverse(quats: Array) -> Array:
-    """Returns the inverse of unit quaternions."""
+    """Returns the inverses of unit quaternions (n x 4)."""
     return quats * (-1.0, -1.0, -1.0, 1.0)
 
 
 def rotate(quats: Array, vectors: Array) -> Array:
-    """Returns vectors (n x 3) rotated by quaternions."""
+    """Returns vectors (n x 3), each rotated by its quaternion (n x 4)."""
     return np.asarray(Rotation.from_quat(quats).apply(vectors))
 
 
 def heading_rad(quat: Array) -> float:
-    """Returns the rotation of a unit quaternion (4) about z, as the twist of its swing-twist decomposition [rad]."""
+    """Returns the rotation angle about z of a unit quaternion (4) [rad], by swing-twist decomposition."""
     return float(2.0 * np.arctan2(quat[2], quat[3]))
 
 
 def about_z(angle_rad: float) -> Array:
-    """Returns a rotation about z, as a quaternion (4)."""
+    """Returns the quaternion (4) of a rotation about z by an angle [rad]."""
     return np.array((0.0, 0.0, np.sin(angle_rad / 2.0), np.cos(angle_rad / 2.0)))
 
 
 class Calibration:
-    """Corrects orientations such that, in the calibrated pose, all segments are upright and face the heading of the
-    pelvis.
+    """Corrects the orientations of segments by constant offsets, one for each segment and person.
 
+    With the offsets, all segments are upright in the pose of the calibration, and face the heading of the pelvis.
     Positions stay unchanged.
     """
 
@@ -53,10 +53,10 @@ class Calibration:
         return sorted(self._offsets)
 
     def fit(self, frame: SegmentFrame) -> str:
-        """Calibrates a person with a frame, which must be uncalibrated; returns a summary.
+        """Calibrates a person with an uncalibrated frame in the T-pose. Returns a summary for the user.
 
         Raises:
-            InterfaceError: If it is no T-pose.
+            InterfaceError: If the frame is not a T-pose.
         """
         ahead = np.tile(about_z(heading_rad(frame.quats_xyzw[0])), (len(SEGMENTS), 1))
         offsets = multiply(inverse(frame.quats_xyzw), ahead)
@@ -69,10 +69,10 @@ class Calibration:
         return f"person {frame.person}: at most, {found}"
 
     def clear(self) -> None:
-        """Removes all offsets."""
+        """Removes the offsets of all people."""
         self._offsets = {}
 
     def apply(self, frame: SegmentFrame) -> SegmentFrame:
-        """Returns a frame with the offsets of its person applied."""
+        """Returns a frame with corrected orientations; the same frame if its person is not calibrated."""
         offsets = self._offsets.get(frame.person)
         return frame if offsets is None else frame._replace(quats_xyzw=multiply(frame.quats_xyzw, offsets))

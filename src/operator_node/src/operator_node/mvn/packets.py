@@ -1,6 +1,6 @@
-"""Datagrams of the MVN network streaming protocol (rev. N, 2018), checked and parsed.
+"""Checks and parses datagrams of the MVN network streaming protocol (rev. N, 2018).
 
-Numbers are big-endian. Unusable datagrams raise a `PacketError`, whose reason is one of `REASONS`.
+Numbers are big-endian. Invalid datagrams raise a `PacketError`, whose reason is a key of `REASONS`.
 """
 
 import re
@@ -16,13 +16,15 @@ from .segments import SEGMENTS
 
 DEFAULT_PORT = 9763
 HEADER = struct.Struct(">6sIBBIBBBBHH")
-"""ID, sample counter, datagram counter, items, time code, person, segments, props, fingers, reserved, payload size."""
+"""Header: ID, sample counter, datagram counter, number of items, time code, person, numbers of segments, props and
+fingers, reserved, payload size.
+"""
 LAST = 0x80
 """Bit of the datagram counter that marks the last datagram of a message."""
 MAX_PROPS, FINGERS = 4, 40
 MAX_ITEMS = len(SEGMENTS) + MAX_PROPS + FINGERS
 MAX_MAGNITUDE = 1e6
-"""Largest magnitude of a number, in any unit; datagrams with larger ones are refused."""
+"""Largest allowed magnitude of a number, in any unit. Datagrams with larger numbers are refused."""
 
 POSE_EULER, POSE_QUATERNION, UNITY = 1, 2, 5
 PERSON_INFO, SCALE = 12, 13
@@ -36,9 +38,12 @@ ITEMS: dict[int, tuple[int, tuple[int, ...]]] = {
     TRACKERS: (1, (10, 16)),
     CENTER_OF_MASS: (0, (3, 9)),
 }
-"""For each type with items: number of ids at the start of an item, and possible numbers of values, 4 bytes each."""
+"""For each type with items: number of ids at the start of an item, and possible numbers of values after the ids.
+
+Each id and each value has 4 bytes.
+"""
 TEXTS = (PERSON_INFO, SCALE, TIME_CODE)
-"""Types whose messages consist of a single datagram."""
+"""Types whose payload is not an array of items. Each message consists of a single datagram."""
 REASONS = {
     "too short": "shorter than a header",
     "not MVN": "does not begin with MXTP and two digits",
@@ -62,7 +67,7 @@ _MAX_NAME_BYTES = 64
 
 
 class PacketError(ValueError):
-    """A datagram is unusable."""
+    """A datagram is invalid. `reason` is a key of `REASONS`."""
 
     def __init__(self, reason: str, detail: str = "") -> None:
         self.reason = reason
@@ -70,18 +75,18 @@ class PacketError(ValueError):
 
 
 class Datagram(NamedTuple):
-    """A datagram whose size is right and whose numbers are finite.
+    """A parsed datagram, with the correct size and finite numbers.
 
     Attributes:
-        kind: Its type.
-        sample: Sample counter, the same for all datagrams of a frame.
-        part: Index of the part of the message, from 0.
-        is_last: Whether it is the last part.
+        kind: Message type, such as `POSE_QUATERNION`.
+        sample: Sample counter, equal for all datagrams of a frame.
+        part: Index of the datagram within its message, from 0.
+        is_last: Whether the datagram is the last one of its message.
         time_ms: Time since the recording began [ms].
         person: Number of the person, from 0.
-        ids: Ids at the start of the items (n x 1 or 2), empty for texts.
-        values: The other numbers of the items (n x m), empty for texts.
-        text: Payload after the header, for texts.
+        ids: Ids at the start of the n items (n x 1 or n x 2); empty for the types in `TEXTS`.
+        values: Values of the n items after the ids (n x m); empty for the types in `TEXTS`.
+        text: Payload of a datagram whose type is in `TEXTS`; empty for other types.
     """
 
     kind: int
@@ -99,10 +104,10 @@ _NOTHING = np.zeros((0, 0))
 
 
 def parse(data: bytes) -> Datagram:
-    """Parses a datagram.
+    """Checks and parses a datagram.
 
     Raises:
-        PacketError: If it is unusable.
+        PacketError: If the datagram is invalid or of an unsupported type.
     """
     if len(data) < HEADER.size:
         raise PacketError("too short", f"{len(data)} bytes")
@@ -135,7 +140,7 @@ def _items(kind: int, count: int, payload: bytes) -> tuple[Array, Array]:
         raise PacketError("size", f"type {kind:02}, {count} items in {len(payload)} bytes")
     ids = np.frombuffer(payload, ">i4").reshape(count, length)[:, :id_count]
     bits = np.frombuffer(payload, ">u4").reshape(count, length)[:, id_count:]
-    if ((bits & _EXPONENT) == _EXPONENT).any():  # numpy warns about some of them when they are converted
+    if ((bits & _EXPONENT) == _EXPONENT).any():  # checked before the conversion, where numpy may warn
         raise PacketError("not finite", f"type {kind:02}")
     values = bits.view(">f4").astype(float)
     if np.abs(values).max() > MAX_MAGNITUDE:
@@ -144,10 +149,15 @@ def _items(kind: int, count: int, payload: bytes) -> tuple[Array, Array]:
 
 
 def body_rows(ids: Array) -> NDArray[np.intp]:
-    """Returns the indices of the rows of the segments, in their order (23); props and fingers follow those of the body.
+    """Returns the indices of the rows with the 23 segments of the body, in the order of `SEGMENTS`.
+
+    Rows after the first 23 belong to props and fingers, and are ignored.
+
+    Args:
+        ids: Ids of the items in a message (n x 1).
 
     Raises:
-        PacketError: If the body is incomplete.
+        PacketError: If the first rows do not contain each segment once.
     """
     body = ids[: len(SEGMENTS), 0]
     order = np.argsort(body, kind="stable")
@@ -160,10 +170,10 @@ _IDS = np.arange(1, len(SEGMENTS) + 1)
 
 
 def unit_quats(quats: Array) -> tuple[Array, float]:
-    """Returns quaternions (n x 4) normalised, and the length that differs most from 1.
+    """Normalises quaternions (n x 4). Returns them and the original norm that differed most from 1.
 
     Raises:
-        PacketError: If one is zero.
+        PacketError: If a quaternion is zero.
     """
     norms = np.sqrt(np.einsum("ij,ij->i", quats, quats))
     if norms.min() < _MIN_NORM:
@@ -172,16 +182,16 @@ def unit_quats(quats: Array) -> tuple[Array, float]:
 
 
 def info_in(text: bytes) -> dict[str, str]:
-    """Returns the fields of a datagram of type 12, by key, such as `name`."""
+    """Returns the fields in a datagram of type 12 (person info), keyed by names such as `name`."""
     lines = re.findall(r"([\w ]{1,64}):[ \t]*([^\n\r\0]{0,256})", text[:4096].decode("ascii", "replace"))
     return {key.strip(): value.strip() for key, value in lines[:64]}
 
 
 def time_code_in(text: bytes) -> str:
-    """Returns the time of day in a datagram of type 25, as HH:MM:SS.mmm.
+    """Returns the time of day in a datagram of type 25 (time code), as HH:MM:SS.mmm.
 
     Raises:
-        PacketError: If it has none.
+        PacketError: If the datagram contains no such time.
     """
     found = _TIME_CODE.search(text[:64])
     if found is None:
@@ -190,12 +200,12 @@ def time_code_in(text: bytes) -> str:
 
 
 def t_pose_in(text: bytes) -> dict[str, tuple[float, float, float]]:
-    """Returns the origins of segments in the T-pose [m], by name, from a datagram of type 13.
+    """Returns the segments' origins in the T-pose [m], keyed by segment, from a datagram of type 13 (scale).
 
-    Other datagrams of that type have points of the skin, and no segments.
+    The result is empty for those datagrams of type 13 that contain points on the skin instead of segments.
 
     Raises:
-        PacketError: If its size does not match its counts.
+        PacketError: If the size of the datagram does not match its counts, or a number is not finite.
     """
     reader = _PayloadReader(text)
     origins = {}

@@ -1,4 +1,4 @@
-"""`mvn_player.py FILE`: sends a recorded stream of MVN with its timing."""
+"""`mvn_player.py FILE`: sends a recorded stream of MVN with the recorded timing."""
 
 import argparse
 import socket
@@ -18,9 +18,12 @@ PAUSE_S = 0.02
 
 
 def send(timed: Iterable[tuple[float, bytes]], host: str, port: int) -> int:
-    """Sends datagrams by UDP, each at its time [s] from now; late ones are sent at once. Returns their number.
+    """Sends datagrams by UDP, and returns their number. It is not an error if nobody receives them.
 
-    A missing receiver is no error.
+    Args:
+        timed: Datagrams, each with the time from now at which to send it [s]. Late datagrams are sent at once.
+        host: Address of the receiver.
+        port: UDP port of the receiver.
     """
     count = 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -51,12 +54,12 @@ def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Itera
     """Yields the datagrams of a recording, each with the time at which to send it [s].
 
     Args:
-        path: The recording.
-        speed: Factor of the speed of the recording.
-        loop: Whether it is repeated forever.
+        path: File of the recording.
+        speed: Factor by which to play the recording faster than it was recorded.
+        loop: Whether to repeat the recording without end.
 
     Raises:
-        InterfaceError: If it cannot be read, or is empty.
+        InterfaceError: If the recording cannot be read, or is empty.
     """
     begin_s = time_s = 0.0
     count = 0
@@ -73,7 +76,7 @@ def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Itera
 
 
 def main() -> int:
-    """Runs the command; returns its exit code."""
+    """Runs the command and returns its exit code."""
     parser = sender_arguments("mvn_player.py", __doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="recording of mvn_node.py")
     parser.add_argument("--speed", type=float, default=1.0, help="factor of the recorded speed")

@@ -1,4 +1,4 @@
-"""Receives a stream of MVN by UDP: decodes, checks, calibrates and records it."""
+"""Receives a stream of MVN by UDP, and decodes, checks, calibrates and records the stream."""
 
 import contextlib
 import select
@@ -22,7 +22,7 @@ from .segments import SegmentFrame
 from .stream import StreamDecoder
 
 MAX_DATAGRAMS = 64
-"""Largest number of datagrams that are read before their events are returned."""
+"""Largest number of datagrams that one call reads before it returns the events."""
 MAX_DATAGRAM_BYTES = 65_535
 BUFFER_BYTES = 1 << 20
 REMARK_PERIOD_S = 1.0
@@ -42,22 +42,22 @@ class MvnConfig(ConfigModel):
 
 
 class Silence(NamedTuple):
-    """No frame of a person has arrived for some time [s]; reported once."""
+    """Event: no frame of a person has arrived for `seconds` [s]. Reported once per silence."""
 
     person: int
     seconds: float
 
 
 class Refused(NamedTuple):
-    """A datagram was refused; the reason is one of `packets.REASONS`."""
+    """Event: a datagram was refused. `reason` is a key of `packets.REASONS`."""
 
     reason: str
 
 
 class Receiver:
-    """A socket, and the decoding of the datagrams that it receives.
+    """Receives datagrams by a socket, and converts them to events.
 
-    One thread opens, polls and closes it; others may calibrate and record meanwhile.
+    The same thread must call `open`, `poll` and `close`. Other threads may calibrate and record at the same time.
     """
 
     def __init__(self, config: MvnConfig) -> None:
@@ -66,7 +66,7 @@ class Receiver:
         self._decoder = StreamDecoder(config.position_scale, bool(config.y_up), config.max_people)
         self._checks: dict[int, FrameChecks] = {}
         self._newest: dict[int, tuple[float, SegmentFrame]] = {}
-        """Arrival and uncalibrated value of the newest frame of each person who is present."""
+        """Arrival [s] and uncalibrated value of each present person's newest frame, keyed by the person's number."""
         self._socket: socket.socket | None = None
         self._remarks_due_s = 0.0
         self._lock = threading.Lock()
@@ -74,29 +74,29 @@ class Receiver:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of datagrams by result, see `StreamDecoder`."""
+        """Number of datagrams, keyed by result, see `StreamDecoder`."""
         return self._decoder.counts
 
     @property
     def refusals(self) -> dict[str, str]:
-        """Details of the newest refused datagram, by reason."""
+        """Details of the newest refused datagram, keyed by reason."""
         return self._decoder.refusals
 
     @property
     def people(self) -> list[int]:
-        """Numbers of the people whose frames arrive."""
+        """Numbers of the people whose frames are arriving, sorted."""
         return sorted(self._newest.copy())
 
     @property
     def port(self) -> int:
-        """The port in use; 0 while the socket is closed."""
+        """The UDP port in use; 0 while the socket is closed."""
         return int(self._socket.getsockname()[1]) if self._socket else 0
 
     def open(self) -> None:
-        """Starts to listen.
+        """Starts to listen for datagrams.
 
         Raises:
-            OSError: If the address is not available.
+            OSError: If the address or the port is not available.
         """
         self.close()
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -119,7 +119,9 @@ class Receiver:
         self._forget()
 
     def poll(self, timeout_s: float) -> list[Any]:
-        """Returns new events: messages, `Finding`s, `Refused` and `Silence`; an empty list after the timeout.
+        """Waits for datagrams, and returns the new events; an empty list after the timeout.
+
+        Events are messages of MVN, `Finding`, `Refused` and `Silence`.
 
         Args:
             timeout_s: Longest time to wait [s].
@@ -182,13 +184,14 @@ class Receiver:
         self._decoder.remarks.clear()
         return found
 
-    # --- For other threads.
+    # --- Methods for other threads.
 
     def calibrate(self) -> str:
-        """Calibrates everybody with their present pose as the T-pose; returns a summary.
+        """Calibrates all present people, with their present poses as T-poses. Returns a summary for the user.
 
         Raises:
-            InterfaceError: If nobody is present, or a pose is no T-pose; that person's offsets stay unchanged then.
+            InterfaceError: If no person is present, or a pose is not a T-pose. The offsets of the person in question
+                then stay unchanged.
         """
         newest = self._newest.copy()
         if not newest:
@@ -196,10 +199,10 @@ class Receiver:
         return "; ".join(self.calibration.fit(frame) for _, frame in newest.values())
 
     def start_recording(self, path: Path) -> None:
-        """Starts to record datagrams.
+        """Starts to record datagrams into a new file.
 
         Raises:
-            InterfaceError: If a recording is running, or the file cannot be created.
+            InterfaceError: If a recording is running already, or the file cannot be created.
         """
         with self._lock:
             if self._recording is not None:
@@ -207,10 +210,10 @@ class Receiver:
             self._recording = DatagramRecording(path)
 
     def stop_recording(self) -> tuple[Path, int]:
-        """Ends the recording; returns its path and its number of datagrams.
+        """Ends the recording. Returns the path of the file and the number of recorded datagrams.
 
         Raises:
-            InterfaceError: If none is running, or the remaining data cannot be written.
+            InterfaceError: If no recording is running, or the remaining data cannot be written.
         """
         with self._lock:
             recording, self._recording = self._recording, None

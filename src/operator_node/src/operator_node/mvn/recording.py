@@ -1,7 +1,7 @@
-"""Recordings of a stream: each datagram as received, with its time of arrival.
+"""Writes and reads recordings of a stream: the unchanged datagrams, with their times of arrival.
 
-A file begins with the line `MVN datagrams 1`. Each record consists of the arrival since the first one [s] as a
-big-endian double, the length as a big-endian unsigned short, and that number of bytes.
+A file begins with the line `MVN datagrams 1`. Each record consists of three parts: the time since the first datagram's
+arrival [s] as a big-endian double, the datagram's length as a big-endian unsigned short, and the datagram.
 """
 
 import struct
@@ -17,17 +17,17 @@ _RECORD = struct.Struct(">dH")
 
 
 class Record(NamedTuple):
-    """A datagram and its arrival since the first one [s]."""
+    """A datagram, and the time from the first datagram's arrival to its arrival [s]."""
 
     time_s: float
     data: bytes
 
 
 class DatagramRecording:
-    """Writes datagrams to a file.
+    """Writes datagrams to a new file.
 
     Raises:
-        InterfaceError: If the file exists, or cannot be written.
+        InterfaceError: If the file exists already, or cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -41,10 +41,10 @@ class DatagramRecording:
             raise _cannot_write(path, error) from None
 
     def write(self, now_s: float, data: bytes) -> None:
-        """Appends a datagram with its arrival by any steady clock [s].
+        """Appends a datagram that arrived at the time `now_s` of any steady clock [s].
 
         Raises:
-            InterfaceError: If it cannot be written, for instance because the disk is full.
+            InterfaceError: If the file cannot be written, for instance because the disk is full.
         """
         if self._begin_s is None:
             self._begin_s = now_s
@@ -71,10 +71,10 @@ def _cannot_write(path: Path, error: OSError) -> InterfaceError:
 
 
 def read_recording(path: Path) -> Iterator[Record]:
-    """Yields the records; one that is cut off at the end of the file is dropped.
+    """Yields the records of a file. An incomplete record at the end of the file is dropped.
 
     Raises:
-        InterfaceError: If the file cannot be read, is no recording, or has invalid times.
+        InterfaceError: If the file cannot be read, is not a recording, or has invalid times.
     """
     try:
         with open(path, "rb") as file:

@@ -1,4 +1,4 @@
-"""The 23 rigid segments of a person, and the messages of MVN about a person."""
+"""Names and structure of the 23 rigid segments of a person, and the types of MVN's messages."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ SEGMENTS = (
     "LeftFoot",
     "LeftToe",
 )
-"""Names of the segments in the order of the stream, whose ids start at 1 (MVN network streaming protocol, rev. N)."""
+"""Names of the segments in the order of the stream (MVN network streaming protocol, rev. N). Ids start at 1."""
 INDEX = {name: index for index, name in enumerate(SEGMENTS)}
 PARENTS = tuple(
     -1 if parent is None else INDEX[parent]
@@ -43,25 +43,26 @@ PARENTS = tuple(
         *("Pelvis", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot"),
     )
 )
-"""Index of each segment's parent, -1 for the pelvis."""
+"""Index of each segment's parent; -1 for the pelvis."""
 BONES = np.array([(parent, child) for child, parent in enumerate(PARENTS) if parent >= 0])
-"""Each bone as the pair of segments whose origins it connects, parent first (22 x 2); it is rigid, and rotates with its
-parent.
+"""Indices of the segments whose origins each bone connects, parent first (22 x 2).
+
+A bone is rigid, and rotates with its parent segment.
 """
 
 
 class SegmentFrame(NamedTuple):
     """All segments of one person at one moment.
 
-    The origin of a segment is the centre of the joint towards the pelvis. In the T-pose all have the same
+    The origin of a segment is the centre of its joint towards the pelvis. In the T-pose, all segments have the same
     orientation: x forward, y left, z up.
 
     Attributes:
         person: Number of the person, from 0.
-        sample: Counter of the frame.
+        sample: Sample counter of the frame.
         time_ms: Time since the recording began [ms].
-        positions: Origins in the world (23 x 3) [m].
-        quats_xyzw: Orientations in the world (23 x 4), unit quaternions x, y, z, w.
+        positions: Origins of the segments in the world (23 x 3) [m].
+        quats_xyzw: Orientations of the segments in the world (23 x 4), unit quaternions x, y, z, w.
     """
 
     person: int
@@ -76,10 +77,10 @@ class JointAngles(NamedTuple):
 
     Attributes:
         person: Number of the person, from 0.
-        sample: Counter of the frame.
-        parents: Name of the segment on the pelvis' side of each joint.
-        children: Name of the one on the other side.
-        angles_rad: Angles about x, y and z of each joint (n x 3) [rad].
+        sample: Sample counter of the frame.
+        parents: For each joint, name of the segment towards the pelvis.
+        children: For each joint, name of the segment away from the pelvis.
+        angles_rad: Angles of each joint about x, y and z (n x 3) [rad].
     """
 
     person: int
@@ -102,11 +103,12 @@ class SegmentMotion(NamedTuple):
 
     Attributes:
         person: Number of the person, from 0.
-        sample: Counter of the frame.
-        kind: The type. 21: position, velocity, acceleration [m, m/s, m/s2]; 22: quaternion w, x, y, z, angular
-            velocity, angular acceleration [deg/s, deg/s2]; 23: quaternion w, x, y, z, acceleration, magnetic field.
-        ids: Ids of segments, from 1, or of trackers.
-        values: Values of each of them, in that order.
+        sample: Sample counter of the frame.
+        kind: Message type, which defines the columns of `values`. Type 21: position, velocity, acceleration
+            [m, m/s, m/s2]. Type 22: quaternion w, x, y, z, angular velocity, angular acceleration [deg/s, deg/s2].
+            Type 23: quaternion w, x, y, z, acceleration, magnetic field.
+        ids: Ids of the n segments, from 1, or of the n trackers.
+        values: Values of each segment or tracker (n x m), in the order of `ids`.
     """
 
     person: int
@@ -117,14 +119,14 @@ class SegmentMotion(NamedTuple):
 
 
 class PersonInfo(NamedTuple):
-    """Fields of a person, by key, such as `name` and `color` (type 12)."""
+    """Descriptive fields of a person, keyed by names such as `name` and `color` (type 12)."""
 
     person: int
     fields: dict[str, str]
 
 
 class TPose(NamedTuple):
-    """Origins of a person's segments in the T-pose [m], by segment (type 13)."""
+    """Origins of a person's segments in the T-pose [m], keyed by segment (type 13)."""
 
     person: int
     origins: dict[str, tuple[float, float, float]]

@@ -1,4 +1,4 @@
-"""Decodes datagrams of MVN into frames of people: grouped by person and sample, in metres, z up."""
+"""Assembles datagrams of MVN, by person and sample, into messages with positions in metres and z up."""
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
@@ -23,14 +23,15 @@ from .segments import (
 )
 
 MAX_BEHIND = 100
-"""Number of samples by which a datagram may be behind and count as late; further behind, the stream has restarted."""
+"""Largest number of samples by which a late datagram is behind. If it is further behind, the stream has restarted."""
 MAX_LATE = 20
-"""Number of consecutive late datagrams of a message type after which the stream counts as restarted, as when a short
-recording is repeated.
+"""Number of consecutive late datagrams of a message type after which the stream counts as restarted.
+
+This happens when a short recording is repeated.
 """
 MAX_REFUSED = 1000
 LONG_GONE = 500
-"""Number of datagrams of others after which a person may be replaced by a new one, if there are too many."""
+"""Number of other people's datagrams after which a person who sends none may be replaced by a new person."""
 LENGTH_TOLERANCE = 0.01
 _COUNTER_RANGE = 2**32
 _METRES_PER_CM = 0.01
@@ -38,7 +39,7 @@ _METRES_PER_CM = 0.01
 
 @dataclass
 class _Group:
-    """The newest message of one type of one person."""
+    """Datagrams of the newest message, for one person and one message type."""
 
     sample: int
     parts: dict[int, Datagram] = field(default_factory=dict)
@@ -48,25 +49,26 @@ class _Group:
 
 
 class StreamDecoder:
-    """Assembles messages from datagrams, in any order of arrival; its memory is bounded for any input.
+    """Assembles messages from datagrams, which may arrive in any order. The memory is bounded for any input.
 
-    A message is returned once all of its datagrams have arrived, and dropped when one of a newer sample arrives first.
+    A message is returned when its last missing datagram arrives. An incomplete message is dropped when a datagram of a
+    newer sample arrives.
 
     Args:
-        position_scale: Factor of positions of types 02, 21 and 24 to metres.
-        y_up: Whether those types have the y axis up, an option of MVN; otherwise z is up. Type 01 always has y up and
-            is in centimetres.
-        max_people: Largest number of people; messages of further ones are refused.
+        position_scale: Factor that converts positions of types 02 and 24 to metres.
+        y_up: Whether MVN sends these types with the y axis up; otherwise z is up. Type 01 always has y up, and
+            positions in centimetres.
+        max_people: Largest number of people. Messages of further people are refused.
 
     Attributes:
-        counts: `received` is the number of datagrams; each of them is `used`, `late`, `duplicate`, `incomplete` (its
-            message was dropped), `ignored` (type 01 when type 02 is sent, too) or `refused: REASON`, or waits for the
-            rest of its message. In addition, `frames` is the number of `SegmentFrame`s returned, and `skipped` the
-            number of samples missing between those: they were lost or late, or MVN streams at a lower rate than it
-            measures.
-        refused: Reason of each refused datagram, of `packets.REASONS`, limited to the newest; may be emptied.
-        refusals: Details of the newest refusal for each reason.
-        remarks: Oddities, by subject; may be emptied.
+        counts: Numbers of datagrams, keyed by result. `received` counts all datagrams. Each datagram is also counted
+            as `used`, `late`, `duplicate`, `incomplete` (its message was dropped), `ignored` (type 01 if type 02 is
+            sent, too) or `refused: REASON`, unless it waits for the rest of its message. Two further keys are
+            `frames`, the number of returned `SegmentFrame`s, and `skipped`, the number of missing samples between
+            them. Samples are missing if they are lost or late, or if MVN streams at a lower rate than it measures.
+        refused: Reasons of the newest refused datagrams, from `packets.REASONS`. The caller may clear it.
+        refusals: Details of the newest refusal, keyed by reason.
+        remarks: Descriptions of unusual data, keyed by subject. The caller may clear it.
     """
 
     def __init__(self, position_scale: float = 1.0, y_up: bool = False, max_people: int = 8) -> None:
@@ -77,11 +79,11 @@ class StreamDecoder:
         self._scale, self._y_up, self._max_people = position_scale, y_up, max_people
         self._groups: dict[tuple[int, int], _Group] = {}
         self._people: dict[int, int] = {}
-        """Value of `received` at the last datagram of each person."""
+        """Value of `counts["received"]` at the last datagram of each person, keyed by the person's number."""
         self._frame_samples: dict[int, int] = {}
 
     def reset(self) -> None:
-        """Drops the state of the stream, for instance after a silence; counts continue."""
+        """Drops all incomplete messages and known people, for instance after a silence. The counts are kept."""
         for group in self._groups.values():
             self._drop(group)
         self._groups.clear()
@@ -94,7 +96,7 @@ class StreamDecoder:
         return sum(len(group.parts) for group in self._groups.values())
 
     def decode(self, data: bytes) -> Message | None:
-        """Decodes one datagram; returns the message that it completes, if any."""
+        """Decodes one datagram. Returns the message that the datagram completes; None if it completes no message."""
         self.counts["received"] += 1
         try:
             datagram = packets.parse(data)
@@ -114,7 +116,11 @@ class StreamDecoder:
         self.refusals[error.reason] = str(error)
 
     def _admit(self, person: int) -> None:
-        """Admits a person; if there are too many, one without datagrams for long is replaced."""
+        """Adds a person to the known people. If there are too many, replaces one who has sent nothing for long.
+
+        Raises:
+            PacketError: If all known people are still sending.
+        """
         received = self.counts["received"]
         if person not in self._people and len(self._people) >= self._max_people:
             oldest = min(self._people, key=self._people.__getitem__)
@@ -130,7 +136,7 @@ class StreamDecoder:
             self._drop(self._groups.pop(key))
 
     def _grouped(self, datagram: Datagram) -> Message | None:
-        """Returns the message that a datagram completes."""
+        """Adds a datagram to its group. Returns the message that the datagram completes, or None."""
         group = self._group_of(datagram)
         if group is None:
             return None
@@ -210,7 +216,7 @@ class StreamDecoder:
         return SegmentMotion(person, sample, kind, tuple(ids[:, 0].tolist()), values)
 
     def _poses(self, kind: int, values: Array) -> tuple[Array, Array]:
-        """Returns positions [m] and quaternions x, y, z, w, z up."""
+        """Converts values of type 01 or 02 to positions [m] and quaternions x, y, z, w, with z up."""
         if kind == packets.POSE_EULER:
             quats, scale, y_up = _quats_of_euler(values[:, 3:]), _METRES_PER_CM, True
         else:
@@ -223,18 +229,22 @@ class StreamDecoder:
 
 
 _Z_UP = [2, 0, 1]
-"""Components of a y-up vector that are x, y and z of a z-up one; a person faces z there, and x here."""
+"""Indices of the components of a y-up vector that become x, y and z of a z-up vector.
+
+A person in the T-pose faces z in y-up coordinates, and x in z-up coordinates.
+"""
 
 
 def _quats_of_euler(angles_deg: Array) -> Array:
-    """Returns quaternions x, y, z, w of rotations about the fixed x, y and z axis in this order, as MVN's receiver
-    does.
+    """Converts angles [deg] of rotations about the fixed axes x, y, z, in this order, to quaternions x, y, z, w.
+
+    MVN's own receiver uses the same order.
     """
     return np.asarray(Rotation.from_euler("xyz", angles_deg, degrees=True).as_quat())
 
 
 def _segment_of_point(point: int) -> str:
-    """Returns the segment of a point."""
+    """Returns the name of the segment to which a point belongs. `point` is 256 times the segment's id plus an index."""
     segment = point // 256
     if not 1 <= segment <= len(SEGMENTS):
         raise PacketError("segment ids", f"point {point}")
