@@ -117,7 +117,7 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether the robot moves while the guard is halted or targets are late; `next_braking` then has commands."""
+        """Whether the robot moves while the guard is halted or targets are late; if so, `next_braking` has commands."""
         return (self.is_halted or self._is_late) and self.is_moving
 
     @property
@@ -127,8 +127,9 @@ class Guard:
 
     @property
     def stop_commands(self) -> np.ndarray:
-        """Commands that bring the robot to rest after the last command, k x n [rad or m]; they have passed the
-        checks.
+        """Commands that bring the robot to rest after the last command, shape (k, n) [rad or m].
+
+        These commands have passed the checks.
         """
         return self._stop.position.copy()
 
@@ -152,8 +153,9 @@ class Guard:
         self.is_halted, self._is_late, self._is_first = False, False, True
 
     def halt(self) -> None:
-        """Refuses further targets; with `on_halt: brake`, `next_braking` then returns the commands that stop
-        the robot.
+        """Refuses further targets.
+
+        With the option `on_halt: brake`, `next_braking` then returns the commands that stop the robot.
         """
         self.is_halted = True
         if self.config.on_halt == "nothing":
@@ -185,7 +187,7 @@ class Guard:
     def next_braking(self) -> tuple[float, ...] | None:
         """Advances the braking by one command, and returns the n positions of that command [rad or m].
 
-        The command is due a period after the last one. Returns None if the robot does not brake.
+        The command has to be sent one period after the previous command. Returns None if the robot does not brake.
         """
         return self._continue_braking() if self.is_braking else None
 

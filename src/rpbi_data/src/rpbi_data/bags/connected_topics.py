@@ -44,11 +44,11 @@ def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], lis
     for publisher, published in wanted.items():
         try:
             uri = master.lookupNode(publisher)  # here, an error means that the master cannot be reached
-        except rosgraph.MasterError:  # it has just ended
+        except rosgraph.MasterError:  # the publisher has just ended
             continue
         try:
             connected = _topics_sent(uri, node)
-        except ConnectionRefusedError:  # it ended without an answer
+        except ConnectionRefusedError:  # the publisher ended without an answer
             continue
         silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
     return [], silent
@@ -103,7 +103,7 @@ def _count_sent_by(uri: str, node: str) -> dict[str, int]:
     except MASTER_FAILURES:
         return {}
     chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
-    if isinstance(answer[0], list):  # roscpp: without code and message, and with the count behind two sizes
+    if isinstance(answer[0], list):  # roscpp: no code and message; the count follows two sizes
         publishers = [(topic, {each[0]: each[3] for each in rows}) for topic, rows in answer[0]]
     else:
         publishers = [(topic, {each[0]: each[2] for each in rows}) for topic, _, rows, *_ in answer[2][0]]

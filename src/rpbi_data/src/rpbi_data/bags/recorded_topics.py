@@ -121,11 +121,11 @@ class Recorder:
             raise RecordingError(self.path, f"no ROS master at {rosgraph.get_master_uri()}")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.path.unlink(missing_ok=True)  # so that it is not mistaken for the new one
+            self.path.unlink(missing_ok=True)  # the old bag must not be mistaken for the new bag
         except OSError as error:
             raise RecordingError(self.path, f"cannot be written: {error}") from None
         self._output = tempfile.TemporaryFile()
-        # it closes the bag on SIGTERM; SIGINT is blocked in children of nodes
+        # the recorder closes the bag on SIGTERM; SIGINT is blocked in child processes of nodes
         environment = {key: value for key, value in os.environ.items() if key != "ROS_NAMESPACE"}
         options: dict[str, Any] = {"stdout": self._output, "stderr": subprocess.STDOUT, "env": environment}
         options["pass_fds"] = self._handles
@@ -258,7 +258,7 @@ def _is_asleep(process_id: int) -> bool:
     """Returns whether all threads of a process sleep: no thread runs, is runnable or is stopped."""
     try:
         threads = [path.read_text() for path in Path(f"/proc/{process_id}/task").glob("*/stat")]
-    except OSError:  # one has just ended
+    except OSError:  # a thread has just ended
         return False
     return all(stat.rpartition(")")[2].split()[0] == "S" for stat in threads)
 

@@ -58,7 +58,7 @@ def _quaternion_faults(quats: Array) -> Iterator[str]:
 
 
 def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
-    """Yields the messages of a check. If the check raises an error, yields a last message about unexpected content.
+    """Yields the messages of a check. If unexpected content makes the check fail, yields a message about the error.
 
     Args:
         part: The checked part of the data set, for the message.

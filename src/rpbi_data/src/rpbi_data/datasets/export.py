@@ -114,7 +114,7 @@ def export_folder(
     plan = _plan(folder, format_, options, result)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.parent / f".{target.name}.part"
-    shutil.rmtree(part, ignore_errors=True)  # of an export that was killed
+    shutil.rmtree(part, ignore_errors=True)  # left by a killed export
     part.mkdir()
     try:
         format_.open(part, plan.schema)
@@ -211,7 +211,7 @@ def _add_all(
                 source.use(plan.schema, plan.signals)
             facts = source.facts()
             facts |= format_.add(index, source)
-        except Exception as error:  # as above
+        except Exception as error:  # see `_plan`
             result.faults.append(_fault(number, error))
             if getattr(error, "errno", None) in DISK_FULL:
                 result.faults += _not_exported(plan.sources[position + 1 :])

@@ -75,7 +75,7 @@ class LinkBox(Check):
         for link, (low, high, reach) in self._boxes.items():
             if link in self._room:
                 place, room = self._room[link]
-                if (np.abs(motion.with_start - place) @ reach).max() < room:  # too short a motion to leave the box
+                if (np.abs(motion.with_start - place) @ reach).max() < room:  # the motion is too short to leave the box
                     continue
             position = motion.link_positions(link)
             self._room[link] = motion.start.position, float(np.minimum(position[0] - low, high - position[0]).min())

@@ -83,7 +83,7 @@ class GuardNode:
         GuardMarkers(self._guard, self._queue.lock, config.base_frame or self._guard.robot.document.root_link())
         self._master = MasterConnection(self._lose_master)
         if self._guard.config.start_from == "measured":
-            self._measurements.wait(FIRST_STATE_S)  # a first target that must be dropped makes the next one too far
+            self._measurements.wait(FIRST_STATE_S)  # if the first target is dropped, the next may be too far away
         self._targets = rospy.Subscriber(
             self._target_topic, JointState, self._receive, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )

@@ -15,8 +15,10 @@ from safe_robot.msg import Violation as ViolationMessage
 
 QUEUE_SIZE = 100
 WARNING_PERIOD_S = 60.0
-"""Shortest time between two warnings of one check while the guard is not halted [s]; the status topic has each
-violation."""
+"""Shortest time between two warnings of one check while the guard is not halted [s].
+
+The status topic reports every violation.
+"""
 
 
 def violation_of(check: str, reason: str) -> Violation:
@@ -97,8 +99,7 @@ class GuardStatus:
         self._warn(self._subject, "halted; call robot_safety/start_subscriber to continue")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:
-        """Returns a description of the motion that leaves the violated margins; computed once for each
-        configuration."""
+        """Returns a text about the motion that leaves violated margins, computed once for each configuration."""
         if self._guard.is_moving:
             return ""
         place = self._guard.last_command, obstacles

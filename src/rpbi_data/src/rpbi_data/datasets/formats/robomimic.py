@@ -96,7 +96,7 @@ class Robomimic(DatasetFormat):
         columns = {
             each.key: {"names": list(each.names), "checksums": checksums(values[each.key])}
             for each in self._schema.features
-            if each.key != ACTION  # which is scaled by the values of all episodes
+            if each.key != ACTION  # actions are scaled later, with all episodes
         }
         crcs = {key: frame_checksums(observations[observation_key(key)]) for key in stamps}
         count = len(episode.times)
@@ -261,7 +261,7 @@ def _environment_faults(data: h5py.Group) -> Iterator[str]:
 def _names(data: h5py.Group) -> dict[str, list[str]]:
     try:
         return dict(json.loads(data.attrs["observation_names"]))
-    except (KeyError, ValueError):  # of another tool
+    except (KeyError, ValueError):  # the data set of another tool
         return {}
 
 
