@@ -88,7 +88,7 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
 
 
 def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
-    """Returns the sum of the normal forces of one other body [N], indexed by time [s]. Without contact, it is 0.
+    """Returns the sum of the normal forces of one other body [N], indexed by time [s]. The sum is 0 without contact.
 
     Args:
         contacts: Contacts of a body, indexed by time [s]. Each contact is a row with the columns `other_body` and

@@ -97,7 +97,7 @@ class MpcController(ABC):
 
     @abstractmethod
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
-        """Returns a plan, which depends only on the measurements since `reset`, not on wall time.
+        """Returns a plan. The plan depends only on the measurements since `reset`, not on wall time.
 
         Args:
             sensed: A complete measurement.

@@ -131,7 +131,7 @@ class LockStep:
         self.controller.reset()
 
     def run(self, max_s: float = math.inf) -> list[Cycle]:
-        """Runs cycles until the task is done, the loop stops, or `max_s` [s] have passed. Returns the run cycles."""
+        """Runs cycles until the task is done, the loop stops, or `max_s` [s] have passed. Returns their records."""
         first = len(self.cycles)
         while not self.is_over and (len(self.cycles) - first) * self.config.period_s < max_s - 1e-9:
             self.cycle()

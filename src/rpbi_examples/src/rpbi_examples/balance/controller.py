@@ -32,7 +32,7 @@ HAND_WEIGHT, HAND_TURN_WEIGHT = 20.0, 0.5
 
 
 class BalanceConfig(ControllerConfig):
-    """Keys of `Balance`."""
+    """Configuration keys of the controller `Balance`."""
 
     urdf_filename: ExistingFile = Field(description="The robot's URDF; `{package}/path` is resolved.")
     hand: Text = Field(description="The link that reaches.")

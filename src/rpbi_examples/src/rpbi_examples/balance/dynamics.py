@@ -45,10 +45,10 @@ class FloatingRobot:
 
     Args:
         urdf_filename: The robot's URDF file.
-        joints: Names of all movable joints, in the order of the joint values in the states for `update`.
+        joints: Names of all movable joints, in the order of the joint values that `update` receives.
 
     Attributes:
-        mass_matrix: Shape (n, n).
+        mass_matrix: Mass matrix, shape (n, n).
         bias: Sum of gravity, Coriolis and centrifugal forces, and joint damping, shape (n,) [N, N m].
         positions: Positions of the joints, shape (n - 6,) [rad].
         velocities: Velocities of base and joints, shape (n,) [m/s, rad/s].
@@ -59,7 +59,7 @@ class FloatingRobot:
         centre: The centre of mass in the world, shape (3,) [m].
 
     Raises:
-        ValueError: If the joints differ from those in the URDF.
+        ValueError: If `joints` does not contain exactly the movable joints of the URDF.
     """
 
     def __init__(self, urdf_filename: str, joints: Sequence[str]) -> None:

@@ -33,7 +33,8 @@ class WholeBodyProgram:
     """Finds the joint efforts t that fulfil the tasks of a whole body best.
 
     The unknowns of the quadratic program are the accelerations a of base and joints, and the wrenches w on the feet.
-    The cost is the weighted sum of the tasks' squared errors and of w squared. The constraints are:
+    The cost is the weighted sum of the tasks' squared errors and of w squared. With the mass matrix M, the bias b, the
+    selection S of the joints, the Jacobian J of the feet, and the robot's velocities v, the constraints are:
 
     - Dynamics: M a + b = S^T t + J^T w, with t within the effort limits. The efforts follow from a and w.
     - Feet at rest: J a + dJ/dt v = -`FOOT_DAMPING` J v.

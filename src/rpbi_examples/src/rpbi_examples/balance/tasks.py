@@ -22,7 +22,7 @@ LEASH_M, LEASH_RAD = 0.05, 0.3
 
 
 class AccelerationTask(NamedTuple):
-    """Asks for accelerations a of the robot with `jacobian @ a = wanted`.
+    """Desired accelerations a of the robot: `jacobian @ a = wanted`.
 
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
@@ -67,7 +67,7 @@ def pull(error: Array, velocity: Array, gain: Gain) -> Array:
     Args:
         error: Goal minus present position [m or rad].
         velocity: Velocity of the goal minus present velocity [m/s or rad/s].
-        gain: The spring's stiffness; its weight is not used.
+        gain: Stiffness of the spring. The weight is not used.
     """
     acceleration: Array = gain.stiffness * error + 2.0 * np.sqrt(gain.stiffness) * velocity
     return acceleration

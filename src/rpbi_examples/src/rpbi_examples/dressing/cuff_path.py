@@ -35,8 +35,8 @@ class ArmPosition(NamedTuple):
 
 
 class CuffPath:
-    """Path of the middle of the cuff. It leads from the cuff's initial position to a point before the hand, then over
-    hand and forearm, and ends past the elbow.
+    """Path of the middle of the cuff. The path leads from the cuff's initial position to a point in front of the
+    fingertips, then over hand and forearm, and ends past the elbow.
 
     Args:
         arm: Joint positions of the person's arm.
@@ -60,7 +60,7 @@ class CuffPath:
         """Returns the direction in which the cuff is pulled at a given distance along the path [m].
 
         Returns:
-            Unit vector, shape (3,). Before the hand, it is the direction from the wrist to the elbow.
+            Unit vector, shape (3,). In front of the fingertips, it is the direction from the wrist to the elbow.
         """
         start = math.dist(*self._corners[:2])
         to = self.place(min(max(done, start) + BLEND_M, self.length))

@@ -28,7 +28,7 @@ POLL_S = 0.05
 
 
 class PushedBox:
-    """Adds and removes the box that is pushed, and measures its distance from the goal.
+    """Adds and removes the box that is pushed, and measures the box's distance from the goal.
 
     Args:
         tf: Access to TF.

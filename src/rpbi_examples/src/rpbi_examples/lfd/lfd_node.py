@@ -1,5 +1,5 @@
-"""`run_lfd.py`: learns from a person's demonstration to push a box, plans pushes from random starts, executes them, and
-draws the results.
+"""`run_lfd.py`: learns from a person's demonstration to push a box, and plans and executes pushes from random starts.
+Also draws the results.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class LfdNode:
         rospy.Subscriber("joy", Joy, self._on_joy, queue_size=100)
 
     def run(self) -> None:
-        """Runs until ROS shuts down, or until the number of executions is `~rounds`. `~rounds` 0 means without limit.
+        """Runs until ROS shuts down, or until `~rounds` plans have been executed. With `~rounds` 0, there is no limit.
 
         Raises:
             InterfaceError: If an execution did not bring the box to its goal.

@@ -44,7 +44,7 @@ Send = Callable[[bool, str], None]
 
 
 class ScriptedPerson:
-    """Operates `run_lfd.py`: presses the key that its state requires, and pushes the box in demonstrations.
+    """Operates `run_lfd.py`: presses the key that the node's state requires, and pushes the box in demonstrations.
 
     Args:
         send: Function that presses and releases keys.
@@ -79,7 +79,7 @@ class ScriptedPerson:
         self._state = message.data
 
     def _wait_for_state(self) -> str:
-        """Waits until the state of `run_lfd.py` is a key of `NEXT_KEY`, and returns the state."""
+        """Waits until `run_lfd.py` is in a state that expects a key press, and returns the state."""
         rate = rospy.Rate(LOOK_HZ)
         while (state := self._state) not in NEXT_KEY:
             rate.sleep()

@@ -108,7 +108,7 @@ class PushSkill:
         learn: Function that learns each primitive.
 
     Raises:
-        InterfaceError: If the demonstration has no contact, or no approach.
+        InterfaceError: If the demonstration lacks a contact with the box, or an approach.
     """
 
     def __init__(self, shown: ShownPush, learn: Learn = learn_dmp) -> None:

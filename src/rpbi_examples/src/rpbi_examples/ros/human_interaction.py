@@ -182,12 +182,12 @@ class Watch:
 
 
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
-    """Returns the newest value that is not newer than a time [s], from pairs of stamp and value. Default: 0."""
+    """Returns the latest value with a stamp at or before a time [s], from pairs of stamp and value. Default: 0."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
 
 
 def interrupt_roslaunch() -> bool:
-    """Interrupts the `roslaunch` that started this process, like Ctrl-C. It then ends all of its nodes.
+    """Interrupts the `roslaunch` that started this process, like Ctrl-C. The `roslaunch` then ends all of its nodes.
 
     Returns:
         Whether `roslaunch` started this process.

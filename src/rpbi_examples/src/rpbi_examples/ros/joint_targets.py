@@ -66,7 +66,7 @@ class JointTargets:
     def send(self, positions: Sequence[float]) -> None:
         """Publishes a target, and waits until the next target is due.
 
-        Also waits until the world runs, and until ROS time is later than the stamp of the last target.
+        Before publishing, waits until the world runs, and until ROS time is later than the stamp of the last target.
 
         Args:
             positions: Target positions of the n joints [rad or m].
@@ -99,6 +99,6 @@ class JointTargets:
 
 
 def _limits(joint: JointInfo) -> tuple[float, float]:
-    """Returns lower and upper position limit, or -inf and inf for PyBullet's range of a joint without limits."""
+    """Returns the lower and upper position limit of a joint: -inf and inf if PyBullet reports an inverted range."""
     limited = joint.jointLowerLimit < joint.jointUpperLimit
     return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))

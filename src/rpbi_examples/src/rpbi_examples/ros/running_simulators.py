@@ -34,7 +34,7 @@ class RunningNode(NamedTuple):
     uri: str
 
     def stop(self, master: str) -> None:
-        """Stops the node and waits for its end. Also waits for the node's `roslaunch` if that runs on this machine.
+        """Stops the node and waits for its end. If its `roslaunch` is on this machine, also waits for the launch's end.
 
         Args:
             master: Address of the node's ROS master. The master may end together with `roslaunch`.
@@ -52,7 +52,7 @@ class RunningNode(NamedTuple):
             time.sleep(_POLL_S)
 
     def _launch_process(self, master: str) -> int | None:
-        """Returns the process id of the `roslaunch` that started the node. None if it does not run on this machine."""
+        """Returns the process id of the `roslaunch` that started the node. None without one on this machine."""
         _, _, uris = _proxy(master).getParam(_CALLER, "/roslaunch/uris")
         for uri in uris.values() if isinstance(uris, dict) else ():
             host, _ = rosgraph.network.parse_http_host_and_port(uri)
@@ -78,7 +78,7 @@ def master_of(port: str | None) -> str:
 
 
 def running_simulators(file: str, master: str) -> list[RunningNode]:
-    """Returns the running simulators that ROS would stop if a launch file were run, since node names are equal.
+    """Returns the running simulators that ROS would stop if a launch file with nodes of the same names were run.
 
     Killed nodes are not returned, although they stay registered with the master.
 
@@ -123,7 +123,7 @@ def _state(master: str) -> list[list[tuple[str, list[str]]]]:
 
 
 def _running(names: Iterable[str], master: str) -> list[RunningNode]:
-    """Returns those of the named nodes that answer, sorted by name."""
+    """Returns the nodes with the given names that answer, sorted by name."""
     nodes = [RunningNode(name, _proxy(master).lookupNode(_CALLER, name)[2]) for name in sorted(names)]
     return [node for node in nodes if node.uri and _answers(node.uri)]
 

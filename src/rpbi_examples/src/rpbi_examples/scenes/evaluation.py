@@ -137,7 +137,7 @@ def _close() -> None:
 def _run(scene: str, seed: int, noise: bool) -> SeedResult:
     """Runs an episode in the environment of this process, and returns the result.
 
-    Makes the environment before the first episode, and again after an error.
+    Creates the environment before the first episode, and again after an error.
     """
     global _env
     _env = _env or make_env(scene, "rgb_array", noise)

@@ -107,8 +107,10 @@ class Factory(Scene):
         return sorted((part for part in mine if part not in self._busy.values()), key=lambda part: -out_m[part])
 
     def _has_brought(self) -> bool:
-        """Returns whether the belt has brought enough parts: one is far enough past the middle, or all parts that are
-        left are on the belt, on average past the middle.
+        """Returns whether the belt has brought parts into reach.
+
+        This is so if a part is `STATION_M` past the belt's middle. It is also so if all remaining parts are on the belt
+        and are past the middle on average.
         """
         places = [tag.position[1] for tag in on_belt(self.sensed.tags).values()]
         are_last = len(places) + len(self._placed) >= self.of

@@ -70,11 +70,11 @@ class Handover(Scene):
         self.change(self.thing, mass=mass, lateralFriction=friction)
 
     def act(self) -> Iterator[None]:
-        """Makes the person and the robot act at the same time. Fails if the thing touches anything but these two."""
+        """Makes the person and the robot act at the same time. Fails if another body touches the thing."""
         yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
 
     def beside(self) -> Iterator[None]:
-        """Makes the person act. Fails if the thing touches anything but person and robot."""
+        """Makes the person act. Fails if a body other than person and robot touches the thing."""
         yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:
@@ -108,7 +108,7 @@ class Handover(Scene):
         in_gripper, yaw = arm.pose().inverse() @ thing, yaw_of(thing.quat_xyzw) - yaw_to(thing.position, BASE)
 
         def standing(place: Vector) -> Pose:
-            """Returns the gripper's pose with which the held thing is upright and its base is at a position [m]."""
+            """Returns the gripper's pose at which the held thing is upright, with the thing's base at a place [m]."""
             return Pose(above(place, self._half_m), about_z(yaw_to(place, BASE) + yaw)) @ in_gripper.inverse()
 
         yield from arm.go(standing(SHOWN_M), 1.8)
@@ -126,7 +126,7 @@ class Handover(Scene):
         yield from arm.go(home, 1.5)
 
     def _grasp(self) -> Pose:
-        """Returns the gripper's pose for a grasp of the thing at its present pose."""
+        """Returns the gripper's pose for a grasp of the thing at the thing's present pose."""
         return upright_grasp(self.sensed.poses[self.thing], GRASP_M - self._half_m)
 
     def note(self) -> None:

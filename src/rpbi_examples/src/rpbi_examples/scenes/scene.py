@@ -88,7 +88,10 @@ class Seen(NamedTuple):
 
 
 class InputValue(NamedTuple):
-    """Value for an input at the next tick: a pose, or numbers indexed by name, as joint targets. See `World.put`."""
+    """Value for an input of the world at the next tick; see `World.put`.
+
+    The value is a pose, or numbers indexed by name, such as joint targets.
+    """
 
     slot: str
     value: Mapping[str, float] | Pose
@@ -215,7 +218,9 @@ class Scene(ABC):
         """
 
     def beside(self) -> Iterator[None]:
-        """Moves the robots in `others` while a policy moves the other robots. Replaces `act`; does nothing by default.
+        """Moves the robots in `others` while a policy moves the other robots. Does nothing by default.
+
+        With a policy, this method runs instead of `act`.
 
         Raises:
             SceneFailedError: If the task can no longer succeed.
@@ -236,7 +241,7 @@ class Scene(ABC):
     def score(self) -> tuple[int, int]:
         """Returns the number of completed parts of the task, and the number of all parts.
 
-        By default, all parts are completed if the task has succeeded; otherwise the number is 0.
+        By default, all parts count as completed after a success, and 0 parts otherwise.
         """
         return self.of * self.has_succeeded(), self.of
 

@@ -213,7 +213,7 @@ def _touch(point: Any) -> Touch:
 
 
 class SceneNodeConfig(ConfigModel):
-    """Parameters of the node."""
+    """Private parameters of `scene_node.py`."""
 
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
     seed: Count = Field(1, description="Seed of the first episode; each further one adds 1.")

@@ -67,7 +67,7 @@ class SensedPoses(Generic[Key]):
         return {key: pose for key, (_, pose) in self._smoothed.items()}
 
     def _corrected(self, key: Key, measured: Pose) -> tuple[int, Pose]:
-        """Returns the number of averaged measurements, and their mean pose, after a new measurement of one body."""
+        """Filters a new measurement of a body, and returns the number of averaged measurements and the mean pose."""
         if key not in self._smoothed:
             return 1, measured
         count, pose = self._smoothed[key]

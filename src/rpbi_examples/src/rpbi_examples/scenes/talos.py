@@ -41,7 +41,7 @@ class Talos(Scene):
 
     Attributes:
         target: Target of the hand's point, in the world.
-        push_angle: Direction of the push, from the robot's initial forward direction to its left [rad].
+        push_angle: Angle of the push from the robot's initial forward direction, positive to the left [rad].
         impulse: Impulse of the push [N s].
     """
 

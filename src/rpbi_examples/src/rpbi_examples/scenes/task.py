@@ -43,7 +43,7 @@ TASK = "rpbi_examples.scenes.task:SceneTask"
 
 
 class SceneTaskConfig(WorldTaskConfig):
-    """Options of the task of a scene."""
+    """Options of `SceneTask`."""
 
     scene: Text = Field(description="The scene: a name of `SCENES`, or `module:Class`.")
     noise: schema.Switch = Field(False, description="Whether poses are sensed with noise and delay.")
@@ -106,7 +106,7 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots that the action controls. `Scene.beside` moves all others. With None, does nothing."""
+        """Moves the robots that the action controls; `Scene.beside` moves all others. With None, does nothing."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)

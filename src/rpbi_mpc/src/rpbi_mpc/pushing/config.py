@@ -27,8 +27,8 @@ class PushingConfig(ConfigModel):
         estimator: Filter of measurements.
         approach: Motion of the pusher to the slider.
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
-        max_lag: Largest distance along the path of the reference ahead of the slider [m]. At a larger distance, the
-            reference waits.
+        max_lag: Largest lead of the reference over the slider, along the path [m]. With a larger lead, the reference
+            waits.
         max_off: Distance of the slider from the path beyond which the task fails [m].
         tolerance: Largest errors of a successful push.
         settle_s: Time for which the end of the path stays the reference before the task is done [s].

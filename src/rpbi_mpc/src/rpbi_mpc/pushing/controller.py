@@ -111,7 +111,7 @@ class PushingController(MpcController):
     def _note(self, sensed: Sensed) -> float:
         """Records the errors of a measurement, and returns the slider's distance from the reference [m].
 
-        The reference is the one at the time of the measurement.
+        The distance refers to the reference at the time of the measurement.
         """
         assert sensed.values is not None
         measured = PlanarScene.of(sensed.values)
@@ -130,7 +130,7 @@ class PushingController(MpcController):
         settling time instead.
 
         Args:
-            lag: Distance along the path of the reference ahead of the slider [m].
+            lag: Lead of the reference over the slider, along the path [m].
         """
         if self.path_time_s >= self.path.duration_s:
             self._settled_s += self.config.cycle_s

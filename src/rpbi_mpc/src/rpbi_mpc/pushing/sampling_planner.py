@@ -1,4 +1,4 @@
-"""A planner for pushing that simulates candidates in forks of the world, and chooses the best candidate."""
+"""A planner for pushing that simulates candidates in forks of the world, and improves its plan from their costs."""
 
 from __future__ import annotations
 

@@ -221,7 +221,7 @@ def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generato
 
 
 def _recovered(errors: list[float], limit: float, loop: LoopConfig) -> float:
-    """Returns the time from the first error until all later errors are below a limit [s]; inf if the last one is above.
+    """Returns the time from the first error until the errors stay below a limit [s]. inf if the last error is above.
 
     Args:
         errors: Error in each cycle [m].

@@ -1,4 +1,4 @@
-"""Plants of the pushing node: a simulator that services step, and a robot or simulator that runs in real time."""
+"""Plants of the pushing node: a stepped simulator, and a robot or simulator that runs in real time."""
 
 from __future__ import annotations
 

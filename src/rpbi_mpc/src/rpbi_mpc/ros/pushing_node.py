@@ -1,4 +1,4 @@
-"""`pushing_mpc_node.py`: pushes a slider along a path, and shows the plan in RViz. Services start and stop the node."""
+"""`pushing_mpc_node.py`: pushes a slider along a path, and shows the plan in RViz. Services start and stop the loop."""
 
 from __future__ import annotations
 

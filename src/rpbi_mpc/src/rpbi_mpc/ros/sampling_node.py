@@ -1,4 +1,4 @@
-"""`sampling_mpc_node.py`: simulates candidate commands for a robot, and executes the best candidate."""
+"""`sampling_mpc_node.py`: simulates candidate plans for a robot, whose costs determine the executed plan."""
 
 from __future__ import annotations
 

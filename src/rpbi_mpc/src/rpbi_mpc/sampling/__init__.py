@@ -1,4 +1,4 @@
-"""Model predictive control by sampling. Candidate plans are simulated in forks of the world, and improve the executed
+"""Model predictive control by sampling. Forks of the world simulate candidate plans, whose costs determine the executed
 plan.
 """
 

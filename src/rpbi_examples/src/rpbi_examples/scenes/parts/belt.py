@@ -16,11 +16,11 @@ FLOOR_Z_M, RIM_Z_M, HALF_X_M, HALF_Y_M = 0.88, 0.935, 0.0325, 0.1275
 
 
 class Kind(NamedTuple):
-    """A kind of parts.
+    """A kind of part on the belt.
 
     Attributes:
         height_m: Height of a part [m].
-        half_m: Half of a part's width along its y axis, on which the fingers close [m].
+        half_m: Half of a part's width along the part's y axis, along which the fingers close [m].
         turn: Angle of symmetry: a part looks the same after this rotation about the vertical [rad]. 0: any rotation.
         x_m: x of the middle of the compartment for this kind [m].
     """
@@ -108,7 +108,7 @@ class Belt:
         return not self.is_moving and self._at_m + self._braking_m(self._most) >= self._way_m
 
     def act(self) -> None:
-        """Sends the belt's next target, for the time that has passed since the last call."""
+        """Advances the belt's target by the time since the last call, and sends the target."""
         dt_s, self._time_s = self._scene.seen.time_s - self._time_s, self._scene.seen.time_s
         is_free = self._at_m + self._braking_m(self._most) < self._way_m
         change = self._acceleration * dt_s * (1.0 if self.is_on and is_free else -1.0)

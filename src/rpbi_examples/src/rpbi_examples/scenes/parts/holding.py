@@ -171,7 +171,7 @@ class PandaArm(LedArm):
 
 
 def above(place: Vector, height_m: float) -> Vector:
-    """Returns the position above a place by a height [m]."""
+    """Returns a position that is raised by a height [m]."""
     return plus(place, (0.0, 0.0, height_m))
 
 

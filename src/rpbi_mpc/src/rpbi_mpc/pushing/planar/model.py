@@ -1,19 +1,19 @@
 """A slider, and its quasi-static motion under the push of one contact, with an ellipsoidal limit surface.
 
-Friction with the table and the force of the pusher are in balance. The limit surface, the set of all loads under which
-a body slides, is approximated with the ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1, where f is the largest force
-and c the characteristic length; the twist is normal to the ellipsoid (K. Lynch, H. Maekawa and K. Tanie, IROS 1992).
-With forces in units of the speed that they cause, the twist of the slider in its own frame under the load (fx, fy, m)
-is (fx, fy, m / c^2).
+Friction with the table and the force of the pusher are in balance. The limit surface is the set of all loads under
+which a body slides. The ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1 approximates the limit surface, with the
+largest force f and the characteristic length c. The twist is normal to the ellipsoid (K. Lynch, H. Maekawa and K.
+Tanie, IROS 1992). Forces are in units of the speed that the force causes. In these units, a load (fx, fy, m) causes the
+twist (fx, fy, m / c^2) in the slider's frame.
 
 The contact sticks, or slides to one side of the face at the edge of the friction cone (F. Hogan and A. Rodriguez,
 "Feedback control of the pusher-slider system", WAFR 2016, and "Reactive planar non-prehensile manipulation with hybrid
 model predictive control", IJRR 39, 2020).
 
-All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact): pose of the slider in
-the plane [m, m, rad], and position of the pusher along the face at -x, from the middle of the face to the left [m]. The
-input is (normal, tangential, left, right): the components of the force [m/s], and the speeds at which the pusher slides
-along the face to the left and to the right [m/s].
+All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact). x, y and yaw are the
+pose of the slider in the plane [m, m, rad]. `contact` is the position of the pusher along the face at -x, from the
+middle of the face to the left [m]. The input is (normal, tangential, left, right). The first two numbers are the
+components of the force [m/s]. The others are the speeds at which the pusher slides to the left and to the right [m/s].
 """
 
 from __future__ import annotations
