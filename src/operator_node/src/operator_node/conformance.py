@@ -199,7 +199,7 @@ class DeviceConformance:
             assert len(reader.readings) == count + 1 and reader.is_at_rest
 
     def test_missing_device_raises_an_error_with_a_reason(self, device: Device) -> None:
-        """An absent device raises a DeviceError with a reason, not a DeviceClosedError, since it may appear later."""
+        """Opening an absent device raises a DeviceError with a reason, and not a DeviceClosedError."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")
         self.unplug()
@@ -210,7 +210,7 @@ class DeviceConformance:
         device.open()
 
     def test_device_rests_while_unplugged_and_returns_without_a_jump(self, reader: Reader) -> None:
-        """A device is unplugged and plugged in while an axis is held. The axis is at rest until it is released."""
+        """If a device is unplugged and plugged in while an axis is held, this axis stays at rest until its release."""
         if not self.can_be_unplugged:
             pytest.skip(f"'{self.device_name}' cannot be unplugged")
         axis = self.moves[0]
@@ -236,7 +236,7 @@ class DeviceConformance:
         reader.until(lambda: reader.axis(axis) > 0.5, "it moves again")
 
     def test_garbage_is_refused_and_counted(self, reader: Reader) -> None:
-        """Invalid inputs raise no exception and cause no invalid reading. They are counted, keyed by reason."""
+        """Invalid inputs neither raise exceptions nor cause invalid readings. The feed counts them, keyed by reason."""
         if type(self).garbage is DeviceConformance.garbage:
             pytest.skip(f"garbage cannot be sent to '{self.device_name}' from outside")
         generator = random.Random(1)

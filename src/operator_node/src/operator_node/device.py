@@ -21,7 +21,7 @@ class DeviceError(InterfaceError):
 
 
 class DeviceClosedError(DeviceError):
-    """The user has closed the device, for example its window. It must not be opened again."""
+    """The user has closed the device, for example its window. The device must not be opened again."""
 
 
 class Reading(NamedTuple):

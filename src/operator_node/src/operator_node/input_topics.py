@@ -25,13 +25,13 @@ def stamp() -> rospy.Time:
 def has_begun() -> bool:
     """Returns whether ROS time has started.
 
-    Before, transforms must not be sent: with stamps in wall time, TF would prefer them to all later transforms.
+    Transforms must not be sent before: their stamps in wall time would be newer than the stamps of later transforms.
     """
     return not rospy.Time.now().is_zero()
 
 
 class InputParameters(ConfigModel):
-    """Time after which input counts as lost; it also does once it has no publisher."""
+    """Time without messages after which input counts as lost. Input without a publisher counts as lost, too."""
 
     input_timeout_s: SecondsOrOff = Field(
         0.0,

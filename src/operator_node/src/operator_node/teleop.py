@@ -19,7 +19,7 @@ Limits = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 
 
 class TeleopConfig(ConfigModel):
-    """The frame, and its limits of position and speed."""
+    """Names of the moved frame and its parent, and limits of position and speed."""
 
     target_frame_id: FrameId = Field(description="The frame that is moved.")
     parent_frame_id: FrameId = Field("world", description="Parent frame; the frame starts at its origin.")
@@ -62,8 +62,8 @@ class TeleopPose(NamedTuple):
     """Pose of a frame in its parent.
 
     Attributes:
-        position: x, y, z [m].
-        rpy: Roll, pitch, yaw [rad], about the fixed axes of the parent in this order, each in [-pi, pi].
+        position: Position x, y, z [m].
+        rpy: Roll, pitch, yaw about the fixed axes of the parent, in this order, each in [-pi, pi] [rad].
     """
 
     position: Vector = ZERO

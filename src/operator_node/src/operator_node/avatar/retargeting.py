@@ -27,7 +27,7 @@ class AvatarPose(NamedTuple):
 
     Attributes:
         position: Origin of the pelvis in the world (3) [m].
-        quat_xyzw: Orientation of the pelvis in the world (4).
+        quat_xyzw: Orientation of the pelvis in the world (4), x, y, z, w.
         hinges: Angles of `HINGES` (66) [rad].
     """
 
@@ -68,7 +68,7 @@ class Retargeting:
         self._turn, self._shift = np.eye(3), np.zeros(3)
 
     def begin(self, hinges: Array | None = None) -> None:
-        """Makes the next frame the first frame again, for instance of another person.
+        """Restarts the mapping with the next frame, for instance because another person follows.
 
         Args:
             hinges: Present angles of the avatar's hinges (66) [rad]; None: the last computed angles.
@@ -93,7 +93,7 @@ class Retargeting:
         return AvatarPose(position, quat, np.clip(self._last, _LOWER, _UPPER).reshape(-1))
 
     def _begin(self, frame: SegmentFrame, pelvis: Array) -> None:
-        """Computes scale, rotation and displacement of the avatar's world from the person's first frame."""
+        """Computes scale, rotation and displacement between person and avatar from the person's first frame."""
         ratio = self._leg / max(leg_length(measured_offsets(frame)), 1e-9)
         if not LEG_RATIOS[0] <= ratio <= LEG_RATIOS[1]:
             least, most = (self._leg / each for each in reversed(LEG_RATIOS))
@@ -160,7 +160,7 @@ def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
 
 
 class Engagement:
-    """Moves the avatar towards its target pose at limited speeds, at all times.
+    """Moves the avatar towards its target pose at limited speeds, also at the start and after a pause.
 
     Args:
         max_joint_speed: Largest speed of each hinge [rad/s].

@@ -49,13 +49,13 @@ class FeedConfig(ConfigModel):
 class DeviceFeed:
     """Keeps a device open, checks its readings, and publishes them.
 
-    An attempt to open an absent device is made once a second. The first reading that is published after opening is at
-    rest. Each axis and button is published as at rest until the device has reported it at rest, so that an axis or a
-    button that is held while a node starts or a device is plugged in does not cause a motion; `held` names these axes
-    and buttons. When the device is disconnected or closed, the last published reading is at rest, too.
+    The feed tries to open an absent device once a second. The first published reading after opening is at rest. Each
+    axis and button is published as at rest until the device has reported it at rest. An axis that is held while the
+    device is plugged in therefore does not cause a motion. `held` names such axes and buttons. When the device
+    disconnects or is closed, a last reading at rest is published.
 
-    Invalid readings are counted and dropped; the last valid reading remains in effect. Exceptions of the device are
-    caught, except those documented for `step`.
+    Invalid readings are counted and dropped, and the last valid reading remains in effect. The feed catches exceptions
+    of the device, except those documented for `step`.
 
     All methods except `post` must be called from the same thread.
 
@@ -63,10 +63,10 @@ class DeviceFeed:
         name: Name of the device in log messages.
         device: The device, which is not open yet.
         config: Rate and merging of the published readings.
-        publish: Called with each reading that is to be published.
+        publish: Function that is called with each reading to publish.
 
     Attributes:
-        problem: Why the device is not open; None while it is open.
+        problem: Reason why the device is not open; None while it is open.
         published: Number of published readings.
         refused: Number of refusals for each reason.
         free_axes: Indices of the axes that have been at rest since the device was opened.
@@ -95,8 +95,8 @@ class DeviceFeed:
         """Publishes readings until `is_over` returns True or the user closes the device, then closes the device.
 
         Args:
-            is_over: Called before each step; ends the loop by returning True.
-            period_s: Longest time that one step waits, and hence that a posted action waits [s].
+            is_over: Function that is called before each step. The loop ends when it returns True.
+            period_s: Longest time that one step waits [s]. A posted action waits for at most this time.
 
         Raises:
             MissingDependency: If the device needs a library that is not installed.
@@ -116,7 +116,8 @@ class DeviceFeed:
             timeout_s: Longest time to wait [s].
 
         Raises:
-            DeviceClosedError: If the user has closed the device. If it was open, a last reading at rest was published.
+            DeviceClosedError: If the user has closed the device. If the device was open, a last reading at rest was
+                published before.
             MissingDependency: If the device needs a library that is not installed.
         """
         for _ in range(len(self._posted)):
@@ -148,11 +149,11 @@ class DeviceFeed:
             logger.warning("%s: %s", self._name, held_text(self.held))
 
     def post(self, action: Callable[[], None]) -> None:
-        """Schedules an action, which the feed's thread runs before the next reading; may be called from any thread."""
+        """Schedules an action that the feed's thread runs before the next reading. Any thread may call this method."""
         self._posted.append(action)
 
     def close(self) -> None:
-        """Closes the device and publishes a last reading at rest; does nothing if the device is not open."""
+        """Closes the device and publishes a last reading at rest. Does nothing if the device is not open."""
         if self.problem is None:
             self._leave()
         self.problem = "closed"
@@ -232,9 +233,7 @@ class DeviceFeed:
         return reading._replace(events=tuple(events), refused=tuple(refused))
 
     def _read(self, timeout_s: float) -> Reading | None:
-        """Returns the next reading of the device, or None if the device returns None or something else than a
-        reading.
-        """
+        """Reads the device. Returns None if the device returns None or an object that is not a reading."""
         value = self._device.read(timeout_s)
         if value is None:
             return None
@@ -257,8 +256,9 @@ class DeviceFeed:
             self._emit(reading)
 
     def _from_rest(self, reading: Reading) -> Reading:
-        """Updates which axes and buttons have been at rest since opening, and returns the reading with all others at
-        rest.
+        """Returns the reading with axes and buttons at rest that have not been at rest since the device was opened.
+
+        Also updates `free_axes` and `held`.
         """
         resting = self._resting().axes
         for index, (value, rest) in enumerate(zip(reading.axes, resting)):

@@ -27,7 +27,7 @@ STRONG = 0
 
 
 class DeviceTopics:
-    """Base class for the topics of a device other than `joy`: publishes its events, and subscribes to its inputs.
+    """Base class that publishes a device's events and subscribes to the device's inputs, on topics other than `joy`.
 
     Args:
         device: The device, which may only be changed through `post`.

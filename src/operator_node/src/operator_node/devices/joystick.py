@@ -148,7 +148,7 @@ class Joystick(Device):
         return number
 
     def _fetch(self, timeout_s: float) -> None:
-        """Queues the events of pygame, and waits for one if none are queued.
+        """Queues the events of pygame. If no event is queued, waits for the next event.
 
         pygame 2.1 loses its queued events when a joystick that was never opened is unplugged. In this case, the state
         of all buttons is read again.

@@ -47,9 +47,10 @@ def codes_in(text: str) -> list[int]:
 
 
 class KeyTerminal:
-    """Records the keys that are typed in the terminal; each key counts as held for a time after it was last received.
+    """Records the keys that are typed in the terminal.
 
-    A terminal starts to repeat a held key only after about half a second, so `hold_s` should be longer.
+    A key counts as held for `hold_s` after the terminal has sent it. A terminal starts to repeat a held key only after
+    about half a second, so `hold_s` should be longer.
 
     Args:
         keys: Receives the keys.

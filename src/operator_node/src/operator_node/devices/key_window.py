@@ -137,7 +137,7 @@ class KeyWindow:
         self._draw()
 
     def wait(self, timeout_s: float) -> None:
-        """Processes queued events, or waits for the next event; errors are those of `DeviceWindow.wait`."""
+        """Processes queued events, or waits for the next event. Raises the errors of `DeviceWindow.wait`."""
         now_s = time.monotonic()
         due_s = self._pending.due_s if self._pending else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))

@@ -33,8 +33,8 @@ class Mouse(Device):
     """A mouse that is dragged in a separate window.
 
     The axes `x` (to the right) and `y` (up) are the displacement from the point where the left button went down,
-    divided by half the width and half the height of the window. They are 0 while the left button is not held. The axis
-    `wheel` is positive away from the user, and returns to 0 `wheel_return_s` after the last notch.
+    divided by half the width and half the height of the window. Both axes are 0 while the left button is not held. The
+    axis `wheel` is positive away from the user. It returns to 0 at the time `wheel_return_s` after the last notch.
     """
 
     Config = MouseConfig

@@ -31,7 +31,7 @@ class HandAxes:
         """Positions of the hands [m], shape (2, 3), and arm lengths [m], shape (2, 1), when the hands were engaged."""
 
     def release(self) -> None:
-        """Disengages the hands; the next frame engages them at their position in this frame."""
+        """Disengages the hands. The next frame engages the hands at their positions in that frame."""
         self._engaged = None
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:

@@ -75,7 +75,7 @@ class MvnTopics(DeviceTopics):
         WallTimer(DIAGNOSTICS_HZ, self._diagnose)
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes the events of a reading, each with the present time as its stamp rather than `stamp`."""
+        """Publishes the events of a reading, with the present time as stamp. The argument `stamp` is not used."""
         for event in reading.events:
             stamp = present_stamp()
             if isinstance(event, SegmentFrame):
@@ -176,9 +176,7 @@ class _Person:
         self._stamp = rospy.Time()
 
     def publish_frame(self, frame: SegmentFrame, stamp: rospy.Time) -> None:
-        """Publishes a frame, unless its stamp equals the stamp of the last frame, as happens while simulated time is
-        paused.
-        """
+        """Publishes a frame, unless its stamp equals the last frame's stamp because simulated time is paused."""
         if stamp == self._stamp:
             return
         self._stamp = stamp

@@ -14,8 +14,9 @@ SETTINGS = {
 
 
 def pygame_with_joysticks() -> Any:
-    """Enables joysticks in pygame and returns the module; its events then report joysticks that are plugged or
-    unplugged.
+    """Enables joysticks in pygame, and returns the module pygame.
+
+    Afterwards, pygame's events report when a joystick is plugged in or unplugged.
 
     Raises:
         MissingDependency: If pygame is not installed.

@@ -57,7 +57,12 @@ class Suit:
         self._name = f"Person{person}"
 
     def datagrams(self, sample: int, time_s: float) -> list[bytes]:
-        """Returns the datagrams of the sample with a number, taken at a time [s]."""
+        """Returns all datagrams of one sample.
+
+        Args:
+            sample: Number of the sample.
+            time_s: Time of the sample [s].
+        """
         positions, quats = self.pose(time_s)
         return [datagram for kind in self._kinds for datagram in self._of_kind(kind, sample, time_s, positions, quats)]
 

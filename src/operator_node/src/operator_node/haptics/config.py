@@ -21,7 +21,7 @@ from .coupling import Mode
 
 
 class ForceFeedbackConfig(ConfigModel):
-    """Mapping of the handle to the tool, and the forces that are rendered."""
+    """Parameters of the mapping from handle to tool, and of the rendered forces."""
 
     mode: Mode = Field("wrench", description="Rendered force: the force on the tool, or a spring to its position.")
     stiffness: Positive = Field(200.0, description="Stiffness of the spring of `mode: coupling` [N/m].")
@@ -70,7 +70,7 @@ class ForceFeedbackConfig(ConfigModel):
 
 
 class HapticNodeConfig(ForceFeedbackConfig):
-    """Device, frames and forces of the haptic node."""
+    """Parameters of the haptic node: device, frames and forces."""
 
     device: Text = Field("virtual", description="virtual, scripted, haply, touch, or module:Class of your own.")
     device_options: dict[str, object] = Field({}, description="Options of the device.")

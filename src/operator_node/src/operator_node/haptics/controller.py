@@ -227,7 +227,7 @@ class HapticController:
         )
 
     def _handle_displacement(self, displacement: Vector) -> Vector:
-        """Converts a displacement of the tool [m] to one of the handle [m]; 0 along axes with a motion scale of 0."""
+        """Converts a displacement of the tool to one of the handle [m]. Components with motion scale 0 become 0."""
         x, y, z = (part / scale if scale else 0.0 for part, scale in zip(displacement, self._config.motion_scale))
         return turned_about_z((x, y, z), -self._yaw)
 

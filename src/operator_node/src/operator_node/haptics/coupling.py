@@ -9,7 +9,7 @@ Mode = Literal["wrench", "coupling"]
 
 
 class Clutch:
-    """Couples the displacement of the tool to that of the handle, from the positions of both when they are engaged.
+    """Couples handle and tool. While the clutch is engaged, the tool moves by the displacement of the handle.
 
     Args:
         button: Index of the button that engages the clutch while it is held; None engages it always.
@@ -30,7 +30,9 @@ class Clutch:
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Updates the clutch with position [m] and buttons of the handle. Returns whether this call engaged it."""
+        """Updates the clutch with position [m] and buttons of the handle. Returns True if this call engaged handle and
+        tool.
+        """
         is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
@@ -51,7 +53,7 @@ class Clutch:
 
 
 class TargetFollower:
-    """Moves the target of the tool after the handle, at a limited speed and within a box.
+    """Lets the target of the tool follow the handle, at a limited speed and within a box.
 
     Args:
         scale: Displacement of the tool per metre of the handle's displacement, for each axis; 0 fixes an axis.

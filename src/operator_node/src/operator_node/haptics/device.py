@@ -14,7 +14,7 @@ class HapticReading(NamedTuple):
     """Measurement of a haptic device, in the axes of its base: x forward (away from the user), y left, z up.
 
     Attributes:
-        position: Position of the handle, from the middle of the workspace [m].
+        position: Position of the handle relative to the middle of the workspace [m].
         velocity: Velocity of the handle as measured by the device [m/s]; None if the device does not measure velocity.
         quat_xyzw: Orientation of the handle, x, y, z, w.
         buttons: 1 for each button that is held, 0 for the others.
@@ -35,7 +35,7 @@ class ReadingError(ValueError):
 
 
 class DeviceEnded(DeviceError):  # noqa: N818 (nothing went wrong)
-    """The user has closed the device, for example its window. It must not be opened again."""
+    """The user has closed the device, for example its window. The device must not be opened again."""
 
 
 class HapticConfig(ConfigModel):

@@ -1,4 +1,4 @@
-"""Simulates a hand on a handle as a mass on a spring; base class of haptic devices without hardware."""
+"""Simulates a hand on a handle as a mass on a spring. Contains the base class of haptic devices without hardware."""
 
 import time
 from abc import abstractmethod
@@ -85,7 +85,7 @@ class PressMotion(NamedTuple):
 
 
 class EmulatedDevice(HapticDevice):
-    """Base class of devices whose handle is simulated: a hand pulls it to a goal. Simulates in real time."""
+    """Base class of devices with a simulated handle, which a hand pulls to a goal. The simulation runs in real time."""
 
     hand: Hand
     buttons: tuple[int, ...] = ()
@@ -110,7 +110,10 @@ class EmulatedDevice(HapticDevice):
         return self._force if self._now_s < self._expires_s else ZERO
 
     def read(self) -> HapticReading | None:
-        """Simulates the time since the last call, and returns the handle's state; None within half a `STEP_S`."""
+        """Simulates the time since the last call, and returns the handle's state.
+
+        Returns None if less than half a `STEP_S` has passed since the last call.
+        """
         now_s = time.monotonic()
         self._now_s = max(self._now_s, now_s - MAX_STEP_S)
         if now_s - self._now_s < 0.5 * STEP_S:

@@ -95,7 +95,7 @@ class HandlePublisher:
 
 
 class HapticStatePublisher:
-    """Publishes `haptics/state`.
+    """Publishes the state of the haptic device and its loop on `haptics/state`.
 
     Args:
         config: Parameters that each message repeats.

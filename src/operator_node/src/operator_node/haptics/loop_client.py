@@ -30,8 +30,8 @@ MAX_FAILURES = 3
 class LoopClient:
     """Runs the haptic loop in a separate process, and restarts the process if it ends. The methods are thread-safe.
 
-    The process has its own session, so a signal to the node's process group does not end it before it sends zero force.
-    The process ends when the node ends.
+    The process has its own session. A signal to the node's process group therefore does not reach the process, which
+    can still send zero force. The process ends when the node ends.
 
     Args:
         setup: First message to the process.

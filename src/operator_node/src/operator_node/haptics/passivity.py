@@ -22,16 +22,16 @@ class PassivityController:
 
     Leak: If the hand's acceleration is at most a, the displacement differs from v dt by at most a dt^2. One sample may
     therefore take the energy below zero by F a dt^2, with the largest force F. This amount is the leak. Every force is
-    shortened such that the energy stays above `floor_j`, whatever such a hand does.
+    shortened such that the energy stays above `floor_j`.
 
     Resolution: Each measured position has an error of up to e, half the diagonal of a cube of the device's steps. A
     measured displacement may therefore differ from v dt by another 4 e. Summation by parts shows two errors of the
-    energy: e times the last force, and e times each change of the force. The controller subtracts the latter from the
-    energy, and reserves the energy needed to release the force. The leak is then F (a dt^2 + 5 e).
+    energy: e times the last force, and e times each change of the force. The controller subtracts the second error from
+    the energy, and reserves the energy needed to release the force. The leak is then F (a dt^2 + 5 e).
 
-    Allowance: The device may return this energy beyond the energy that was put in. Without an allowance, a tool pushed
-    by another object cannot push a hand at rest, and a first touch feels weaker if the simulator lags. A refill power
-    restores the allowance. Over a time t, the device returns at most minus `floor_j` plus refill power times t.
+    Allowance: The allowance is energy that the device may return beyond the energy that was put in. Without it, a tool
+    pushed by another object cannot push a hand at rest, and a first touch feels weaker if the simulator lags. A refill
+    power restores the allowance. Over a time t, the device returns at most minus `floor_j` plus refill power times t.
 
     Reserve: The observer drops energy beyond the reserve. Otherwise, a user who stirs against a damper for long could
     get all of this energy back at once. The observed energy is then less than the real energy, so the bound holds.

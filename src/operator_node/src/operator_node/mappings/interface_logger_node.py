@@ -19,7 +19,7 @@ QUEUE_SIZE = 100
 
 
 class LoggerParameters(ConfigModel):
-    """Time span of the window, and how often it is published."""
+    """Time span of the window, and rate at which the window is published."""
 
     window_duration: Seconds = Field(1.0, description="Time span shown in the window.")
     hz: HzOrOff = Field(
@@ -30,8 +30,8 @@ class LoggerParameters(ConfigModel):
 class InterfaceLogger:
     """Publishes the recent signals of `operator_node/signal` on `operator_node/window`.
 
-    A message is published with each signal, or at the rate `~hz`. Its data are records `[t, s_1, ..., s_n]`, oldest
-    first, where t is the signal's arrival in ROS time [s].
+    A message is published with each signal, or at the rate `~hz`. The message's data are records
+    `[t, s_1, ..., s_n]`, oldest first, where t is the signal's arrival in ROS time [s].
 
     Raises:
         ConfigError: If a parameter is wrong.

@@ -10,7 +10,7 @@ from .scale import ScaleConfig
 class IsometricMapping(Mapping):
     """Limits the vector a of the axes to length 1, then scales it: `scale * min(n, 1) / n * a`, where n is its length.
 
-    A list has one factor for each axis. For example, `[-0.2, 0.2, 0.2]` reverses the first axis.
+    If `scale` is a list, it has one factor for each axis. For example, `[-0.2, 0.2, 0.2]` reverses the first axis.
     """
 
     Config = ScaleConfig

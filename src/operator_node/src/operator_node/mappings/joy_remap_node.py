@@ -18,7 +18,7 @@ NAME = "joy_remap"
 
 
 class JoyRemapParameters(InputParameters):
-    """Rate at which the reading of a device that reports changes only is repeated."""
+    """Rate at which the newest message is repeated, and time-out of the input."""
 
     hz: Hz = Field(100.0, description="Rate, in wall time.")
 

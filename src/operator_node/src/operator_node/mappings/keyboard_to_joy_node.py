@@ -28,7 +28,7 @@ If a press arrives later and has an earlier stamp than the release, the clock wa
 
 
 class KeyboardToJoyConfig(ConfigModel):
-    """Keys of axes and buttons."""
+    """Keys that act as axes and buttons."""
 
     axes: ListOf[KeyPair] = Field(description="For each axis, the key that makes it -1 and the key that makes it 1.")
     buttons: ListOf[KeyName] = Field((), description="The key of each button.")

@@ -11,7 +11,7 @@ from custom_ros_tools.schema import ConfigModel, Count, ListOf
 
 
 class AxesConfig(ConfigModel):
-    """Selection of axes of a device."""
+    """Selection of a device's axes."""
 
     axes_idx: ListOf[Count] = Field(
         min_length=1, description="Indices of axes, from 0 on, in the order of the signal; one may occur twice."

@@ -75,7 +75,7 @@ def _picked(columns: list[int]) -> Callable[[Array], Array]:
 
 
 def _explanations() -> Iterator[tuple[str, Callable[[Array, Array], _Pose]]]:
-    """Yields possible faults of a stream, the most likely first. Each has a text and a function that undoes it."""
+    """Yields possible faults of a stream, the most likely first: a text, and a function that undoes the fault."""
     y_up = "the stream is Y-up: set y_up: true, or choose Z-up in MVN"
     yield "quaternions come as x, y, z, w instead of w, x, y, z", _with_quats(_picked([3, 0, 1, 2]))
     yield y_up, lambda positions, quats: (positions[:, [2, 0, 1]], quats[:, [2, 0, 1, 3]])

@@ -1,4 +1,4 @@
-"""Computes with orientations of segments as quaternions (n x 4), x, y, z, w, and calibrates them in a T-pose."""
+"""Calculates with orientations of segments, given as quaternions (n x 4), x, y, z, w, and calibrates orientations."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -73,6 +73,6 @@ class Calibration:
         self._offsets = {}
 
     def apply(self, frame: SegmentFrame) -> SegmentFrame:
-        """Returns a frame with corrected orientations; the same frame if its person is not calibrated."""
+        """Returns a frame with corrected orientations, or the unchanged frame if its person is not calibrated."""
         offsets = self._offsets.get(frame.person)
         return frame if offsets is None else frame._replace(quats_xyzw=multiply(frame.quats_xyzw, offsets))

@@ -170,7 +170,7 @@ _IDS = np.arange(1, len(SEGMENTS) + 1)
 
 
 def unit_quats(quats: Array) -> tuple[Array, float]:
-    """Normalises quaternions (n x 4). Returns them and the original norm that differed most from 1.
+    """Returns the normalised quaternions (n x 4), and the original norm that differed most from 1.
 
     Raises:
         PacketError: If a quaternion is zero.

@@ -66,9 +66,9 @@ class StreamDecoder:
             sent, too) or `refused: REASON`, unless it waits for the rest of its message. Two further keys are
             `frames`, the number of returned `SegmentFrame`s, and `skipped`, the number of missing samples between
             them. Samples are missing if they are lost or late, or if MVN streams at a lower rate than it measures.
-        refused: Reasons of the newest refused datagrams, from `packets.REASONS`. The caller may clear it.
+        refused: Reasons of the newest refused datagrams, from `packets.REASONS`. The caller may clear this queue.
         refusals: Details of the newest refusal, keyed by reason.
-        remarks: Descriptions of unusual data, keyed by subject. The caller may clear it.
+        remarks: Descriptions of unusual data, keyed by subject. The caller may clear this dictionary.
     """
 
     def __init__(self, position_scale: float = 1.0, y_up: bool = False, max_people: int = 8) -> None:
@@ -96,7 +96,7 @@ class StreamDecoder:
         return sum(len(group.parts) for group in self._groups.values())
 
     def decode(self, data: bytes) -> Message | None:
-        """Decodes one datagram. Returns the message that the datagram completes; None if it completes no message."""
+        """Decodes one datagram. Returns the message if the datagram completes a message, otherwise None."""
         self.counts["received"] += 1
         try:
             datagram = packets.parse(data)
@@ -116,7 +116,7 @@ class StreamDecoder:
         self.refusals[error.reason] = str(error)
 
     def _admit(self, person: int) -> None:
-        """Adds a person to the known people. If there are too many, replaces one who has sent nothing for long.
+        """Adds a person to the known people. If there are too many, replaces a person who has sent nothing for long.
 
         Raises:
             PacketError: If all known people are still sending.
@@ -136,7 +136,7 @@ class StreamDecoder:
             self._drop(self._groups.pop(key))
 
     def _grouped(self, datagram: Datagram) -> Message | None:
-        """Adds a datagram to its group. Returns the message that the datagram completes, or None."""
+        """Adds a datagram to its group. Returns the message if the datagram completes a message, otherwise None."""
         group = self._group_of(datagram)
         if group is None:
             return None

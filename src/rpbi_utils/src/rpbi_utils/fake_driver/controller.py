@@ -85,7 +85,7 @@ class _Motion(NamedTuple):
 
 
 class SetPoint(NamedTuple):
-    """Position that the motors are to have at a time.
+    """Target position of the motors at a time.
 
     Attributes:
         time_s: Time by the clock of the commands [s]. Set points are nearly one cycle apart, even if commands arrive

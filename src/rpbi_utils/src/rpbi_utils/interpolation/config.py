@@ -100,7 +100,7 @@ class RotationConfig(ConfigModel):
         return self.rotation_repr in ("quat", "axis_angle") or (self.rotation_repr != "none" and self.shortest_path)
 
     def quat(self, values: Sequence[float]) -> Quaternion:
-        """Returns the orientation x, y, z, w for the values of its rows, in the representation `rotation_repr`.
+        """Converts the values of `rows`, in the representation `rotation_repr`, to an orientation x, y, z, w.
 
         Raises:
             WaypointError: If a quaternion is zero.

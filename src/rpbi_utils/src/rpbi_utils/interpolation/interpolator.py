@@ -30,7 +30,7 @@ class TargetSample(NamedTuple):
 
     Attributes:
         time_s: Time of the sample [s].
-        state: Values, velocities and accelerations of the scalar rows.
+        state: Values, velocities and accelerations of the rows that are interpolated as numbers.
         pose: Pose of the target frame; None for targets of joints.
     """
 
@@ -43,8 +43,8 @@ class Plan(NamedTuple):
     """A planned motion.
 
     Attributes:
-        scalars: Trajectory of the scalar rows.
-        path: Path of the orientation; None if the orientation is constant or part of the scalar rows.
+        scalars: Trajectory of the rows that are interpolated as numbers.
+        path: Path of the orientation; None if the orientation is constant or among those rows.
         knots_s: Times of the waypoints [s].
     """
 

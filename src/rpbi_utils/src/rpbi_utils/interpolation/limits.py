@@ -80,8 +80,8 @@ class Peaks(NamedTuple):
     """Largest speeds and accelerations of a motion.
 
     Attributes:
-        velocity: Largest speed of each scalar row [m/s or rad/s], shape (S,).
-        acceleration: Largest acceleration of each scalar row [m/s^2 or rad/s^2], shape (S,).
+        velocity: Largest speed of each row that is interpolated as a number [m/s or rad/s], shape (S,).
+        acceleration: Largest acceleration of each of these rows [m/s^2 or rad/s^2], shape (S,).
         angular_velocity: Largest angular speed of the orientation path [rad/s]; 0 without a path.
         angular_acceleration: Largest angular acceleration of the orientation path [rad/s^2]; 0 without a path.
     """
@@ -93,7 +93,12 @@ class Peaks(NamedTuple):
 
     @classmethod
     def of(cls, scalars: Trajectory, path: RotationPath | None) -> Peaks:
-        """Returns the peaks of the scalar rows and the orientation path between the first and the last knot."""
+        """Returns the peaks between the first and the last knot.
+
+        Args:
+            scalars: Trajectory of the rows that are interpolated as numbers.
+            path: Path of the orientation; None without a path.
+        """
         ends = [*(each.start_s for each in scalars.segments[1:]), scalars.end_s]
         rows = np.array([each.polynomials for each in scalars.segments])  # segments x S x 6
         spans = np.array(

@@ -120,7 +120,7 @@ class _Topic:
         self._subscriber.unregister()
 
     def is_published(self, is_published: bool) -> None:
-        """Shows in the plot why messages are missing: without a publisher, or before the first message."""
+        """Shows in the plot that the topic has no publisher or no message yet. Otherwise, removes this text."""
         for name, _ in self.fields:
             if not is_published:
                 self._plot.note(name, "nobody publishes it")

@@ -89,7 +89,7 @@ class TrackingNodeConfig(ConfigModel):
 
 
 class StandaloneTag(ConfigModel):
-    """A tag that is reported."""
+    """A tag that the node reports."""
 
     id: Count = Field(description="Its number in the family.")
     size: PositiveMetres = Field(description="Side of its black square.")
@@ -97,7 +97,7 @@ class StandaloneTag(ConfigModel):
 
 
 class AprilTagNodeConfig(ConfigModel):
-    """Tags of the family tag36h11 to report."""
+    """Tags that the node reports. They belong to the family tag36h11."""
 
     standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
     publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")

@@ -35,7 +35,7 @@ KEYS = ("vector", "values")
 
 
 class HaplyConfig(HapticConfig):
-    """A Haply Inverse3."""
+    """Options of a Haply Inverse3."""
 
     max_force_n: Positive = Field(8.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")

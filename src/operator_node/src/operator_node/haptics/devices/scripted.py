@@ -14,7 +14,7 @@ SPREAD = 0.15
 
 
 class ScriptedConfig(HapticConfig):
-    """A hand that presses once and releases."""
+    """Options of the scripted device, whose hand presses once and releases."""
 
     max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")

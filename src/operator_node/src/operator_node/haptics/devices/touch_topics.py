@@ -37,7 +37,7 @@ ENDED = "its ROS node was shut down"
 
 
 class TouchConfig(HapticConfig):
-    """A Touch and its driver."""
+    """Options of a Touch and its driver."""
 
     max_force_n: Positive = Field(3.0, description="Largest force that is sent to it [N]; the Touch X has 7.9.")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")

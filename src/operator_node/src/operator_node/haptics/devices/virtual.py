@@ -25,7 +25,7 @@ SHOW_S = 0.02
 
 
 class VirtualConfig(HapticConfig):
-    """A window with a handle."""
+    """Options of the virtual device, a window with a handle."""
 
     max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")

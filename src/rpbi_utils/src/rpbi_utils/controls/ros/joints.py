@@ -36,7 +36,7 @@ MOVED = "font-weight: bold"
 
 
 class JointRow:
-    """A slider, a target field and the measured position of one joint.
+    """Widgets of one joint: a slider, a target field, and a text with the measured position.
 
     The slider follows the measured position until the user moves the slider.
 

@@ -63,7 +63,7 @@ class SimulatorSnapshot:
 
     @property
     def cameras(self) -> list[str]:
-        """Names of the cameras in topic names, sorted, such as `camera`."""
+        """Names of the cameras as they occur in topics, sorted; for example `camera`."""
         if not self.is_alive:
             return []
         return sorted(
