@@ -1,4 +1,4 @@
-"""Actions on bodies, such as teleporting or moving joints; they are recorded, and repeated by a replay."""
+"""Actions on bodies, such as teleporting a body or moving joints. Actions are recorded, and a replay repeats them."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class TimedGoal(NamedTuple):
 
 
 class RecordedTrajectory(NamedTuple):
-    """A requested trajectory, as it is recorded.
+    """Record of a requested trajectory.
 
     Attributes:
-        request: The trajectory. Its stamp [ns] is relative to the stamp of the tick at which it was requested; 0 means
-            an immediate start.
+        request: The trajectory. The trajectory's stamp [ns] is relative to the stamp of the tick at which the
+            trajectory was requested; 0 means an immediate start.
         tolerances: Goal tolerances; None if the trajectory was requested without goal tolerances.
     """
 
@@ -79,7 +79,7 @@ class Action(NamedTuple):
     Attributes:
         do: Applies the action; its arguments are the body, the world's clock and the value.
         value: Converts a given value to the type that `do` requires, for instance a mapping to a named tuple. Raises
-            ValueError if this is not possible.
+            ValueError if the value cannot be converted.
     """
 
     do: Callable[[Any, Clock, Any], Any]

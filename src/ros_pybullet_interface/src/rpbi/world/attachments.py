@@ -1,4 +1,4 @@
-"""Attachments: constraints that hold bodies together, optionally up to a largest force."""
+"""Attachments: constraints that hold two bodies together, optionally with a force limit at which they break."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rpbi.geometry import LinkWrench, Pose, rotated
 log = logging.getLogger(__name__)
 
 _UNLIMITED_N = 1e9
-"""Largest force of a constraint [N], so large that it is never reached; PyBullet's default would be 500 N."""
+"""Force limit of a constraint in PyBullet [N], so large that it is never reached; PyBullet's default is 500 N."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,9 @@ class Attachments:
     """The attachments of a world.
 
     Attributes:
-        limited: Whether at least one attachment has a largest force, so that forces must be checked.
-        changes: Number of changes so far; a change is an added or removed attachment, or a reset.
-        last_change: Sentence about the last change; empty before the first.
+        limited: Whether at least one attachment has a force limit, so that forces must be checked.
+        changes: Number of changes so far. A change adds or removes an attachment, or removes all at a reset.
+        last_change: Text that describes the last change; empty before the first change.
     """
 
     def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
@@ -105,8 +105,9 @@ class Attachments:
         """Attaches the child body to the parent body.
 
         Raises:
-            UnknownNameError: If there is no such body or link.
-            ValueError: If the name is taken, or the bodies are attached already or cannot be attached.
+            UnknownNameError: If a configured body or link does not exist.
+            ValueError: If another attachment has the same name, or the two links are already attached to each other.
+                Also if the two links cannot be attached to each other.
             PhysicsError: If PyBullet refuses the constraint.
         """
         if config.name in self._holding:
@@ -145,13 +146,13 @@ class Attachments:
             log.info("%s", self._release(each, f"ended, since '{name}' was removed"))
 
     def resume(self) -> None:
-        """Creates all constraints again, after the bodies have moved into another client."""
+        """Creates all constraints again, after the world has moved into another PyBullet client."""
         for name, each in self._holding.items():
             constraint = self._constrain(each.config, each.parent, each.child)
             self._holding[name] = replace(each, constraint=constraint)
 
     def refuse_moving(self, name: str) -> None:
-        """Checks that a body is not attached, since attachments would pull a teleported body back at once.
+        """Checks that a body may be teleported: attachments would pull the body back at once.
 
         Raises:
             ValueError: If the body is attached to another body.
@@ -190,14 +191,14 @@ class Attachments:
         return [each for each in self._holding.values() if name in (each.parent.body.name, each.child.body.name)]
 
     def _end(self, key: str, name: str) -> _End:
-        """Returns an end of an attachment, without its pose.
+        """Returns one end of an attachment; the end's pose is not set yet.
 
         Args:
             key: `parent` or `child`, for messages.
             name: `NAME` for the root link of a body, or `NAME/LINK`.
 
         Raises:
-            UnknownNameError: If there is no such body or link.
+            UnknownNameError: If the body or link does not exist.
             ValueError: If the body is soft or has no physics.
         """
         body_name, _, link = name.partition("/")
@@ -236,7 +237,7 @@ class Attachments:
         self._note(attachment, what)
 
     def _release(self, attachment: _Attachment, what: str) -> str:
-        """Removes an attachment, and returns a sentence about the removal that ends with `what`."""
+        """Removes an attachment, and returns a text that describes the removal and ends with `what`."""
         self._pb.removeConstraint(attachment.constraint)
         del self._holding[attachment.config.name]
         return self._note(attachment, what)
@@ -250,7 +251,7 @@ class Attachments:
 
 
 def _placed(config: AttachmentConfig, parent: _End, child: _End) -> tuple[_End, _End]:
-    """Returns both ends with their configured poses; a missing pose is chosen so that the bodies need not move."""
+    """Returns both ends with their configured poses. A missing pose is chosen such that the bodies do not move."""
     on_parent = None if config.parent_pose is None else config.parent_pose.pose
     on_child = None if config.child_pose is None else config.child_pose.pose
     child_in_parent = parent.link_pose().inverse() @ child.link_pose()

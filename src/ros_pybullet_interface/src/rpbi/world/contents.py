@@ -32,11 +32,11 @@ DIGEST_BYTES = 16
 
 
 def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
-    """Returns a BLAKE2b hash of the tick, and of names, positions and velocities of all bodies and joints.
+    """Returns a BLAKE2b hash of the tick, the bodies' names, and the positions and velocities of bodies and joints.
 
     Equal states have equal hashes in all processes: names are sorted, and numbers are hashed as bytes. Motor targets
-    are not hashed, since differences between them soon change the motion. The motion of soft bodies is not hashed,
-    since it is not reproducible.
+    are not hashed, since different targets soon lead to different motion. The motion of soft bodies is not hashed,
+    since this motion is not reproducible.
     """
     digest = hashlib.blake2b(struct.pack("<Q", tick), digest_size=DIGEST_BYTES)
     for name in sorted(bodies):
@@ -49,7 +49,7 @@ def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ..
     """Returns a body's sensors and its inputs.
 
     Returns:
-        The sensors, with configured sensors after the built-in sensors of the body, and the inputs indexed by name.
+        The sensors, first the body's built-in sensors and then the configured sensors; and the inputs, indexed by name.
 
     Raises:
         PluginError: If a class of another package fails.
@@ -184,7 +184,7 @@ class WorldContents:
         """Adds all configured objects, attachments and cameras. Existing cameras keep their present poses.
 
         Raises:
-            ConfigError: If objects, attachments or cameras cannot be added; all others are added.
+            ConfigError: If objects, attachments or cameras cannot be added; all remaining ones are added.
         """
         inputs_before = self.inputs
         self._config = loaded.config
@@ -221,7 +221,7 @@ class WorldContents:
 
         Args:
             recipe: Recipe of the new contents.
-            changed: Names of bodies that were added or removed between `fill` and the making of the recipe.
+            changed: Names of the bodies that were added or removed after `fill` and before the recipe was made.
 
         Raises:
             ConfigError: If an object cannot be loaded. Later objects of the recipe are then missing.

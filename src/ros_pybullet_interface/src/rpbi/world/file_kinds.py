@@ -1,4 +1,4 @@
-"""Recognises the kind of a file from its content, to report files of a wrong kind, such as a robot as a world."""
+"""Recognises the kind of a file from the content, to report a wrong file, such as a robot file given as a world."""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -27,7 +27,7 @@ def load_main_file(path: str) -> dict[str, Any]:
     """Returns the content of the main file of a world.
 
     Raises:
-        ConfigError: If the file is not a YAML mapping. If it is a known kind of XML file, the message says so.
+        ConfigError: If the file is not a YAML mapping. For a known kind of XML file, the message names this kind.
     """
     return _load(path, "a world")
 
@@ -36,7 +36,7 @@ def load_object_file(path: str) -> dict[str, Any]:
     """Returns the content of an object's file.
 
     Raises:
-        ConfigError: If the file is not a YAML mapping. If it is a known kind of XML file, the message says so.
+        ConfigError: If the file is not a YAML mapping. For a known kind of XML file, the message names this kind.
     """
     return _load(path, "an object file")
 
@@ -83,7 +83,7 @@ def check_is_listed_right(data: Mapping[str, Any], file: str, section: str, know
         data: Content of the object's file.
         file: Name of the object's file, for messages.
         section: Key of the list that contains the object's file.
-        known: Keys that files in this list may have.
+        known: Keys that files in the list `section` may contain.
 
     Raises:
         ConfigError: If the file is of another kind; the message names the right list, unless the file is a world.
@@ -101,7 +101,7 @@ def check_is_listed_right(data: Mapping[str, Any], file: str, section: str, know
 
 
 def _section_of(data: Mapping[str, Any]) -> str:
-    """Returns the key of the main file's list to which a file belongs; empty if the file's keys do not decide this."""
+    """Returns the key of the main file's list to which a file belongs; empty if this is not clear from the content."""
     if "loadURDF" in data:
         return "robots" if any(key in data for key in _OF_ROBOTS) else "urdfs"
     for key, section in (

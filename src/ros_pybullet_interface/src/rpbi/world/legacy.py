@@ -59,7 +59,7 @@ NO_EFFECT: dict[str, dict[str, str]] = {
 
 
 def old_keys(section: str) -> dict[str, str]:
-    """Returns advice on keys of older worlds, indexed by key; a nested key is written like `object_tf.offset`."""
+    """Returns advice on keys of older worlds, indexed by key. A nested key is written like `object_tf.offset`."""
     spellings = {old: f"Old spelling: write {new}." for old, new in LEGACY_KEYS.get(section, {}).items()}
     return {**spellings, **{key: f"No effect: {advice}." for key, advice in NO_EFFECT.get(section, {}).items()}}
 
@@ -73,7 +73,8 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
         file: Name of the file, for messages.
 
     Returns:
-        A copy of the mapping with present keys, the old spellings indexed by present key, and the problems found.
+        A copy of `data` with present spellings; the old spellings in `data`, indexed by present spelling; and a problem
+        for each key that `data` contains in two spellings.
     """
     current = copy.deepcopy(dict(data))
     spellings: dict[str, str] = {}

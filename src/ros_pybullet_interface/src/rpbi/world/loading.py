@@ -44,7 +44,7 @@ class CameraConfig(NamedTuple):
 
     Attributes:
         config: Configuration of the camera.
-        file: File from which the configuration was read, as the user wrote its name.
+        file: Name of the file with the configuration, as the user wrote the name.
     """
 
     config: RgbdSensorConfig
@@ -76,9 +76,9 @@ def load_world(
 
     Args:
         path: The main file; `{package}/path` and `package://package/path` are resolved.
-        robot_description: URDF file that is loaded in place of the file name `robot_description`; None if there is no
-            such file.
-        overrides: Keys and values that replace keys of the main file; mappings are merged key by key.
+        robot_description: URDF file to load wherever a configuration gives `robot_description` as the file name; None
+            if no URDF is supplied.
+        overrides: Values that replace values of the main file, indexed by key. Mappings are merged key by key.
 
     Raises:
         ConfigError: If there are problems; the error lists all problems of all files.
@@ -92,7 +92,7 @@ def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str |
 
     Args:
         data: Content of the main file; it is not changed.
-        file: Name of the main file; `"~config"`, which has no folder, if the content came from the parameter server.
+        file: Name of the main file, or `"~config"` if the content came from the parameter server.
         robot_description: See `load_world`.
 
     Raises:
@@ -102,7 +102,7 @@ def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str |
 
 
 def robots_description(path: str, names: Sequence[str]) -> str:
-    """Returns the text of a single URDF that holds given robots of a world at the poses where their bases start.
+    """Returns the text of a single URDF that contains the named robots of a world, with their bases at the start poses.
 
     The URDF's root is the link `world`. Names of links and joints begin with the robot's name and an underscore.
 
@@ -112,7 +112,7 @@ def robots_description(path: str, names: Sequence[str]) -> str:
 
     Raises:
         ConfigError: If the world cannot be loaded.
-        UnknownNameError: If the world does not have a robot of a given name.
+        UnknownNameError: If the world does not have a robot with a given name.
     """
     configs = (each.config for each in load_world(path).objects)
     bases = {each.name: each.loadURDF for each in configs if isinstance(each, RobotConfig)}
@@ -185,12 +185,12 @@ class _Reader:
                 yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
 
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yields content, name and context of each file in a list of the main file.
+        """Reads the files in a list of the main file.
 
-        Collects problems of files that cannot be read, and of objects whose names are not unique.
+        Yields, for each file, its content, its name for messages, and the `context` for `load_object`.
 
-        Args:
-            section: Key of the list.
+
+        Collects a problem for each file that cannot be read, and for each object name that is not unique.
         """
         search_paths = self._search_paths()
         for index, entry in _object_entries(self._data.get(section)):
@@ -224,7 +224,7 @@ class _Reader:
             self._owner_of[name] = file
 
     def _search_paths(self) -> tuple[str, ...]:
-        """Returns the search paths whose folders exist, even if other keys of the main file are wrong."""
+        """Returns the configured search paths that exist; other keys of the main file need not be valid."""
         given = self._data.get("setAdditionalSearchPath")
         folders: list[str] = []
         for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
@@ -234,7 +234,7 @@ class _Reader:
 
 
 def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
-    """Yields the index and content of each valid entry of a list; the main file's model reports invalid entries."""
+    """Yields the index and content of each valid entry of a list; the main file's model reports invalid ones."""
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
             yield index, parse_object_entry(entry)

@@ -18,20 +18,20 @@ _Model = TypeVar("_Model", bound=ConfigModel)
 RESERVED_NAME = "world"
 """Name that objects must not have, since `rpbi/world` is the world frame."""
 OWN_TYPES = Body.section
-"""Key of the main file's list of objects whose files contain their type."""
+"""Key of the list in the main file for objects whose files contain the object's type."""
 TYPE = "type"
 """Key in an object's file for the type of the object: a key of BODY_TYPES, or `module:Class`."""
 
 
 @dataclass(frozen=True)
 class ObjectConfig:
-    """An object that a world is to be built with.
+    """Configuration of an object of a world, and the file from which the configuration was read.
 
     Attributes:
         type: Type of the object: a key of BODY_TYPES, or `module:Class`.
         config: Validated configuration of the object.
-        file: File of the configuration, as the user wrote its name.
-        path: Resolved path of this file; empty if the configuration is not from a file on this machine.
+        file: Name of the file, as the user wrote the name.
+        path: Resolved path of the file; empty if the configuration is not from a file on this machine.
     """
 
     type: str
@@ -41,9 +41,9 @@ class ObjectConfig:
 
 
 def object_sections() -> dict[str, type[BodyConfig]]:
-    """Returns the configuration models of objects, indexed by the main file's list of such objects.
+    """Returns the configuration models of objects, indexed by the key under which the main file lists such objects.
 
-    The order is the order of loading: soft objects come last.
+    The models are in the order in which objects are loaded: soft objects come last.
     """
     rigid: dict[str, type[BodyConfig]] = {}
     soft: dict[str, type[BodyConfig]] = {}
@@ -53,12 +53,14 @@ def object_sections() -> dict[str, type[BodyConfig]]:
 
 
 def type_of(section: str, data: Any) -> str:
-    """Returns the type of an object: the value of `type` in its file, or else a type that belongs to its list.
+    """Returns the type of an object.
+
+    This is the value of the key `type` in the object's file. Without this key, the type follows from `section` and from
+    the file's other keys. If OWN_TYPES lists the file, the key is required, and without it the returned type is empty.
 
     Args:
         section: Key of the main file's list that contains the object, such as `robots`.
-        data: Content of the object's file. If it is not a mapping, the list's first type is returned, and `load_object`
-            then fails.
+        data: Content of the object's file. If the content is not a mapping, `load_object` fails with the returned type.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:
@@ -76,8 +78,8 @@ def load_object(kind: str, data: Mapping[str, Any], file: str, context: Mapping[
         kind: Type of the object: a key of BODY_TYPES, or `module:Class`.
         data: Content of the object's file; it is not changed.
         file: Name of the object's file, for messages.
-        context: Context in which file names are resolved, with the optional keys `file` (path of the object's file, if
-            `file` is not a path), `search_paths` and `robot_description`.
+        context: Settings for resolving file names, all optional: `file` (path of the object's file, if the argument
+            `file` is not a path), `search_paths` (folders) and `robot_description` (URDF file, see `load_world`).
 
     Raises:
         ConfigError: If the type is unknown or the content is not valid; the error lists all problems.
@@ -119,7 +121,7 @@ def parse_section(
         data: Content of the file; it is not changed.
         file: Name of the file, for messages.
         model: Model of the content.
-        context: Context in which file names are resolved, see `load_object`.
+        context: Settings for resolving file names, see `load_object`.
 
     Raises:
         ConfigError: If the content is not valid; problems name keys as the user spelt them.
@@ -144,6 +146,6 @@ def _respelt(key: str, spellings: Mapping[str, str]) -> str:
 
 
 def name_in(data: Any) -> str | None:
-    """Returns the value of `name` in the content of a file; None if there is no such key or no text."""
+    """Returns the value of `name` in the content of a file; None if the key is missing or the value is not text."""
     name = data.get("name") if isinstance(data, Mapping) else None
     return name if isinstance(name, str) else None

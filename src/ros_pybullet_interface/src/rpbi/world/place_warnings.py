@@ -19,7 +19,7 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from .world import World
 
 MAX_NAMES = 3
-"""Largest number of bodies or links that a warning names; further ones are only counted."""
+"""Maximum number of bodies or links that a warning names; further ones are only counted."""
 FAR_M = 100.0
 """Largest plausible coordinate of a position [m]; a larger one was probably given in millimetres."""
 TOUCHING_M = 1e-3
@@ -69,7 +69,7 @@ def _far_message(position: Sequence[float]) -> str:
 
 
 def _rolling(world: World) -> Iterator[Problem]:
-    """Yields a warning for each ball or capsule that can roll endlessly, without rolling friction, on a level floor."""
+    """Yields a warning for each ball or capsule that rolls endlessly on a level floor for lack of rolling friction."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     floors = [body for body in placed if is_still(body, -1) and _shape_kinds(body) in _FLAT]
     for body in placed:
@@ -123,7 +123,7 @@ def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _planes(world: World) -> Iterator[Problem]:
-    """Yields a warning for each plane on which bodies rest, or will rest after a fall."""
+    """Yields a warning for each plane on which bodies rest, or will rest after a fall: planes lose contact points."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     for plane in placed:
         if _shape_kinds(plane) != {pybullet.GEOM_PLANE}:
@@ -144,7 +144,7 @@ def _shape_kinds(body: Body) -> set[int]:
 
 
 def _needs_points(body: Body) -> bool:
-    """Returns whether a body can fall, and rests on several contact points; this is assumed of all shapes but balls."""
+    """Returns whether a body can fall and is not a ball, so that it needs several contact points to rest."""
     return not is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
 
 
@@ -155,7 +155,7 @@ def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool
         world: The world.
         plane: The plane, or another body that can be a floor.
         body: The body that may rest on `plane`.
-        level: Smallest cosine of the slope at the nearest point of `plane`; 0 accepts every slope.
+        level: Minimum cosine of the slope angle at the nearest point of `plane`; 0 accepts every slope.
     """
     points = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
     if not points:
@@ -171,7 +171,7 @@ def _is_below(world: World, plane: Body, body: Body, level: float = 0.0) -> bool
 
 
 def _has_place(world: World, body: Body) -> bool:
-    """Returns whether a body is rigid, has collisions, and does not follow a TF frame of another node."""
+    """Returns whether a body is rigid, takes part in the physics, and does not follow a TF frame of another node."""
     is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
     return body.has_physics and not body.is_soft and is_placed
 
@@ -193,7 +193,10 @@ class _Frames:
         self._followed = {slot: each for slot, each in world.inputs.items() if isinstance(each, PoseInput)}
 
     def warnings(self) -> Iterator[Problem]:
-        """Yields a warning for each followed or parent frame that is not published, and each frame published twice."""
+        """Yields a warning for each unpublished frame that is needed, and for each frame that is published twice.
+
+        A frame is needed if a body or camera follows the frame, or if a configured pose has the frame as its parent.
+        """
         main = self._world.loaded.file
         for index, each in enumerate(self._world.config.poses):
             key = f"poses[{index}]"
@@ -209,14 +212,14 @@ class _Frames:
                 yield Problem(file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
-        """Returns the body in the frame's name, `rpbi/BODY/...`, if this body can publish frames; otherwise None."""
+        """Returns the body that a frame name `rpbi/BODY/...` refers to; None unless this body can publish frames."""
         parts = frame.split("/")
         body = self._world.bodies.get(parts[1]) if len(parts) > 1 and parts[0] == "rpbi" else None
         can_publish = isinstance(body, JointedBody) or hasattr(getattr(body, "config", None), "broadcast_hz")
         return body if can_publish else None
 
     def _links_on_tf(self, body: Body) -> set[str]:
-        """Returns the frames of a body, including frames that robot_state_publisher computes from joint states."""
+        """Returns a body's frames on TF, including frames that robot_state_publisher computes from joint states."""
         frames: set[str] = set()
         for sensor in self._world.sensors_of(body.name):
             if isinstance(sensor, LinkPoseSensor):
@@ -226,7 +229,7 @@ class _Frames:
         return frames
 
     def _missing(self, tf_id: str) -> str | None:
-        """Returns a message if a needed frame is not published by this world; None if it is published."""
+        """Returns a message if this world does not publish a needed frame; otherwise None."""
         frame = self._world.config.without_prefix(tf_id)
         missing = f"nothing here publishes the TF frame '{tf_id}'"
         if frame in self._published:
@@ -258,8 +261,8 @@ def some(names: Sequence[str]) -> str:
 def is_still(body: Body, link: int) -> bool:
     """Returns whether a link never moves.
 
-    This is the case if the body has no physics, or if the base is fixed or has mass 0 and the link is the base or
-    connected to it by fixed joints.
+    No link of a body without physics moves. Otherwise the base must be fixed or have mass 0, and only fixed joints may
+    lie between the base and the link.
     """
     if body.is_soft:
         return False

@@ -21,14 +21,14 @@ from .loading import CAMERAS
 from .objects import OWN_TYPES, TYPE, object_sections
 
 WORLD = "world"
-"""Name of the main file's kind, among the kinds of YAML files."""
+"""Name of the file kind to which main files belong."""
 _FILE_NAME = {"type": "string", "minLength": 1}
 _ENTRY = "entry"
 """Name of the schema definition for an entry of a list in the main file."""
 
 
 def sections() -> dict[str, type[ConfigModel]]:
-    """Returns the models of object and camera files, indexed by the key of the main file's list."""
+    """Returns the models of object and camera files, indexed by the key under which the main file lists such files."""
     return {**object_sections(), CAMERAS: RgbdSensorConfig}
 
 
@@ -40,8 +40,8 @@ def kind_of(section: str) -> str:
 def file_schemas() -> dict[str, Schema]:
     """Returns the schemas indexed by kind of file (`world`, `robot`, `dynamic_object` and so on), without old keys.
 
-    A schema accepts everything that the model accepts. Only the models check rules that a schema cannot express, such
-    as unique names or existing files.
+    A schema accepts everything that the model of the same files accepts. Only the model checks rules that a schema
+    cannot express, such as unique names or existing files.
     """
     files = json_schemas(
         {WORLD: main_file_model(sections())} | {kind_of(section): model for section, model in sections().items()}
@@ -60,9 +60,9 @@ def file_schemas() -> dict[str, Schema]:
 def schemas() -> dict[str, Schema]:
     """Returns the schemas for editors, indexed by kind of file.
 
-    The schemas extend `file_schemas` by keys of older worlds, and by list entries with overrides. An entry with
-    overrides names a file and may override every key of the file. The entry's schema is the definition `entry` in the
-    schema of the file's kind, such as `robot.schema.json#/$defs/entry`.
+    In addition to `file_schemas`, these schemas accept keys that only older worlds use. In the main file's lists, they
+    also accept entries that name a file and override keys of this file. The schema of such an entry is the definition
+    `entry` in the schema of the named file, such as `robot.schema.json#/$defs/entry`.
     """
     files = file_schemas()
     world = _with_old_keys(files[WORLD], MAIN)
@@ -76,7 +76,7 @@ def schemas() -> dict[str, Schema]:
 
 
 def _of_any_type(schema: Schema) -> Schema:
-    """Returns the schema of object files with the key `type`, to which a type may add further keys."""
+    """Extends the schema of object files by the required key `type`; a type may accept further keys."""
     known = {"type": "string", "enum": list(BODY_TYPES)}
     own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
     kind = {"description": "Its class, as `module:Class`, or the name of a type.", "anyOf": [own, known]}
@@ -90,7 +90,7 @@ def _of_any_type(schema: Schema) -> Schema:
 
 
 def _with_entry(schema: Schema) -> Schema:
-    """Returns a schema, extended by the definition of a list entry with `file` and overrides of the file's keys."""
+    """Extends a schema of a file by the definition of a list entry, which names a file and may override its keys."""
     path = {"description": "File that has the keys which are not here.", **_FILE_NAME}
     entry = {
         "description": "A file, and what is different for this one.",
@@ -123,7 +123,7 @@ def _optional(schema: Schema, root: Schema) -> Schema:
 
 
 def _required(schema: Schema, root: Schema) -> Schema:
-    """Returns only those parts of a mapping's schema that make keys required, also in nested mappings."""
+    """Returns only the parts of a schema that make keys of mappings required, also in nested mappings."""
     mapping = mapping_in(schema, root) if "items" not in schema else None
     if mapping is None:
         return {}
@@ -134,7 +134,7 @@ def _required(schema: Schema, root: Schema) -> Schema:
 
 
 def _with_old_keys(schema: Schema, section: str) -> Schema:
-    """Returns a schema, extended by the keys of older worlds that are still accepted, marked as deprecated."""
+    """Extends a schema by the accepted keys of older worlds, which are marked as deprecated."""
     result = copy.deepcopy(schema)
     properties = result["properties"]
     for key, advice in old_keys(section).items():

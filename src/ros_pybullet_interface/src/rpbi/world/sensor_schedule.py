@@ -130,7 +130,7 @@ class SensorSchedule:
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
     def act(self, method: str) -> None:
-        """Calls a method, `before_step` or `after_step`, of all sensors in `watching`."""
+        """Calls the named method, `before_step` or `after_step`, of every sensor that has either of these methods."""
         for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)
@@ -140,7 +140,7 @@ class SensorSchedule:
 
     @property
     def idle_ticks(self) -> float:
-        """Number of ticks before the next tick at which a sensor acts or is due; inf without sensors."""
+        """Number of ticks until a sensor has to be called or read, not counting that tick; inf without such sensors."""
         if self.watching:
             return 0.0
         return self._queue[0][0] - self._clock.tick - 1 if self._queue else math.inf
@@ -161,7 +161,7 @@ class SensorSchedule:
         return _present(samples)
 
     def read_rest(self) -> list[Any]:
-        """Reads all sensors that have not been read at the present tick, and returns their samples."""
+        """Reads sensors that have not been read at the present tick, see `World.read_rest`; returns the samples."""
         tick = self._clock.tick
         return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
 
@@ -180,7 +180,7 @@ class SensorSchedule:
             yield from scheduled
 
     def _rated(self) -> Iterator[_Scheduled]:
-        """Returns an iterator over the sensors that have a rate other than 0 and a receiver of their samples."""
+        """Returns an iterator over the sensors whose rate is not 0 and whose samples have a receiver."""
         return (each for each in self._all() if each.sensor.hz and each.sensor.wanted)
 
 

@@ -18,9 +18,9 @@ from .contents import WorldContents
 from .saved.command_log import MAX_KEPT, CommandLog, WorldCommand
 
 MAX_LOGGED = 1_000
-"""Largest number of new load log entries for a fast reset; beyond it, the world is built again to shorten the log."""
+"""Maximum number of new load log entries for a fast reset. With more, the world is built again to shorten the log."""
 MAX_FREE = 1
-"""Largest number of free bodies for a fast reset; worlds with more free bodies are always built again."""
+"""Maximum number of free bodies for a fast reset; worlds with more free bodies are always built again."""
 APART_M = 1_000.0
 """Distance between the bases of bodies at which bodies certainly do not touch [m]."""
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -47,8 +47,8 @@ class StartState:
     to be built again.
 
     A world is not suitable if its bodies may sleep, since PyBullet does not restore sleep. Worlds with several free
-    bodies are not suitable either: PyBullet does not restore the order of body pairs in collision detection, in which
-    contacts are solved. In a test, one of 164 random heaps of bodies moved differently for this reason.
+    bodies are not suitable either. PyBullet solves contacts in the order of the body pairs in collision detection, and
+    does not restore this order. In a test, one of 164 random heaps of bodies moved differently for this reason.
 
     Args:
         pb: Client of the world.
@@ -98,13 +98,13 @@ class StartState:
         self._pb.removeState(self._state_id)
 
     def _end_contacts(self) -> None:
-        """Moves all bodies far apart, so that PyBullet drops their contacts, which `restoreState` alone would keep."""
+        """Moves all bodies far apart, so that PyBullet drops their contacts; `restoreState` would keep the contacts."""
         for index, body in enumerate(self._contents.bodies.values()):
             self._pb.resetBasePositionAndOrientation(body.body_id, (0.0, 0.0, APART_M * (index + 1)), NO_TURN)
         self._pb.performCollisionDetection()
 
     def _undoing(self, commands: CommandLog) -> Iterator[DynamicsChange | None]:
-        """Yields the changes of dynamics that undo commands; None for each command that cannot be undone."""
+        """Yields the changes of dynamics that undo `dynamics` commands; None for each command that cannot be undone."""
         for command in commands.since(0)[1]:
             if command.what == "dynamics" and not command.tick:  # after tick 0, a change may have renewed contacts
                 yield self._undo_dynamics(command.name, command.value)

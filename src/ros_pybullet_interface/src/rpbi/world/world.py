@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 IDLE_ROW_S = 0.0004
 """Intended wall time [s] between two checks for new inputs in `World.run_idle`."""
 MAX_IDLE_ROW = 20
-"""Largest number of ticks between two checks for new inputs, since later ticks may take much longer than expected."""
+"""Maximum number of ticks between two checks for new inputs, since later ticks may take much longer than expected."""
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -56,7 +56,7 @@ _Result = TypeVar("_Result")
 def _recorded(
     method: Callable[Concatenate[World, _Arguments], _Result],
 ) -> Callable[Concatenate[World, _Arguments], _Result]:
-    """Decorates a method that records its changes of PyBullet as commands; `ChangeWatch` then ignores the changes."""
+    """Decorates a method that records its changes of PyBullet as commands, so that `ChangeWatch` ignores them."""
 
     @wraps(method)
     def call(world: World, *arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
@@ -73,7 +73,8 @@ def _recorded(
 class World:
     """A simulated world of bodies and sensors, which advances in ticks.
 
-    Only the thread that made the world may call its methods. Other threads use `put` and the mailbox.
+    Only the thread that made the world may call methods of the world, except `put`, which any thread may call. Other
+    threads may also use `mailbox`.
 
     Args:
         loaded: The validated configuration of the world, its objects and its cameras.
@@ -169,7 +170,7 @@ class World:
         Args:
             state: The state, or a file that `WorldState.write` wrote.
             trust: Packages from which the state may import classes, see `from_description`.
-            max_ticks: Largest number of ticks that may have to be simulated to reach the state.
+            max_ticks: Maximum number of ticks to simulate to reach the state.
 
         Raises:
             ConfigError: If the file cannot be read, or the world cannot be built on this machine.
@@ -337,8 +338,8 @@ class World:
             name: Name of the body.
             what: Name of the action, a key of ACTIONS.
             value: Value for the action. Instead of a named tuple, a mapping of field names to values is accepted.
-            do: Function of the body that is called in place of the action. It must have the same effect, but may for
-                instance use data prepared in another thread.
+            do: Function that is called with the body in place of the action. The function must have the same effect,
+                but may for instance use data prepared in another thread.
 
         Returns:
             Result of the action.
@@ -360,7 +361,7 @@ class World:
         return result
 
     def put(self, slot: str, value: Any) -> None:
-        """Sends a value to an input of a body or sensor, which takes effect before the next tick.
+        """Sends a value to an input of a body or sensor. The value takes effect before the next tick.
 
         Any thread may call this method.
 
@@ -472,11 +473,11 @@ class World:
         """Advances the world by ticks in which only PyBullet's physics acts.
 
         The result is the same as with `step`, but takes less time. Stops before a tick at which a body, an external
-        wrench, an attachment with a limited force or a sensor has to be updated. Stops within MAX_IDLE_ROW ticks after
+        wrench, an attachment with a force limit or a sensor has to be updated. Stops within MAX_IDLE_ROW ticks after
         a new input has arrived.
 
         Args:
-            ticks: Largest number of ticks.
+            ticks: Maximum number of ticks.
             end_s: Time of `time.monotonic` at which to stop [s].
 
         Returns:
@@ -504,7 +505,10 @@ class World:
         return done
 
     def read_rest(self) -> list[Any]:
-        """Reads all sensors that have not been read at the present tick, and returns their samples."""
+        """Reads the sensors that have not been read at the present tick, and returns their samples.
+
+        Sensors with rate 0 or without a receiver of their samples are not read.
+        """
         return self._sensors.read_rest()
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
@@ -714,7 +718,7 @@ class World:
         Args:
             state: State from `save`.
             trust: Packages from which the commands may import classes, see `from_description`.
-            max_ticks: Largest number of ticks that may have to be simulated to reach the state.
+            max_ticks: Maximum number of ticks to simulate to reach the state.
 
         Raises:
             InterfaceError: If the state is from another world, or more than `max_ticks` ticks have to be simulated.
@@ -811,7 +815,7 @@ class World:
             every: Number of ticks between two samples of the motion.
             cost: Cost of the world's state, summed over all ticks. A module-level function from `World` to a number,
                 a class whose objects are such functions, or `module:name` of such a function or class.
-            jobs: Largest number of processes at a time; by default the number of processors.
+            jobs: Maximum number of processes at a time; by default the number of processors.
 
         Returns:
             A prediction for each candidate, in the order of the candidates.
@@ -832,7 +836,7 @@ class World:
 
     @contextmanager
     def _followed(self) -> Iterator[Shadow]:
-        """Yields the shadow process of this world after it has reached the present state; an error ends the process."""
+        """Yields the shadow of this world after the shadow has reached the present state; an error ends the shadow."""
         self._require_recorded()
         try:
             self.prepare_forks()
@@ -858,7 +862,7 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Fails waiting requests, ends the shadow, disconnects from PyBullet and closes all bodies."""
+        """Makes waiting requests fail, ends the shadow, disconnects from PyBullet and closes all bodies."""
         self.mailbox.close()
         self._end_shadow()
         try:

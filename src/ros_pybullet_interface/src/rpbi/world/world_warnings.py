@@ -138,7 +138,7 @@ def _topics(world: World) -> Iterator[Problem]:
 
 
 def _efforts(world: World, item: ObjectConfig, config: RobotConfig) -> Iterator[Problem]:
-    """Yields a warning for motors with effort 0 in the URDF: it means no limit, but most authors mean no effort."""
+    """Yields a warning for motors with effort 0 in the URDF: 0 means no limit, which few authors intend."""
     document = UrdfDocument(config.loadURDF.fileName)
     joints = Joint.all_of(world.pb, world.bodies[config.name].body_id)
     free = {joint.name for joint in joints if joint.is_driven and joint.max_effort == math.inf}
@@ -167,7 +167,8 @@ def _loose_arm(world: World, item: ObjectConfig, config: RobotConfig) -> Iterato
 def _is_arm(document: UrdfDocument) -> bool:
     """Returns whether a robot is an arm.
 
-    An arm has a single moving joint on its base, which is not prismatic and begins a chain of ARM_JOINTS or more.
+    An arm has a single moving joint on its base. This joint is not prismatic, and is the first in a chain of at least
+    ARM_JOINTS moving joints.
     """
     below = _joints_below(document)
     base, first = [document.root_link()], []
@@ -203,7 +204,8 @@ def _start_angles(world: World, item: ObjectConfig, config: RobotConfig) -> Iter
 def _are_radians(angles: Sequence[float]) -> bool:
     """Returns whether angles that should be degrees look like radians.
 
-    They do if all are within a half turn in radians, and one is a multiple of 15 degrees or FRACTIONS are not integer.
+    All angles, taken as radians, must be within a half turn. In addition, one of them must be a multiple of 15 degrees
+    (at least 30), or FRACTIONS of them must not be integers.
     """
     if max(map(abs, angles), default=0.0) > HALF_TURN:
         return False
@@ -227,7 +229,7 @@ def _urdf_angles(world: World, item: ObjectConfig, document: UrdfDocument) -> It
 
 
 def _views(world: World) -> Iterator[Problem]:
-    """Yields a warning for each angle of a pose or camera that seems to be in the wrong unit."""
+    """Yields a warning for each angle of a pose, and each camera's `fov`, that seems to be in the wrong unit."""
     main = world.loaded.file
     for index, pose in enumerate(world.config.poses):
         if pose.rpy is not None and max(map(abs, pose.rpy)) > FULL_TURN:

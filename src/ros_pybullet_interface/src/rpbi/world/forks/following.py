@@ -1,4 +1,4 @@
-"""Code of the shadow process, which repeats the commands of a world, and forks itself for copies and predictions."""
+"""Runs the shadow process, which repeats the commands of a world, and forks itself for copies and predictions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def end_with(parent: int) -> None:
-    """Makes this process, which was just forked, end as soon as its parent ends.
+    """Makes this process, which was just forked, end as soon as the parent process ends.
 
     Args:
         parent: Process id of the parent.
@@ -39,7 +39,8 @@ def serve(connection: Connection, build: Callable[[], Any]) -> None:
 
     Args:
         connection: Connection to the `Shadow`.
-        build: Returns the `World`. An error of this function is the answer to requests to follow and restore.
+        build: Function that builds the `World`. An error of this function is returned as the answer to each `follow`
+            or `restore` request.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process whose world is followed
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that forks leave no zombies
@@ -92,7 +93,7 @@ def _advance(world: Any, commands: Sequence[RecordedCommand], tick: int) -> None
 
 
 def _requests_of(world: Any) -> dict[str, Callable[..., Any]]:
-    """Returns the functions that answer the requests to a fork, indexed by name of the request."""
+    """Returns the functions that answer requests to a fork, indexed by the request's name."""
     return {
         "put": world.put,
         "act": lambda *arguments: world.act(*arguments) and None,
@@ -124,7 +125,7 @@ def _words(error: Exception) -> str:
 
 
 def _predict_all(world: Any, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> Iterator[Prediction]:
-    """Yields the prediction of each candidate, made in a fork of its own; at most `jobs` forks run at a time."""
+    """Makes the prediction of each candidate in a separate fork, and yields it; at most `jobs` forks run at a time."""
     waiting = list(enumerate(candidates))
     answers: dict[int, list[bytes]] = {}
     running: dict[int, int] = {}

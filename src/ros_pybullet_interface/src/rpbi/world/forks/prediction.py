@@ -1,4 +1,4 @@
-"""Predictions: simulates a sequence of inputs, and samples the resulting motion."""
+"""Predicts motion: simulates a sequence of inputs, and samples the resulting motion."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Prediction(NamedTuple):
         cost: Sum of the costs after all ticks; inf if the prediction failed.
         state_hash: Hash of the state at the end, see `World.state_hash`.
         ticks: Ticks of the samples, counted from the start of the prediction, shape (n,).
-        poses: For each body, position [m] and quaternion (x, y, z, w) of the base in the world, shape (n, 7).
+        poses: For each body, positions [m] and quaternions (x, y, z, w) of the base in the world, shape (n, 7).
         joints: For each robot, positions of the moving joints [rad or m] in the order of the joint model, shape
             (n, number of joints).
         contacts: For each body, sum of the normal forces of all contacts [N], shape (n,).
@@ -73,7 +73,7 @@ class Prediction(NamedTuple):
 
 
 def predict(world: Any, candidate: Candidate, job: PredictionJob) -> Prediction:
-    """Steps a `World` with the inputs of a candidate, and returns the cost and the sampled motion.
+    """Simulates a `World` with the input sequence `candidate`, and returns the cost and the sampled motion.
 
     Raises:
         InterfaceError: If an input is unknown, or its tick is not within the prediction.

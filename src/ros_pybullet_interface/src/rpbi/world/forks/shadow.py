@@ -61,7 +61,7 @@ class Remote:
         Args:
             name: Name of the request.
             arguments: Arguments of the request; they must be picklable.
-            handle: File descriptor to be sent with the request; by default none is sent.
+            handle: File descriptor to send with the request; None sends no file descriptor.
 
         Raises:
             InterfaceError: If the answer is an error, or the other process has ended.
@@ -103,7 +103,7 @@ class Remote:
 
 
 class Fork(Remote):
-    """A copy of a world in its own process, which started from the world's state; a `with` block ends the process."""
+    """A copy of a world in another process, made from the world's state; leaving a `with` block ends the process."""
 
     def put(self, slot: str, value: Any) -> None:
         """Sends a value to an input of the fork's world, see `World.put`."""
@@ -142,8 +142,8 @@ class _Copy:
 
     Args:
         call: Function to call in the fork.
-        keep: File descriptor that stays open in the fork, besides standard error. All others are redirected to
-            /dev/null in the fork; otherwise a pipe closed by this process would stay open in the fork.
+        keep: File descriptor that stays open in the fork, besides standard error. The fork redirects all others to
+            /dev/null, since a pipe that this process closes would stay open in the fork.
     """
 
     stdin = None
@@ -185,7 +185,7 @@ class Shadow:
     Args:
         connection: Connection to the shadow.
         process: Process of the shadow.
-        commands: Number of the world's commands that the shadow has.
+        commands: Number of the world's commands that the shadow has received.
     """
 
     def __init__(self, connection: Connection, process: subprocess.Popen[bytes] | _Copy, commands: int) -> None:
@@ -257,7 +257,7 @@ class Shadow:
 
     @property
     def is_copy(self) -> bool:
-        """Whether the shadow is a fork of this process; making a new one is faster than restoring a state."""
+        """Whether the shadow is a fork of this process: making a new fork is then faster than restoring a state."""
         return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:

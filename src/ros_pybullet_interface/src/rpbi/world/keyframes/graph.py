@@ -115,7 +115,7 @@ class GraphWriter:
         return ["object", full_name(type(value)), self.attributes(value, where)]
 
     def attributes(self, value: Any, where: str) -> list[list[Any]]:
-        """Returns name and plain value of each attribute of an object, except those in `not_in_keyframes` of its class.
+        """Returns name and plain value of each attribute of an object, except those that `not_in_keyframes` names.
 
         Args:
             value: The object.
@@ -145,7 +145,7 @@ class GraphWriter:
 def _has_attributes(value: Any) -> bool:
     """Returns whether the attributes of an object are its whole state.
 
-    This is assumed if its class is written in Python and not from the standard library.
+    This is assumed if the object's class is written in Python and is not from the standard library.
     """
     kind = type(value)
     is_written = hasattr(value, "__dict__") or any("__slots__" in vars(each) for each in kind.__mro__)
@@ -165,7 +165,7 @@ class GraphReader:
     """Converts the plain values of a GraphWriter back to objects, and fills existing objects where possible.
 
     Args:
-        fixed: Types whose objects were not written; same as the writer's.
+        fixed: Types whose objects were not written; must equal the writer's `fixed`.
         anchors: Objects of the reading world that replace the writer's anchors, indexed by name.
     """
 
@@ -193,10 +193,10 @@ class GraphReader:
 
         Args:
             plain: Plain form from `GraphWriter.plain`.
-            here: Existing object to be filled or replaced by the value; NOTHING if there is none.
+            here: Existing object to fill or to replace; NOTHING if there is no such object.
 
         Raises:
-            ValueError: If a GraphWriter does not write such a plain form, or a class is missing or not trusted.
+            ValueError: If the plain form is not valid, or a class is missing or not trusted.
             ConfigError: If a configuration in the plain form is not valid on this machine.
         """
         with _one_error():

@@ -54,7 +54,8 @@ class Keyframe:
 
         Raises:
             ValueError: If the text is not a keyframe, or was written by an incompatible version of this package.
-            ConfigError: If the unpacked text is not JSON or is too large, or a configuration is not valid here.
+            ConfigError: If the unpacked text is not JSON or is too large, or a configuration is not valid on this
+                machine.
         """
         try:
             self._content = load_foreign_json(_unpacked(text), "keyframe", MAX_BYTES, MAX_VALUES)
@@ -75,7 +76,7 @@ class Keyframe:
 
         Raises:
             ValueError: If the keyframe does not fit the world.
-            InterfaceError: If the world's state then differs from the keyframe, so that it would continue differently.
+            InterfaceError: If the state that the world reaches differs from the keyframe.
         """
         for name, body in contents.bodies.items():
             self._motions[name].check(body)
@@ -186,7 +187,7 @@ def refuse(world: Any) -> None:
     """Checks that keyframes can contain the complete state of a world.
 
     Raises:
-        InterfaceError: If the world has a window, a soft body, or a body of another package.
+        InterfaceError: If the world has a window, a soft body, or a body whose class is from another package.
     """
     if world.pb.has_window:
         raise InterfaceError(

@@ -25,7 +25,7 @@ class KeyframeMaker:
         every_s: Period of keyframes in simulated time [s]; 0 means no periodic keyframes.
 
     Attributes:
-        longest_s: Longest wall time that a part of the last keyframe took [s].
+        longest_s: Maximum wall time that a part of the last keyframe took [s].
     """
 
     def __init__(self, world: Any, every_s: float) -> None:
@@ -47,7 +47,7 @@ class KeyframeMaker:
         return asked
 
     def poll(self) -> None:
-        """Makes the next part of a keyframe that is due, requested or begun; does nothing while the world is busy."""
+        """If a keyframe is due, requested or in progress, makes its next part; does nothing while the world is busy."""
         world = self._world
         if world.mailbox.is_held:
             return
@@ -82,7 +82,7 @@ class KeyframeMaker:
         self._finish(fail)
 
     def _finish(self, state: Callable[[], WorldState]) -> None:
-        """Ends a keyframe, and completes the futures of all requests with the result or InterfaceError of `state`."""
+        """Ends a keyframe, and completes the futures of all requests with the result or InterfaceError from `state`."""
         asked, self._asked, self._parts = self._asked, [], None
         for each in asked:
             if each.set_running_or_notify_cancel():

@@ -26,8 +26,8 @@ class BodyMotion(NamedTuple):
         linear: Linear velocity of the base [m/s].
         angular: Angular velocity of the base [rad/s].
         joints: PyBullet's indices of all joints that are not fixed.
-        positions: For each of these joints, its position [rad or m]; for a spherical joint, its quaternion.
-        velocities: For each of these joints, its velocity [rad/s or m/s].
+        positions: Position of each joint in `joints` [rad or m]; for a spherical joint, a quaternion.
+        velocities: Velocity of each joint in `joints` [rad/s or m/s].
     """
 
     position: Vector
@@ -77,9 +77,9 @@ def _shape(values: Any) -> Any:
 
 
 def asleep(pb: Client, bodies: Mapping[str, Body]) -> tuple[str, ...]:
-    """Returns the names of the sleeping bodies: those that do not move in a step with unusual gravity.
+    """Returns the names of the sleeping bodies: bodies that do not move in a simulation step with unusual gravity.
 
-    The client must not be used afterwards, since it has made this step.
+    The client must not be used afterwards, since the step changes the client's state.
     """
     movable = {name: body for name, body in bodies.items() if _can_move(body)}
     before = {name: body.motion_state() for name, body in movable.items()}

@@ -25,7 +25,7 @@ class WorldCommand(NamedTuple):
     """A change that entered a world from outside.
 
     Attributes:
-        tick: Tick of the world at which the command entered: after the physics of this tick, before the next step.
+        tick: Tick of the world at which the command was applied: after the physics of this tick, before the next step.
         name: Name of the body or camera that the command concerns; `NAME/LINK` for `dynamics` of a link, `NAME/INPUT`
             for `input`, the attachment's name for `attach` and `detach`; empty for the whole world.
         what: Kind of the command: `input`, `add`, `add_camera`, `remove`, `dynamics`, `physics`, `sensor_rate`,
@@ -40,7 +40,7 @@ class WorldCommand(NamedTuple):
 
 
 class RecordedCommand(NamedTuple):
-    """A command as it is recorded: the fields of a `WorldCommand`, but with its value as text (`data`)."""
+    """Record of a command: the fields of a `WorldCommand`, with the text `data` in place of the value."""
 
     tick: int
     name: str
@@ -81,7 +81,7 @@ class CommandLog:
         Args:
             index: Index of the first command, counted since the world was built or reset. If this command is compressed
                 already, the oldest command that is not compressed is the first.
-            most: Largest number of commands.
+            most: Maximum number of commands to return.
 
         Returns:
             The index of the first returned command, and the commands.

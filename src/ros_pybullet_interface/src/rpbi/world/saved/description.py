@@ -32,7 +32,7 @@ _WRITTEN = re.compile(r'(?<=")/[^"\\]*/robot_description-[0-9a-f]{12}\.urdf(?=")
 
 
 def describe(loaded: LoadedWorld, start_hash: str) -> str:
-    """Returns the description of a world as JSON: its configuration, and the hashes of its files and its start state.
+    """Returns the JSON description of a world: the configuration, and hashes of all files and of the start state.
 
     Files are not included, except robot descriptions that `write_description` wrote to temporary files.
 
@@ -59,7 +59,7 @@ def describe(loaded: LoadedWorld, start_hash: str) -> str:
 
 
 class _Object(ConfigModel):
-    """An object in a description; `config` is the configuration as text of `to_text`."""
+    """An object in a description; `config` is the configuration as text returned by `to_text`."""
 
     type: str
     file: str
@@ -67,7 +67,7 @@ class _Object(ConfigModel):
 
 
 class _Camera(ConfigModel):
-    """A camera in a description; `config` is the configuration as text of `to_text`."""
+    """A camera in a description; `config` is the configuration as text returned by `to_text`."""
 
     file: str
     config: str
@@ -118,7 +118,7 @@ class WorldDescription:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """Messages about files, or a PyBullet version, that differ between this machine and the recording."""
+        """A message for each file on this machine, and for PyBullet's version, that differs from the recorded one."""
         read, left, differences = self._read, MAX_COMPARED_BYTES, []
         for path, digest in read.files.items():
             if path in read.descriptions:

@@ -29,7 +29,7 @@ _PAIRS = (
 
 
 class BodyRecipe(NamedTuple):
-    """A body as it was loaded.
+    """Data from which a body was loaded.
 
     Attributes:
         name: Name of the body.
@@ -45,7 +45,7 @@ class BodyRecipe(NamedTuple):
 
 
 class Recipe(NamedTuple):
-    """The bodies of a world, changes since they were loaded, and cameras.
+    """The bodies of a world, the changes since the bodies were loaded, and the cameras.
 
     Attributes:
         bodies: The bodies in the order of loading.
@@ -111,7 +111,7 @@ class Recipe(NamedTuple):
             yield LogEntry("", "physics", physics)
 
     def check_ids(self, bodies: Mapping[str, Body]) -> None:
-        """Checks that the bodies that were built have the body ids in the recipe.
+        """Checks that the built bodies have the same body ids as in the recipe.
 
         Raises:
             InterfaceError: If a body has another id.
@@ -188,7 +188,7 @@ def _merge(values: dict[str, Any], change: Mapping[str, Any]) -> None:
 
 
 def _change(body: Body, link: str, values: dict[str, Any]) -> ChangeDynamics:
-    """Returns the change of dynamics that a newly loaded copy of a body needs to equal the present body in one link.
+    """Returns the change of dynamics that makes a link of a newly loaded body equal to the same link of `body`.
 
     Args:
         body: The present body.

@@ -37,11 +37,11 @@ class WorldState(NamedTuple):
     """A state of a world, saved as the world's description and all commands that lead to the state.
 
     Attributes:
-        description: Description of the world, text of `describe`.
-        commands: All commands, in order, since the keyframe or, without a keyframe, since the world was built or reset.
+        description: Description of the world, as returned by `describe`.
+        commands: All commands since the keyframe, in order. Without a keyframe, all since the world was built or reset.
         tick: Tick of the state.
         state_hash: Hash of the state, see `World.state_hash`.
-        keyframe: Text of the keyframe after which the commands begin; empty without a keyframe.
+        keyframe: Text of the keyframe that precedes the commands; empty without a keyframe.
         start: Tick of the keyframe; 0 without a keyframe.
     """
 
@@ -137,7 +137,7 @@ class WorldState(NamedTuple):
         return False
 
     def require_short(self, max_ticks: int) -> None:
-        """Checks how many ticks have to be simulated to reach the state, since a forged number could take days.
+        """Checks that not too many ticks have to be simulated to reach the state: a forged file could demand days.
 
         Raises:
             InterfaceError: If the number of ticks exceeds `max_ticks`.

@@ -46,7 +46,7 @@ def from_text(text: str) -> Any:
 
     Raises:
         ValueError: If the text was not written by `to_text`, or contains a class that is missing or not trusted.
-        ConfigError: If a configuration in the text is not valid here, for instance because a file is missing.
+        ConfigError: If a configuration in the text is not valid on this machine, for instance if a file is missing.
     """
     try:
         plain = load_foreign_json(text, "recorded value")
