@@ -1,4 +1,4 @@
-"""Offers `RosNode` under the import path of the authors' release."""
+"""Offers `RosNode` under the import path that scripts for the authors' original release use."""
 
 from rpbi.ros.ros_node import RosNode
 

@@ -1,4 +1,4 @@
-"""Topic of the attachments between bodies, and services that attach, detach and apply wrenches."""
+"""Topic with the attachments between bodies, services that add and remove attachments, and one for wrenches."""
 
 import math
 from typing import Any
@@ -46,7 +46,7 @@ def attach(node: Any, request: AttachRequest) -> Answer:
     """Attaches a link of an object to a link of another object, as a magnet or a tool changer does.
 
     Raises:
-        ConfigError: If a number in the request is invalid; the error lists all problems.
+        ConfigError: If a field of the request is invalid; the error lists all problems.
     """
     asked = request.attachment
     config = AttachmentConfig.parse(_keys(asked), "attachment")
@@ -61,10 +61,10 @@ def detach(node: Any, request: SetStringRequest) -> Answer:
 
 
 def apply_wrench(node: Any, request: ApplyWrenchRequest) -> Answer:
-    """Applies a force and a torque to an object or a link, for a given time or until the next request.
+    """Applies a force and a torque to an object or a link, for a given time or until another wrench replaces them.
 
     Raises:
-        ValueError: If the frame is unknown, or a number in the request is invalid.
+        ValueError: If the request's `frame` is not `world`, `link` or empty, or a number is invalid.
     """
     if request.frame not in AXES:
         raise ValueError(f"frame: expected world or link, got '{request.frame}'")

@@ -1,6 +1,6 @@
 """Types that describe topics and services, and functions that open them.
 
-The node and the reference pages use the same descriptions.
+The node opens topics and services from these descriptions, and the reference pages list them.
 """
 
 import inspect
@@ -23,14 +23,14 @@ An empty sequence means that the body does not have the topic or service."""
 
 
 class Answer(NamedTuple):
-    """Answer of most services: success and a message; `serve` converts it to the response type of the service."""
+    """Success and message, which most service handlers return; `serve` converts them to the service's response."""
 
     success: bool
     message: str
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns an `Owners` function for a topic or service that every body of the given type has once."""
+    """Returns an `Owners` function which gives each body of a type the topic or service once, under the body's name."""
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -38,15 +38,15 @@ class Topic(NamedTuple):
     """A topic.
 
     Attributes:
-        name: Name of the topic, with `{name}` in place of the body, sensor or camera.
+        name: Name of the topic, with `{name}` in place of the name of the body, sensor or camera.
         message_type: ROS type of the messages.
-        handler: Function for the messages, of three kinds. For a sensor's topic, it converts a sample and its stamp
-            [ns] to a message. For an input, it converts a message to the input's value. In `BODY_TOPICS`, it takes the
-            body's context and a message, and acts on the body. None if other code publishes the topic.
+        handler: For a sensor's topic, the function that converts a sample and its stamp [ns] to a message. For an
+            input's topic, the function that converts a message to the input's value. For a topic in `BODY_TOPICS`, the
+            function that acts on a body, given the body's context and a message. None if other code publishes it.
         meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
         key: Key of the main YAML file that opens the topic or sets its rate, where 0 is off. Empty if the topic is
             always open.
-        owners: Returns the owners within a body that subscribe to the topic, see `Owners`.
+        owners: Returns the names with which a body subscribes to the topic, see `Owners`.
         on_tf: For a sensor's topic whose samples also go to TF: converts a sample and its stamp [ns] to poses and
             their stamp [ns]. None for other topics.
     """
@@ -64,12 +64,12 @@ class Service(NamedTuple):
     """A service of the node or of bodies.
 
     Attributes:
-        name: Name of the service, with `{name}` in place of the body or sensor.
+        name: Name of the service, with `{name}` in place of the name of the body, sensor or controller.
         service_type: ROS type of the service.
         handler: Takes a context and a request, and returns an Answer, the response, or the response's fields. To refuse
             the request, it raises an InterfaceError or ValueError. The client then gets `success=False` and the error's
             message; if the response has no field `success`, the call fails. None if other code opens the service.
-        owners: Returns the owners within a body that have the service, see `Owners`.
+        owners: Returns the names under which a body has the service, see `Owners`.
     """
 
     name: str
@@ -131,7 +131,7 @@ def find_topic(name: str, owner: Any) -> Topic:
 
     Args:
         name: Module and variable of the Topic, as `module:NAME`.
-        owner: The sensor or input function whose `ros_topic` is `name`, for the error message.
+        owner: Sensor or function of an input whose `ros_topic` is `name`; only used in the error message.
 
     Raises:
         ConfigError: If the module has no such Topic; the error names the owner.

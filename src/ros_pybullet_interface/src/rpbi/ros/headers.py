@@ -27,13 +27,13 @@ def use_prefix(prefix: str | None) -> None:
 
 
 def use_own_frames(frames: Container[str]) -> None:
-    """Sets which frames belong to this node's world, by names without prefix; `named_frame` adds the prefix."""
+    """Sets the frames that belong to this node's world, as names without prefix; see `named_frame`."""
     global _own_frames
     _own_frames = frames
 
 
 def named_frame(frame: str) -> str:
-    """Returns the full name of a frame from a YAML file; only frames of this node's world get the prefix."""
+    """Returns a frame's name from a YAML file, with the prefix in front if the frame belongs to this node's world."""
     return prefixed(frame) if frame in _own_frames else frame
 
 
@@ -48,7 +48,7 @@ def world_frame() -> str:
 
 
 def to_ros_time(stamp_ns: int) -> genpy.Time:
-    """Converts a stamp [ns] to a ROS time without rounding, since it computes with integers only."""
+    """Converts a stamp [ns] to a ROS time, exactly."""
     stamp: genpy.Time = _new(genpy.Time)
     stamp.secs, stamp.nsecs = divmod(stamp_ns, NS_PER_S)
     return stamp

@@ -1,4 +1,4 @@
-"""Sets the initial joint positions of robots from joint states of, for instance, the real robot."""
+"""Sets the initial joint positions of robots from received joint states, for instance from the real robots."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,9 @@ from rpbi.world.loading import LoadedWorld
 
 
 def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
-    """Waits for the `initial_joint_state_topic` of each robot that names one, and returns a world with these positions.
+    """Waits for a message on each robot's `initial_joint_state_topic`, and returns a world with the received positions.
+
+    Robots whose configuration has no such key keep their configured positions.
 
     Raises:
         ConfigError: If a joint state does not arrive in time or does not fit its robot; the error lists all problems.
@@ -32,13 +34,13 @@ def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
 
 
 def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
-    """Waits for a robot's `initial_joint_state_topic`, and returns its configuration with the received positions.
+    """Waits for a message on a robot's `initial_joint_state_topic`, and returns a configuration with its positions.
 
-    Joints that the message does not name start as configured. Joints that the robot lacks are ignored. For other
-    bodies, and for robots without that key, the configuration is returned unchanged. Errors name the YAML file `file`.
+    Joints that the message does not name start as configured. Joints that the robot lacks are ignored. A configuration
+    without this key, or of another type of body, is returned unchanged. Errors name the YAML file `file`.
 
     Raises:
-        ConfigError: If a message does not arrive in time, names no joint of the robot, or has invalid positions.
+        ConfigError: If no message arrives in time, or the message lacks the robot's joints or has invalid positions.
     """
     if not isinstance(config, RobotConfig) or config.initial_joint_state_topic is None:
         return config

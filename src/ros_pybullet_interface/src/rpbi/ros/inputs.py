@@ -27,7 +27,7 @@ from .tf_follower import TfFollower, refusal
 
 
 def _joint_target(message: JointState) -> JointCommand:
-    """Converts a message with all its quantities; the robot's control mode decides which quantities are used."""
+    """Converts positions, velocities and efforts; the robot's control mode decides later which of them are used."""
     return JointCommand(
         message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec()
     )
@@ -117,10 +117,12 @@ def topic_input(key: str, taken: Input) -> Topic:
 
 
 def input_messages(world: World, slot: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yields the topics and messages that would have caused an input, for joint targets and base velocities only.
+    """Converts an input back to ROS messages, and yields each with its topic.
+
+    Yields nothing for inputs other than joint targets and base velocities.
 
     Args:
-        world: The world; the messages get its present stamp.
+        world: The world, whose present stamp the messages of joint targets get.
         slot: Body and name of the input, as `NAME/INPUT`.
         value: Value of the input, as it was applied to the world.
     """

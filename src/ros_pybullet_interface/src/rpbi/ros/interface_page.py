@@ -57,7 +57,7 @@ PACKAGES = ("ros_pybullet_interface", "compatibility/cob_srvs", "compatibility/c
 
 
 def interface_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the reference page, indexed by the path of its file; `root` is the workspace folder."""
+    """Returns a mapping from the reference page's path to its text; `root` is the workspace folder."""
     world = reference_world()
     try:
         return {root / "docs/topics_and_services.md": interface_page(world, _definitions(root))}
@@ -92,9 +92,12 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
 
 
 def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[str]]:
-    """Returns the types of bodies that have each topic or service, with placeholders in place of example names.
+    """Returns the types of bodies that have a topic or service, indexed by topic or service.
 
-    The argument has the topics and services of the reference world's bodies, indexed by the type of body.
+    In the returned topics and services, placeholders such as NAME replace the example names of the reference world.
+
+    Args:
+        of_bodies: Topics and services of the reference world's bodies, indexed by the type of body.
     """
     owners: dict[Endpoint, list[str]] = {}
     placeholders = {f"/{JOINT}/": "/JOINT/", **{f"/{name}/": "/CONTROLLER/" for name in CONTROLLERS}}
@@ -113,7 +116,7 @@ def _tables(owners: Mapping[Endpoint, list[str]], definitions: Mapping[str, str]
     """Yields a heading and a table for each kind of endpoint; kinds without endpoints are left out.
 
     Args:
-        owners: Types of bodies that have each endpoint; `[""]` for endpoints that belong to no body.
+        owners: Types of bodies that have an endpoint, indexed by endpoint; `[""]` if it does not belong to a body.
         definitions: Definitions of this workspace's message and service types, indexed by name.
     """
     for kind, heading in HEADINGS.items():

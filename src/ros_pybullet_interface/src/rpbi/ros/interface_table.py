@@ -81,10 +81,10 @@ class Endpoint(NamedTuple):
     """A topic, a service or a followed TF frame.
 
     Attributes:
-        kind: What the node does with it: `publishes`, `subscribes`, `serves` or `listens to TF`.
+        kind: Action of the node: `publishes`, `subscribes`, `serves` or `listens to TF`.
         name: Relative ROS name, or name of the TF frame.
         type: ROS type; empty for a TF frame.
-        note: Rate in this world, name of the owner, or both.
+        note: Rate in this world, name of the body, both, or that the endpoint belongs to PyBullet's window.
         meaning: Purpose, in a sentence.
     """
 

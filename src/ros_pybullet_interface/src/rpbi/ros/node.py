@@ -44,11 +44,11 @@ from .window_topics import WindowTopics
 def configured_world(robot_description: str | None) -> LoadedWorld:
     """Loads the world from the file that `~config_file` names, or from the mapping `~config` if no file is named.
 
-    With `~config_file`, the keys of `~config` override those of the file.
+    If a file is named, the keys of `~config` override keys of the file.
 
     Args:
-        robot_description: URDF file of robots whose `fileName` is the word `robot_description`; None without such a
-            file.
+        robot_description: URDF file to load wherever a configuration gives `robot_description` as the `fileName`; None
+            if no URDF is supplied.
 
     Raises:
         ConfigError: If both parameters are missing, or the configuration is wrong; the error lists all problems.
@@ -87,7 +87,7 @@ def _wants_real_time_priority() -> bool:
 
 
 def parameter_above(name: str) -> Any:
-    """Returns a ROS parameter from this namespace or the nearest namespace above; None if the parameter is not set."""
+    """Returns a ROS parameter from the node's or the nearest enclosing namespace; None if the parameter is not set."""
     found = rospy.search_param(name)
     if found is None:
         return None
@@ -198,7 +198,7 @@ class SimulatorNode:
 
 
 def main() -> None:
-    """Runs the node; the exit code is 1 if the node cannot start, and 0 if it is interrupted."""
+    """Runs the node; exits with code 1 if the node cannot start, and with 0 if it is interrupted."""
     sys.setswitchinterval(SWITCH_S)
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False, loggers=["robot_model"])

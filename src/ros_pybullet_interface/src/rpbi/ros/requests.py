@@ -68,7 +68,7 @@ class BodyContext(NamedTuple):
     Attributes:
         name: Name of the body.
         owner: Text that replaces `{name}` in the name of the service or topic: the body's name, or `BODY/JOINT` for a
-            sensor, or `BODY/CONTROLLER` for a controller.
+            force-torque sensor, or `BODY/CONTROLLER` for a controller.
         simulation: The loop that runs the world.
         ask: Makes the simulation thread call a function.
     """
@@ -85,7 +85,7 @@ class BodyContext(NamedTuple):
 
     @property
     def body(self) -> Any:
-        """The body of this name; a reset may replace it by a new object.
+        """The body that `name` refers to; a reset may replace the body by a new object.
 
         Only the simulation thread may read the body's PyBullet state.
 
@@ -105,7 +105,7 @@ class BodyContext(NamedTuple):
 
         Args:
             call: The function, without arguments.
-            body: The body that the function uses; None for the present one.
+            body: The body that the function uses; by default the body that has this name when `ask_body` is called.
 
         Raises:
             UnknownNameError: If the body was removed before the call.
@@ -122,5 +122,5 @@ class BodyContext(NamedTuple):
         return self.ask(checked)
 
     def act(self, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
-        """Makes the simulation thread apply an action to the body, which is recorded for replays; see `World.act`."""
+        """Makes the simulation thread apply an action to the body and record it for replays; see `World.act`."""
         return self.ask_body(lambda: self.world.act(self.name, what, value, do))

@@ -1,4 +1,4 @@
-"""A class that offers all of rospy and a TF listener in one object, as scripts of the authors' release expect."""
+"""The class `RosNode`, kept for scripts that were written for the authors' original release."""
 
 from typing import Any
 

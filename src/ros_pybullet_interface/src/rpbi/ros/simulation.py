@@ -52,7 +52,7 @@ class RestoreRequest:
     """A request to restore a state, and its progress; the caller waits for `done`.
 
     Args:
-        ticks: Runs the ticks up to the saved state and yields the number of each, see `World.restoring`.
+        ticks: Iterator that runs the ticks up to the saved state and yields each tick's number, see `World.restoring`.
         end: Number of the last tick.
     """
 
@@ -61,7 +61,11 @@ class RestoreRequest:
         self._ticks, self._end, self._tick = ticks, end, 0
 
     def advance(self, end_s: float) -> bool:
-        """Continues the restoration until a time of the monotonic clock [s]; returns whether it is complete."""
+        """Continues the restoration until it is complete or the monotonic clock reaches `end_s` [s].
+
+        Returns:
+            Whether the restoration is complete.
+        """
         for tick in self._ticks:
             self._tick = tick
             if time.monotonic() > end_s:
@@ -88,7 +92,7 @@ class Simulation:
 
     Args:
         helpers: Functions that each pass of the loop calls; they must return at once.
-        priority: Real-time priority of the node's threads; None if it is never changed.
+        priority: Changes the scheduling priority of the node's threads; None if the priority is never changed.
     """
 
     def __init__(
@@ -101,12 +105,12 @@ class Simulation:
         self.world = world
         self.running = False
         self._failure: str | None = None
-        """Error that stopped it, until the next start or step."""
+        """Error that stopped the world; None again after the next start or step."""
         self._request: StepRequest | None = None
         self._restore: RestoreRequest | None = None
         self._thread: int | None = None
         self.passes = 0
-        """Number of passes of the loop; grows as long as it is alive."""
+        """Number of passes of the loop; grows as long as the loop is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
         self._publishers = TickPublisher(world, publishers, idle_ticks)
         self._helpers = helpers
@@ -205,7 +209,7 @@ class Simulation:
         return request.done
 
     def reset(self, refill: Callable[[], None] = lambda: None) -> None:
-        """Resets the world to its initial state; it stays running or stopped, and stamps continue.
+        """Resets the world to its initial state; the world stays running or stopped, and stamps continue.
 
         Args:
             refill: Sends inputs to the world after the reset; by default none are sent.
@@ -341,7 +345,7 @@ class Simulation:
         """Advances by a tick and publishes the samples that are due.
 
         Args:
-            is_last: Whether the world stops after this tick; then all samples are published, due or not.
+            is_last: Whether the world stops after this tick; if so, all samples are published, due or not.
         """
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
@@ -388,7 +392,7 @@ class Simulation:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
-        """Stops the world after an error; its samples are not published until the next start or step."""
+        """Stops the world after an error; samples are not published until the next start or step."""
         if str(error) == self._failure:
             return  # this error was reported before
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))

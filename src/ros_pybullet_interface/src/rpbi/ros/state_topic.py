@@ -16,13 +16,13 @@ waits for a subscriber."""
 class StateTopic(rospy.SubscribeListener):
     """A topic whose last message can be sent to new subscribers while the world is stopped.
 
-    A stopped world in simulated time has no new messages, and publishing the last one again to all subscribers would
-    repeat its stamp. `serve_late` therefore sends the last message to new subscribers only. `publish` and `serve_late`
+    A stopped world in simulated time has no new messages. Publishing the last message again would send the same stamp
+    twice to old subscribers, so `serve_late` sends the last message to new subscribers only. `publish` and `serve_late`
     must not run in two threads at once.
 
     Args:
-        queue_size: Largest number of messages buffered for each subscriber; beyond it, the oldest are dropped. With
-            None, publishing waits until the message is sent.
+        queue_size: Maximum number of messages buffered for each subscriber; further messages replace the oldest ones.
+            With None, `publish` waits until the message is sent.
     """
 
     def __init__(self, topic: str, message_type: type, queue_size: int | None = QUEUE_SIZE) -> None:
@@ -52,7 +52,7 @@ class StateTopic(rospy.SubscribeListener):
         self._publisher.publish(message)
 
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Sends the message that `last_message` returns to subscribers that connected after it was published."""
+        """Calls `last_message`, and sends the returned message to subscribers that have connected since `publish`."""
         while self._late:
             self._late.popleft()(last_message())
 
@@ -72,7 +72,7 @@ class FastTopic(StateTopic):
         self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
 
     def wrap_connections(self) -> None:
-        """Wraps the connections of new subscribers too, so that sending never waits for a subscriber."""
+        """Wraps the connections of new subscribers, so that sending never waits for a subscriber."""
         if self._sending is not None:
             self._sending.wrap_connections()
 

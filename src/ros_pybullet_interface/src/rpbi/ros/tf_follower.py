@@ -84,9 +84,9 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
 class FollowedFrame:
     """A pose input, and the state of the TF frame that it follows.
 
-    The frame is looked up about once a period, at the arrival of a transform. Look-ups at other times would make the
-    steps of a motion uneven. A frame without arriving transforms, which moves with its parent, is looked up once a
-    period.
+    The frame is looked up about once in each period of `pose_input.hz`, at the arrival of a transform. Look-ups at
+    other times would make the steps of a motion uneven. A frame that only moves with its parent, so that its own
+    transforms do not arrive, is looked up once in each period.
     """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
@@ -98,16 +98,16 @@ class FollowedFrame:
         self.last_pose: Pose | None = None
         self.last_stamp_ns = -1
         self.news_time_s = 0.0
-        """The world's time at which its stamp last changed [s]; `news_s` is that in wall time."""
+        """The world's time at which the frame's stamp last changed [s]; `news_s` is the same moment in wall time."""
         self.is_stale = False
         self.quiet_until_s = 0.0
 
     def due_s(self, came_s: float) -> float:
         """Returns the time of the next look-up on the monotonic clock [s].
 
-        Without an arrival since the last look-up, it is one period after the last look-up. If a transform arrived less
-        than LOOK_FROM periods after the stamp last changed, it is LOOK_UNTIL periods after the last look-up, to wait
-        for the next transform. Otherwise, it is the time of the arrival.
+        If no transform has arrived since the last look-up, the next look-up is one period after the last. If a
+        transform has arrived less than LOOK_FROM periods after the stamp last changed, the next look-up waits for
+        another transform, until LOOK_UNTIL periods after the last look-up. Otherwise, it is due at the arrival.
 
         Args:
             came_s: Time of the last arrival on the monotonic clock [s].
@@ -129,7 +129,7 @@ class FollowedFrame:
         return True
 
     def age_s(self, now_s: float, time_s: float) -> float:
-        """Returns for how long the frame's stamp has not changed [s], in wall time or world time, whichever is less."""
+        """Returns the time since the frame's stamp last changed [s]: in wall time or world time, whichever is less."""
         return min(now_s - self.news_s, time_s - self.news_time_s)
 
 
@@ -153,7 +153,7 @@ class TfFollower:
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Starts to follow the TF frame of a pose input.
 
-        `name` is the body or sensor, `slot` the address of its input as `NAME/INPUT`.
+        `name` is the name of the body or sensor, `slot` the address of the input as `NAME/INPUT`.
         """
         self._followed = (*self._followed, FollowedFrame(name, slot, pose_input))
         if self._tf is None:

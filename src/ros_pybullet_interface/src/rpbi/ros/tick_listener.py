@@ -12,8 +12,8 @@ import rospy
 class TickListener:
     """Subscribes to topics, stores the newest message of each, and waits for the messages of a given tick.
 
-    It is needed since services and topics use different sockets: the answer of `rpbi/step_n` may arrive before the
-    messages of its last tick. Waits use the wall clock, and so also end while ROS time is stopped.
+    Services and topics use different sockets, so the answer of `rpbi/step_n` may arrive before the messages of the last
+    tick. Timeouts use the wall clock, and therefore also work while ROS time is stopped.
 
     Args:
         topics: Message types, indexed by topic; each type must have a header.
@@ -28,11 +28,14 @@ class TickListener:
         }
 
     def wait_for_tick(self, stamp: genpy.Time, timeout_s: float = 5.0) -> dict[str, Any]:
-        """Waits until every topic has a message of a tick or later, and returns the newest messages, indexed by topic.
+        """Waits until every topic has a message of the given tick or a later one.
 
         Args:
             stamp: Stamp of the tick, as returned by `rpbi/step_n`.
-            timeout_s: Longest wait [s] of wall time.
+            timeout_s: Maximum wait [s] of wall time.
+
+        Returns:
+            The newest message of each topic, indexed by topic.
 
         Raises:
             TimeoutError: If a topic has no such message in time; the error names all such topics.

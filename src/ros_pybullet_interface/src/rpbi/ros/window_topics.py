@@ -122,7 +122,7 @@ class VisualizerImage:
     Args:
         window: The window.
         clock: The world's clock, for the stamps.
-        hz: Highest rate of the images [Hz] of wall time.
+        hz: Maximum rate of the images [Hz] of wall time.
         width_px: Number of columns of an image.
         height_px: Number of rows of an image.
     """
