@@ -1,1 +1,1 @@
-"""Shared by every package of the workspace; free of ROS outside `custom_ros_tools.ros`."""
+"""Code that all packages of the workspace share. Only modules in `custom_ros_tools.ros` import ROS."""

@@ -1,5 +1,4 @@
-"""Child processes that end with their parent, even if it is killed, and can be killed together with their own
-children."""
+"""Starts child processes that end with their parent, and kills processes together with their children."""
 
 import contextlib
 import fcntl
@@ -12,12 +11,12 @@ from typing import Any
 
 
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:
-    """Starts a process that gets a signal when this one ends, for any reason.
+    """Starts a child process that gets a signal when this process ends, even if this process is killed.
 
-    Its standard input is a pipe that this process holds open. When that end is closed, because this process ends or
-    closes `stdin` of the returned process, the kernel sends the signal (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG`
-    would send it at the end of the thread that starts the child. It also needs code between fork and exec, which is not
-    safe where there are threads.
+    The child's standard input is a pipe that this process holds open. The kernel sends the signal when this process
+    ends, or closes `stdin` of the returned process (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG` is not used for two
+    reasons. It sends the signal as soon as the thread that started the child ends. It also needs code between fork and
+    exec, which is unsafe in a process with several threads.
 
     Args:
         command: The command line.
@@ -25,7 +24,7 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
         options: Options of `subprocess.Popen`, except `stdin`.
 
     Raises:
-        OSError: If it cannot be started.
+        OSError: If the process cannot be started.
     """
     reading, writing = os.pipe()
     try:
@@ -43,7 +42,10 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
 
 
 def kill_with_children(process: subprocess.Popen) -> None:
-    """Kills a process and its children, each of which leads a process group, as `roslaunch` and its nodes do."""
+    """Kills a process and its children with their process groups, and waits for the end of the process.
+
+    The process and each child must lead a process group of their own, like `roslaunch` and its nodes.
+    """
     for pid in (process.pid, *_children(process.pid)):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(pid, signal.SIGKILL)
@@ -52,7 +54,7 @@ def kill_with_children(process: subprocess.Popen) -> None:
 
 def is_stopped(process_id: int) -> bool:
     """Returns whether a process is stopped by a signal, such as SIGSTOP; see proc_pid_stat(5)."""
-    with contextlib.suppress(OSError):  # it has just ended
+    with contextlib.suppress(OSError):  # the process has just ended
         return Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0] == "T"
     return False
 
@@ -61,7 +63,7 @@ def _children(parent: int) -> list[int]:
     """Returns the ids of a process's children; see proc_pid_stat(5)."""
     children = []
     for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):  # it has just ended
+        with contextlib.suppress(OSError):  # the process has just ended
             _, ppid, *_ = path.read_text().rpartition(")")[2].split()
             if int(ppid) == parent:
                 children.append(int(path.parent.name))

@@ -1,4 +1,4 @@
-"""Configuration files: paths with ROS packages in them, and YAML that is safe to load."""
+"""Loads YAML configuration files safely, and resolves ROS packages in paths."""
 
 import errno
 import gc
@@ -19,14 +19,14 @@ from .errors import ConfigError, Problem, closest, shortened
 _SOURCES = Path(__file__).resolve().parents[3]
 """Folder of this workspace's packages, if the code runs from its sources."""
 MAX_BYTES = 16_000_000
-"""Largest length of a YAML file or text; longer ones are rejected."""
+"""Largest length of a YAML file or text; longer files are rejected."""
 MAX_VALUES = 1_000_000
-"""Largest number of values in a YAML file; values that aliases (`*NAME`) repeat are counted each time.
+"""Largest number of values in a YAML file; files with more values are rejected.
 
-More are rejected.
+Values that aliases (`*NAME`) repeat are counted each time.
 """
 MAX_NUMBER_LENGTH = 1000
-"""Largest number of characters of a number; longer scalars without a tag are texts."""
+"""Largest number of characters of a number. A longer scalar without a tag is read as a text."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -34,10 +34,10 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 def ros_package_path(package: str) -> str:
     """Returns the folder of a ROS package.
 
-    Searches ROS_PACKAGE_PATH, and then the folder that contains this package.
+    Searches the folders in ROS_PACKAGE_PATH, and then the source folder of this workspace.
 
     Raises:
-        ConfigError: If there is no such package.
+        ConfigError: If the package is not found.
     """
     search_path = os.environ.get("ROS_PACKAGE_PATH", "")
     packages = _packages(search_path)
@@ -51,16 +51,22 @@ def ros_package_path(package: str) -> str:
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Returns the packages found under one value of ROS_PACKAGE_PATH; cached, since each search walks all folders."""
-    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # an installed one has other files
+    """Returns the index of the packages for one value of ROS_PACKAGE_PATH.
+
+    Cached, since each search reads all folders.
+    """
+    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # false if this package is installed
     return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
 
 
 def replace_package(path: str) -> str:
-    """Resolves `{package}/path` and `package://package/path`; the first package only, others stay as they are.
+    """Replaces the first `{package}` or `package://package` in a path by the folder of the ROS package.
+
+    Returns:
+        The path; unchanged if it does not contain a package.
 
     Raises:
-        ConfigError: If there is no such package.
+        ConfigError: If the package is not found.
     """
     match = _PACKAGE.search(path)
     if match is None:
@@ -70,16 +76,17 @@ def replace_package(path: str) -> str:
 
 
 def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
-    """Returns the content of an ordinary file.
+    """Reads an ordinary file.
 
-    Other files, such as pipes, devices and the kernel's own files in /proc, might never end, or block. Those of /proc
-    report size 0, and are read as empty.
+    Refuses pipes and devices, since reading them might block or never end. Files in /proc report the size 0, and are
+    read as empty.
 
     Args:
-        most_bytes: The largest size.
+        path: The file.
+        most_bytes: Largest size; by default unlimited.
 
     Raises:
-        OSError: If it cannot be read, is no ordinary file or too large.
+        OSError: If the file cannot be read, is not an ordinary file, or is too large.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -95,10 +102,14 @@ def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
 
 
 def load_config(path: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
-    """Returns the mapping in a YAML file; `{package}/path` and `package://package/path` are resolved.
+    """Reads a YAML file that contains a mapping.
+
+    Args:
+        path: The file; `{package}/path` and `package://package/path` are resolved.
+        most_bytes: Largest size of the file.
 
     Raises:
-        ConfigError: If the file cannot be read or is not a YAML mapping; it names file, line and column.
+        ConfigError: If the file cannot be read or is not a YAML mapping; the error names file, line and column.
     """
     try:
         text = read_file(replace_package(path), most_bytes).decode()
@@ -112,10 +123,15 @@ def load_config(path: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
 
 
 def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -> dict[str, Any]:
-    """Returns the mapping in the YAML text `s`, which messages call `file`; an empty text is an empty mapping.
+    """Parses a YAML text that contains a mapping; an empty text gives an empty mapping.
+
+    Args:
+        s: The text.
+        file: Name of the text in messages.
+        most_characters: Largest length of the text.
 
     Raises:
-        ConfigError: If it is not a YAML mapping, names a key twice, asks for Python objects, or is too large.
+        ConfigError: If the text is not a YAML mapping, repeats a key, has tags for Python objects, or is too large.
     """
     if len(s) > most_characters:
         raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {most_characters}")])
@@ -137,13 +153,13 @@ def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Returns a mapping of plain data as YAML textwith its keys in order; `load_configs` reads it back."""
+    """Converts a mapping of plain data to a YAML text, which `load_configs` can read; keeps the order of the keys."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
 @contextmanager
 def _without_collections() -> Iterator[None]:
-    """Excludes newly parsed objects from garbage collection, whose passes would stop all threads."""
+    """Switches off garbage collection in a context, since collecting many new objects would block all threads."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -154,7 +170,7 @@ def _without_collections() -> Iterator[None]:
 
 
 def _dismantle(root: yaml.Node) -> None:
-    """Frees nodes one by one; freed all at once, they would stop all threads."""
+    """Frees the nodes of a tree one by one, since freeing a large tree at once would block all threads."""
     waiting = [root]
     while waiting:
         node = waiting.pop()
@@ -165,8 +181,7 @@ def _dismantle(root: yaml.Node) -> None:
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """The safe loader; it also rejects a key that occurs twice in one mapping, and texts whose aliases expand to too
-    many values."""
+    """PyYAML's safe loader, which also rejects repeated keys in a mapping, and texts with too many values."""
 
     def get_single_data(self) -> Any:
         node = self.get_single_node()
@@ -180,9 +195,7 @@ class _StrictLoader(yaml.SafeLoader):
             _dismantle(node)
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Resolves a scalar that is longer than any number as a text: matching it against patterns would stop all
-        threads.
-        """
+        """Reads a very long scalar as a text, since matching it with PyYAML's patterns would block all threads."""
         if kind is yaml.ScalarNode and len(value) > MAX_NUMBER_LENGTH:
             implicit = (False, True)
         return super().resolve(kind, value, implicit)
@@ -221,13 +234,14 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 def _size(node: yaml.Node, known: dict[int, int]) -> int:
-    """Returns the number of values in a node; values of aliases are counted each time.
+    """Counts the values in a node; values that aliases repeat are counted each time.
 
     Args:
-        known: Results by the id of a node; one that is not finished yet contains itself.
+        node: The node.
+        known: Known counts by the id of the node; 0 for nodes that are being counted.
 
     Raises:
-        yaml.YAMLError: If it contains itself.
+        yaml.YAMLError: If a node contains itself.
     """
     if isinstance(node, yaml.ScalarNode):
         return 1

@@ -1,6 +1,7 @@
-"""Errors, grouped by whose fault they are; every one of them is an `InterfaceError`.
+"""Error classes of the workspace, which all derive from `InterfaceError`.
 
-Each holds data and composes its own message, so that the wording lives in one place.
+The class says who has to act, such as the author of a configuration. Most errors store data, and compose the message
+from the data.
 """
 
 import difflib
@@ -9,27 +10,27 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 MAX_QUOTE_LENGTH = 60
-"""Largest number of characters of a file that a message quotes; the file may be confidential."""
+"""Largest number of characters that a message quotes from a file, which may be confidential."""
 MAX_LINE_LENGTH = 2_000
-"""Largest length of a line of a message."""
+"""Largest number of characters in a line of a message."""
 MAX_LINES = 100
-"""Largest number of lines of a message."""
+"""Largest number of lines in a message."""
 
 
 def shortened(text: str) -> str:
-    """Returns a text for quotation, shortened if it is long."""
+    """Cuts a text to at most `MAX_QUOTE_LENGTH` characters, for quotation in a message."""
     return text if len(text) <= MAX_QUOTE_LENGTH else f"{text[: MAX_QUOTE_LENGTH - 3]}..."
 
 
 def bounded(text: str) -> str:
-    """Returns a message with at most 100 lines of at most 2,000 characters, whatever input of the caller it quotes."""
+    """Cuts a message to at most 100 lines with about 2,000 characters each, even if it quotes long input."""
     lines = text.split("\n")
     kept = [line if len(line) <= MAX_LINE_LENGTH else f"{line[:MAX_LINE_LENGTH]}..." for line in lines[:MAX_LINES]]
     return "\n".join([*kept, f"... and {len(lines) - MAX_LINES} lines more"] if len(lines) > MAX_LINES else kept)
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """Returns the known name most similar to `name`, or None if none is similar (case is ignored)."""
+    """Returns the known name that is most similar to `name`, ignoring case; None if all names are dissimilar."""
     if len(name) > MAX_QUOTE_LENGTH:  # the search is slow for long names
         return None
     by_lower_case = {candidate.lower(): candidate for candidate in known}
@@ -38,7 +39,7 @@ def closest(name: str, known: Iterable[str]) -> str | None:
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Returns `"; did you mean 'x'?"`, or the list of known names, to be put after "unknown ..."."""
+    """Returns the end of a message about an unknown name: `"; did you mean 'x'?"`, or the list of known names."""
     names = sorted(set(known))
     match = closest(name, names)
     if match is not None:
@@ -47,17 +48,17 @@ def hint(name: str, known: Iterable[str]) -> str:
 
 
 class InterfaceError(Exception):
-    """Base of every error this workspace raises on purpose."""
+    """Base class of all errors that this workspace raises on purpose."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One fault in one configuration file.
+    """A fault in a configuration file.
 
     Attributes:
-        file: Path of the YAML file as the user wrote it; `"~config"` when it came from the parameter server.
-        key: Dotted key path with list indices, such as `intrinsics.range[1]`; empty for the file as a whole.
-        message: The expected value, the value found, and what to write instead.
+        file: Path of the YAML file as the user wrote it; `"~config"` for a configuration from the parameter server.
+        key: Dotted key path with list indices, such as `intrinsics.range[1]`; empty for the whole file.
+        message: Description of the fault, usually with the expected value and the given value.
     """
 
     file: str
@@ -66,11 +67,11 @@ class Problem:
 
     def __str__(self) -> str:
         text = ": ".join(part for part in (self.file, self.key, self.message) if part)
-        return bounded(" ".join(text.splitlines()))  # one line each, whatever the user's text holds
+        return bounded(" ".join(text.splitlines()))  # one line, even if the user's text has several
 
 
 class ConfigError(InterfaceError):
-    """The author of the configuration has to change something; has all problems, in the order of the files."""
+    """A configuration is invalid, so that its author has to change it. `problems` has all faults that were found."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -81,7 +82,13 @@ class ConfigError(InterfaceError):
 
 
 class UnknownNameError(InterfaceError):
-    """The caller used an unknown name; `kind` is the kind of object, such as `"joint"`."""
+    """The caller used an unknown name.
+
+    Attributes:
+        kind: Kind of the named object, such as `"joint"`.
+        name: The unknown name.
+        known: The known names.
+    """
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
@@ -96,7 +103,12 @@ class UnknownNameError(InterfaceError):
 
 @dataclass(eq=False)
 class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is the matter)
-    """An optional library is not installed; `how` is a remedy, such as a command to type."""
+    """An optional library is not installed.
+
+    Attributes:
+        package: Name of the library.
+        how: How to install it, such as a command to type.
+    """
 
     package: str
     how: str
@@ -107,12 +119,12 @@ class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is th
 
 @dataclass(eq=False)
 class PluginError(InterfaceError):
-    """A class or function of another package failed.
+    """A plug-in, which is a class or function of another package, failed.
 
     Attributes:
-        plugin: Its name, as `module:Class`.
-        doing: The call that failed, such as `before_step`, if necessary with its object.
-        cause: The error, with file and line.
+        plugin: Name of the plug-in, as `module:Class`.
+        doing: The call that failed, such as `before_step`, if necessary with the name of an object.
+        cause: The error as text, with file and line.
     """
 
     plugin: str
@@ -124,18 +136,19 @@ class PluginError(InterfaceError):
 
 
 class PhysicsError(InterfaceError):
-    """PyBullet rejected a call that the configuration allows; has the request and PyBullet's message."""
+    """PyBullet rejected a call that the configuration allows. The message has the request and PyBullet's message."""
 
 
 @contextmanager
 def collecting_problems() -> Iterator[Callable[[], AbstractContextManager[None]]]:
-    """Collects the problems of several parts of a configuration, so that all of them are reported at once.
+    """Collects the problems of several parts of a configuration, so that they are reported together.
 
     Yields:
-        A factory of contexts for the parts: `with collecting_problems() as part`, then `with part(): ...` for each.
+        A function that makes a context for one part: `with collecting_problems() as part`, then `with part(): ...`
+        for each part.
 
     Raises:
-        ConfigError: At the end, if a part raised one; has the problems of all.
+        ConfigError: At the end, if at least one part raised a ConfigError; it has the problems of all parts.
     """
     problems: list[Problem] = []
 

@@ -1,4 +1,4 @@
-"""Files that are replaced as a whole, and temporary folders that are removed after their process has ended."""
+"""Replaces files atomically, and makes temporary folders that are removed after the end of the process."""
 
 import atexit
 import os
@@ -15,10 +15,12 @@ _NAME = re.compile(rf"{_PREFIX}[a-z]+-(?P<process>\d+)-\w+")
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Yields a path of the same name to write to, in a hidden folder next to the file; `*.csv` does not match it.
+    """Replaces a file atomically at the end of a context.
 
-    At the end of the context, the written file replaces the former one. If the context fails, the written file is
-    removed and the former one stays unchanged. Symbolic links at either path are removed first.
+    Yields a temporary path to write to. It has the same file name, in a hidden folder next to the file, so that
+    patterns such as `*.csv` do not match it. At the end of the context, the written file replaces the old file. If the
+    context fails, the written file is removed, and the old file does not change. Symbolic links at both paths are
+    replaced, not followed.
     """
     folder = path.with_name(f".{path.name}.part")
     if folder.is_symlink():
@@ -33,12 +35,12 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 
 def temporary_folder(kind: str) -> tempfile.TemporaryDirectory[str]:
-    """Returns a new folder of this process, which lasts until it is cleaned up or the process ends.
+    """Makes a temporary folder, which exists until `cleanup` is called or the process ends.
 
-    The folder of a killed process is removed when the next process calls this function.
+    If a process is killed, its folder is removed when another process calls this function.
 
     Args:
-        kind: Its content, in small letters, for people who look at the folder of temporary files.
+        kind: Word for the content in lower-case letters, which becomes part of the folder's name.
     """
     _remove_left_behind()
     folder = tempfile.TemporaryDirectory(prefix=f"{_PREFIX}{kind}-{os.getpid()}-")
@@ -47,7 +49,7 @@ def temporary_folder(kind: str) -> tempfile.TemporaryDirectory[str]:
 
 
 def _remove_left_behind() -> None:
-    """Removes the folders that ended processes of this user have left behind."""
+    """Removes temporary folders of this user whose processes have ended."""
     with suppress(OSError):
         for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             match = _NAME.fullmatch(folder.name)

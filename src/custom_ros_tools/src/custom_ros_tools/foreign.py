@@ -1,7 +1,7 @@
-"""Files and texts from untrusted sources: paths that stay inside a folder, size limits, and text that is safe on a
-terminal.
+"""Reads files and texts from untrusted sources: keeps paths inside a folder, limits sizes, and makes texts safe to
+print.
 
-All code that reads an episode, a saved world, a data set or a message of another node uses these functions.
+In this module, "foreign" means untrusted: from an episode, a saved world, a data set or another node's message.
 """
 
 import errno
@@ -15,22 +15,23 @@ from .config import MAX_BYTES, MAX_VALUES, load_config, read_file
 from .errors import ConfigError, Problem, shortened
 
 MAX_PATH_BYTES = 1000
-"""Longest path that a foreign file may name [bytes]; PyBullet copies paths into 1024 bytes."""
+"""Largest length of a path in a foreign file [bytes]. PyBullet copies paths into buffers of 1024 bytes."""
 MAX_DEPTH = 100
-"""Largest depth of nested lists and mappings in a foreign JSON text."""
+"""Largest nesting depth of lists and mappings in a foreign JSON text."""
 MAX_ENTRIES = 100_000
-"""Largest number of entries of a foreign folder that are read."""
+"""Default of the largest number of entries in a foreign folder."""
 
 
 def path_below(folder: str | Path, name: str) -> Path:
-    """Returns the path that a foreign file names, in a folder and never outside of it.
+    """Joins a trusted folder and a foreign path such that the result is inside the folder.
 
     Args:
-        folder: The folder; it is trusted, and may be a symbolic link itself.
+        folder: The folder, which is trusted and may be a symbolic link.
         name: The foreign path. An absolute path is taken relative to the folder: `/a/b` becomes `FOLDER/a/b`.
 
     Raises:
-        ConfigError: If the path is empty, too long, has `..` or control characters, or passes a symbolic link.
+        ConfigError: If the foreign path is empty or too long, has `..` or control characters, or contains a symbolic
+            link.
     """
     parts = [part for part in name.split("/") if part not in ("", ".")]
     reason = ""
@@ -54,11 +55,10 @@ def path_below(folder: str | Path, name: str) -> Path:
 
 
 def read_below(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> bytes:
-    """Returns the content of a file that a foreign file names, see `path_below`.
+    """Reads a file inside a folder, given by a foreign path; see `path_below`.
 
     Raises:
-        ConfigError: If the path leaves the folder, or if the file is missing, is too large, or is a link, pipe or
-            device.
+        ConfigError: If the path is invalid, or if the file is missing, too large, a symbolic link, a pipe or a device.
     """
     path = path_below(folder, name)
     try:
@@ -68,12 +68,12 @@ def read_below(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> by
 
 
 def entries_of(folder: str | Path, most: int = MAX_ENTRIES, *, links: bool = False) -> list[os.DirEntry[str]]:
-    """Returns the entries of a foreign folder in the order of their names.
+    """Returns the entries of a foreign folder, sorted by name.
 
     Args:
         folder: The folder.
-        most: Largest number of its entries.
-        links: Whether symbolic links are among them.
+        most: Largest allowed number of returned entries.
+        links: Whether symbolic links are returned, too.
 
     Raises:
         OSError: If the folder cannot be read, or has more than `most` entries.
@@ -89,31 +89,31 @@ def entries_of(folder: str | Path, most: int = MAX_ENTRIES, *, links: bool = Fal
 
 
 def load_foreign_yaml(folder: str | Path, name: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
-    """Returns the mapping in a YAML file below a folder.
+    """Reads a mapping from a YAML file inside a folder, given by a foreign path.
 
     Raises:
-        ConfigError: As `read_below` and `load_config` do.
+        ConfigError: As for `path_below` and `load_config`.
     """
     return load_config(str(path_below(folder, name)), most_bytes)
 
 
 def load_foreign_json(text: str | bytes, file: str, most_bytes: int = MAX_BYTES, most_values: int = MAX_VALUES) -> Any:
-    """Returns the value of a JSON text.
+    """Parses a foreign JSON text.
 
     Args:
-        text: The text, in UTF-8 if it is bytes.
-        file: Its source, for messages.
+        text: The text, or its bytes in UTF-8.
+        file: Source of the text, for messages.
         most_bytes: Largest length of the text.
-        most_values: Largest number of values, of all levels together.
+        most_values: Largest number of values, counted over all levels.
 
     Raises:
-        ConfigError: If it is no JSON, too large, or nested in more than 100 levels.
+        ConfigError: If the text is not JSON, is too large, or has more than 100 levels.
     """
     try:
         if len(text) > most_bytes:
             raise ValueError(f"has {len(text)} bytes, expected at most {most_bytes}")
         data = json.loads(text)
-        if len(text) > min(2 * MAX_DEPTH, most_values):  # a shorter one has fewer levels and values
+        if len(text) > min(2 * MAX_DEPTH, most_values):  # shorter texts cannot exceed the limits
             _check_size(data, most_values)
     except RecursionError:
         raise ConfigError([Problem(file, "", f"has more than {MAX_DEPTH} levels")]) from None
@@ -123,22 +123,22 @@ def load_foreign_json(text: str | bytes, file: str, most_bytes: int = MAX_BYTES,
 
 
 def printable(text: str, most: int = 1000) -> str:
-    """Returns a foreign text in one line for a terminal or a log.
+    """Converts a foreign text to one line that is safe for a terminal or a log.
 
-    Control characters (line breaks and escape sequences among them) and characters that change the direction of the
-    text become `\\x1b` and the like; a text of more than `most` characters is cut and ends with `...`.
+    Control characters, such as line breaks, and characters that change the text direction are replaced by escapes such
+    as `\\x1b`. A text with more than `most` characters is cut, and ends with `...`.
     """
     cut = text if len(text) <= most else f"{text[: max(most - 3, 0)]}..."
     return "".join(_escaped(each) if unicodedata.category(each) in _UNSAFE else each for each in cut)
 
 
 def printable_lines(text: str) -> str:
-    """Returns a text whose lines are all safe for a terminal, see `printable`; none is cut."""
+    """Makes each line of a text safe for a terminal, see `printable`, without cutting lines."""
     return "\n".join(printable(line, len(line)) for line in text.split("\n"))
 
 
 _UNSAFE = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
-"""Unicode categories of characters that a terminal or an editor may act on."""
+"""Unicode categories of unsafe characters: a terminal or an editor may interpret them as commands."""
 
 
 def _escaped(character: str) -> str:
@@ -147,7 +147,7 @@ def _escaped(character: str) -> str:
 
 
 def _check_size(data: Any, most_values: int) -> None:
-    """Raises a ValueError if there are too many values, or too many levels."""
+    """Raises a ValueError if parsed JSON has more than `most_values` values or `MAX_DEPTH` levels."""
     level, depth, count = [data], 0, 1
     while level:
         if depth > MAX_DEPTH:

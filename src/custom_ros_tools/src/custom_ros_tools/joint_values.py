@@ -1,4 +1,4 @@
-"""Values of joints by name, as in a joint state."""
+"""Checked joint values with names, as in a joint state, and conversions of their names and units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ QUANTITIES = ("position", "velocity", "effort")
 
 
 class MissingJointsError(InterfaceError):
-    """A joint state lacks requested joints; `known` are those that it has."""
+    """A joint state lacks requested joints.
+
+    Attributes:
+        names: The missing joints.
+        known: The joints in the joint state.
+    """
 
     def __init__(self, names: Sequence[str], known: Sequence[str]) -> None:
         self.names, self.known = tuple(names), tuple(known)
@@ -26,13 +31,13 @@ class MissingJointsError(InterfaceError):
 
 @dataclass(frozen=True)
 class JointValues:
-    """Checked values of joints, which are measured, remapped or guarded; made by `of`.
+    """Positions, velocities and efforts of n joints. Make it with `of`, which checks the values.
 
     Attributes:
-        names: n joint names; empty if the sender names none.
-        position: n positions [rad or m], or none.
-        velocity: n velocities [rad/s or m/s], or none.
-        effort: n torques or forces [N m or N], or none.
+        names: n joint names; empty if the sender gave no names.
+        position: n positions [rad or m]; empty if not given.
+        velocity: n velocities [rad/s or m/s]; empty if not given.
+        effort: n torques or forces [N m or N]; empty if not given.
     """
 
     names: tuple[str, ...]
@@ -48,10 +53,10 @@ class JointValues:
         velocity: Iterable[float] | None = None,
         effort: Iterable[float] | None = None,
     ) -> JointValues:
-        """Returns checked values; None means that the quantity is not given.
+        """Checks values, and returns them as `JointValues`; None means that a quantity is not given.
 
         Raises:
-            ValueError: If lengths differ, a joint is named twice or a value is not finite.
+            ValueError: If lengths differ, a joint name is repeated, or a value is not finite.
         """
         joints = tuple(names)
         if len(set(joints)) != len(joints):
@@ -67,14 +72,14 @@ class JointValues:
         return cls(joints, *values)
 
     def in_order(self, names: Sequence[str], ns: str = "") -> JointValues:
-        """Returns the values of some joints in the requested order; a quantity that is missing stays empty.
+        """Selects the values of joints in a given order; quantities that are not given stay empty.
 
         Args:
-            names: The joints, under which the result lists them.
-            ns: Prefix of their names here, as `ns` in `ns/joint`; empty for none.
+            names: Names of the joints in the result.
+            ns: Prefix of the names in this object: joint `a` is called `ns/a`. By default, names have no prefix.
 
         Raises:
-            MissingJointsError: If joints are missing; it names all of them.
+            MissingJointsError: If joints are missing; the error names all of them.
         """
         prefix = f"{ns.rstrip('/')}/" if ns else ""
         index = {name: i for i, name in enumerate(self.names)}
@@ -86,11 +91,11 @@ class JointValues:
         return JointValues(tuple(names), *(tuple(v[i] for i in picked) if v else () for v in quantities))
 
     def converted(self, conversions: Sequence[JointConversion]) -> JointValues:
-        """Returns the values with some joints converted, in the same order; others stay as they are.
+        """Converts names and values of some joints, and returns all joints in the same order.
 
         Raises:
-            MissingJointsError: If a joint to convert is missing; it names all of them.
-            ValueError: If a joint gets the name of another, or a value is no longer finite.
+            MissingJointsError: If joints to convert are missing; the error names all of them.
+            ValueError: If two joints get the same name, or a converted value is not finite.
         """
         if not conversions:
             return self
@@ -109,16 +114,17 @@ class JointValues:
 
 @dataclass(frozen=True)
 class JointConversion:
-    """Conversion of the values of a joint to other names and units.
+    """Conversion of a joint's name and values between two systems, such as simulator and driver.
 
-    A position q becomes `sign * factor * q + offset`, a velocity v `sign * factor * v`, an effort e `sign * e`.
+    A position q becomes `sign * factor * q + offset`. A velocity v becomes `sign * factor * v`. An effort e becomes
+    `sign * e`.
 
     Attributes:
-        joint: Its name here.
-        name: Its name there.
-        sign: 1, or -1 if the joint rotates the other way there.
-        factor: Number of their units per unit here.
-        offset: Their position [their unit] at position 0 here.
+        joint: Name of the joint in the source system.
+        name: Name of the joint in the target system.
+        sign: -1 if the positive directions of the two systems are opposite, otherwise 1.
+        factor: Number of target units per source unit.
+        offset: Position in the target system at the source position 0 [target units].
     """
 
     joint: str
@@ -128,6 +134,6 @@ class JointConversion:
     offset: float = 0.0
 
     def inverse(self) -> JointConversion:
-        """Returns the inverse conversion."""
+        """Returns the conversion from the target system to the source system."""
         offset = -self.offset * self.sign / self.factor
         return replace(self, joint=self.name, name=self.joint, factor=1.0 / self.factor, offset=offset)

@@ -1,4 +1,4 @@
-"""Codes of keys."""
+"""Re-exports `KeyDownSubscriber`, which receives the codes of pressed keys."""
 
 from custom_ros_tools.ros.key_down_subscriber import KeyDownSubscriber
 

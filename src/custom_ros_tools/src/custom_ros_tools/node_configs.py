@@ -33,23 +33,28 @@ MARKER_TYPES = (
     "ARROW", "CUBE", "SPHERE", "CYLINDER", "LINE_STRIP", "LINE_LIST", "CUBE_LIST", "SPHERE_LIST", "POINTS",
     "TEXT_VIEW_FACING", "MESH_RESOURCE", "TRIANGLE_LIST",
 )  # fmt: skip
-"""Names of the constants of visualization_msgs/Marker for `type`."""
+"""Names of the constants for the field `type` of visualization_msgs/Marker."""
 MARKER_ACTIONS = ("ADD", "MODIFY", "DELETE", "DELETEALL")
-"""Names of its constants for `action`."""
+"""Names of the constants for the field `action` of visualization_msgs/Marker."""
 SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
-"""Marker types that this configuration can describe; the others need points or a text."""
+"""Marker types that this configuration can describe completely. Other types need points or a text."""
 PER_SI_UNIT = {"rad": 1.0, "deg": 180.0 / math.pi, "m": 1.0, "mm": 1000.0}
-"""Number of units per rad or m."""
+"""For each unit, how many of it make 1 rad or 1 m."""
 
 
 def _in_any_case(names: Sequence[str]) -> WithJsonSchema:
-    """Returns the JSON Schema of constants; editors propose the usual spelling."""
+    """Makes the JSON Schema of constants that are accepted in any case; editors propose the lower-case spelling."""
     usual = {"type": "string", "enum": [name.lower() for name in names]}
     return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
 
 
 def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
-    """Returns a validator that matches the name of a constant regardless of case."""
+    """Makes a validator that accepts names of constants in any case, and converts them to upper case.
+
+    Args:
+        names: The constants.
+        kind: Word for the kind of constant in messages.
+    """
 
     def upper(name: str) -> str:
         if name.upper() not in names:
@@ -116,12 +121,12 @@ class MarkerConfig(ConfigModel):
 
     @property
     def quat_xyzw(self) -> list[float]:
-        """Its orientation as a unit quaternion x, y, z, w."""
+        """The marker's orientation as a unit quaternion x, y, z, w."""
         return quat_of(self.orientation, self.ori_in_deg).tolist()
 
     @property
     def mesh_uri(self) -> str:
-        """URI of the mesh for RViz; empty if there is none. `{package}/file` and plain paths become URIs."""
+        """URI of the mesh for RViz, made from `mesh_resource`; empty for a marker without mesh."""
         path = self.mesh_resource or ""
         if path.startswith("{"):
             return "package://" + path[1:].replace("}", "", 1)
@@ -153,7 +158,7 @@ class RemappedJoint(ConfigModel):
     offset: float = Field(0.0, description="The driver's position, in its unit, at position 0 of the simulator.")
 
     def conversion(self) -> JointConversion:
-        """Returns the conversion from the simulator to the driver."""
+        """Makes the conversion from the simulator to the driver."""
         return JointConversion(self.joint, self.rename or self.joint, self.sign, PER_SI_UNIT[self.unit], self.offset)
 
 
@@ -184,7 +189,7 @@ class RemapConfig(ConfigModel):
         return self
 
     def conversions(self) -> tuple[JointConversion, ...]:
-        """Returns the conversions of the forwarded joints."""
+        """Makes the conversions of those forwarded joints whose name or unit changes."""
         there = (each.conversion() for each in self.joints)
         conversions = (each.inverse() if self.inverse else each for each in there)
         wanted = self.joint_names

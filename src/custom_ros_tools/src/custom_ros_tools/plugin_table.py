@@ -1,4 +1,4 @@
-"""The tables of plug-ins: bodies, sensors, controllers, solvers, tasks, devices, mappings, checks and primitives."""
+"""The class of all tables of plug-ins, such as solvers, tasks, sensors, controllers, devices and primitives."""
 
 import ast
 import importlib.util
@@ -24,16 +24,16 @@ _Model = TypeVar("_Model", bound=ConfigModel)
 
 
 class PluginTable(Mapping[str, type[Plugin]]):
-    """Classes of one kind by name; each is imported when it is looked up.
+    """Table of the plug-in classes of one kind, by name. A class is imported when it is looked up.
 
-    Wherever a name of the table is valid, `module:Class` of another package is valid too.
+    Users can write `module:Class`, for a class in their own package, wherever they can write a name from the table.
 
     Args:
-        kind: Noun for one class, used in messages and on pages, such as `solver`.
-        base: `module:Class` that those of other packages derive from. Classes of the table that do not derive from it
-            are only used by other classes, and cannot be selected by name.
-        paths: `module:Class` by name.
-        suggests: Whether the message for an unknown name lists the known ones.
+        kind: Noun for one plug-in in messages and documentation, such as `solver`.
+        base: Base class of the plug-ins, as `module:Class`. Classes in the table that do not derive from the base class
+            cannot be selected by name; only other code uses them.
+        paths: `module:Class` of each plug-in, by name.
+        suggests: Whether the message for an unknown name lists the known names.
     """
 
     def __init__(self, kind: str, base: str, paths: Mapping[str, str], suggests: bool = True) -> None:
@@ -54,27 +54,27 @@ class PluginTable(Mapping[str, type[Plugin]]):
 
     @cached_property
     def base(self) -> type[Plugin]:
-        """The class that all plug-ins of other packages derive from."""
+        """The base class, from which plug-ins of other packages must derive."""
         return cast(type[Plugin], pkgutil.resolve_name(self._base))
 
     def name_of(self, thing: Any) -> str:
-        """Returns the name of a class, or of an object's class; `module:Class` if it is not in the table."""
+        """Returns the table's name for a class, or for an object's class; `module:Class` if the table lacks it."""
         path = full_name(thing)
         return next((name for name, each in self._paths.items() if each == path), path)
 
     # --- Look-up and making
 
     def find(self, name: str) -> type[Plugin]:
-        """Returns the class of a name.
+        """Looks up a plug-in class.
 
         Args:
-            name: A name of the table, or `module:Class`.
+            name: A name in the table, or `module:Class`.
 
         Raises:
-            UnknownNameError: If the table does not have the name, and suggests others.
-            UntrustedError: If the class belongs to a package that may not be imported.
-            ValueError: If another package has no such class, or it does not derive from `base`.
-            MissingDependency: If it needs a library that is not installed.
+            UnknownNameError: If the name is not in the table (only if the table `suggests`).
+            UntrustedError: If the class belongs to a package that must not be imported.
+            ValueError: If `module:Class` does not exist or cannot be imported, or does not derive from `base`.
+            MissingDependency: If the class needs a library that is not installed.
         """
         if name in self and issubclass(self[name], self.base):
             return self[name]
@@ -83,17 +83,19 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return cast(type[Plugin], find_class(name, self.base))
 
     def configured(self, name: str, file: str = "", key: str = "") -> type[Plugin]:
-        """Returns the class that a configuration names.
+        """Looks up a plug-in class that is named in a configuration.
+
+        Does the same as `find`, but raises a ConfigError instead of a ValueError.
 
         Args:
-            name: A name of the table, or `module:Class`.
-            file: The file that has the name, for messages.
-            key: The key that has it.
+            name: A name in the table, or `module:Class`.
+            file: Path of the configuration file, for messages.
+            key: Key in the file whose value is the name, for messages.
 
         Raises:
-            UnknownNameError: If the table does not have the name.
-            MissingDependency: If it needs a library that is not installed.
-            ConfigError: If another package has no such class, or its module cannot be imported.
+            UnknownNameError: If the name is not in the table.
+            MissingDependency: If the class needs a library that is not installed.
+            ConfigError: If `module:Class` does not exist, cannot or must not be imported, or has another base class.
         """
         try:
             return self.find(name)
@@ -104,18 +106,18 @@ class PluginTable(Mapping[str, type[Plugin]]):
     def make(
         self, name: str, data: Mapping[str, Any], file: str = "~", context: Mapping[str, Any] | None = None
     ) -> Plugin:
-        """Makes a plug-in whose only argument is its configuration.
+        """Validates the options of a plug-in, and makes the plug-in. Its constructor must take only the options.
 
         Args:
-            name: A name of the table, or `module:Class`.
-            data: Its options, as read from YAML.
+            name: A name in the table, or `module:Class`.
+            data: Options of the plug-in, as read from YAML.
             file: Source of the options, for messages and relative paths; `"~"` for parameters of a node.
-            context: Further entries for validators, see `ConfigModel.parse`.
+            context: Further entries of the validation context, see `ConfigModel.parse`.
 
         Raises:
-            UnknownNameError: If the table does not have the name.
-            MissingDependency: If it needs a library that is not installed.
-            ConfigError: If the options are wrong; it names file and key of each.
+            UnknownNameError: If the name is not in the table.
+            MissingDependency: If the plug-in needs a library that is not installed.
+            ConfigError: If options are invalid; the error names file and key of each fault.
         """
         make: Any = self.configured(name)
         return cast(Plugin, make(make.Config.parse(data, file, context)))
@@ -123,15 +125,16 @@ class PluginTable(Mapping[str, type[Plugin]]):
     # --- Configuration and schema
 
     def parse_entry(self, entry: Any, info: ValidationInfo, model: type[_Model], expected: str) -> _Model:
-        """Returns the configuration of an entry with a `type`, by the model of its class; for pydantic's validators.
+        """Validates a YAML entry whose key `type` names a plug-in, using its `Config`; for pydantic validators.
 
         Args:
-            entry: The entry as read from YAML, or the configuration itself.
-            model: Base of the configuration.
-            expected: Description of an entry, for the message if this is no mapping with a type.
+            entry: The entry as read from YAML; an instance of `model` is returned unchanged.
+            info: Pydantic's information about the validation.
+            model: Base class of the plug-ins' configurations.
+            expected: Words for an entry, for the error message if `entry` is not a mapping with a type.
 
         Raises:
-            ValueError: If the entry does not fit.
+            ValueError: If the entry is invalid.
         """
         if isinstance(entry, model):
             return entry
@@ -149,7 +152,7 @@ class PluginTable(Mapping[str, type[Plugin]]):
             raise InnerProblemsError(error.problems) from None
 
     def configs(self) -> dict[str, type[ConfigModel]]:
-        """Returns the models of the options by name, of those whose libraries are installed."""
+        """Returns the plug-ins' option models by plug-in name; leaves out plug-ins with missing libraries."""
         found = {}
         for name in self:
             with suppress(MissingDependency):
@@ -157,21 +160,25 @@ class PluginTable(Mapping[str, type[Plugin]]):
         return found
 
     def schemas(self) -> dict[str, Schema]:
-        """Returns the JSON Schemas of the options by name, of those whose libraries are installed."""
+        """Returns the JSON Schemas of the plug-ins' options by plug-in name; see `configs`."""
         return json_schemas(self.configs())
 
     # --- Documentation
 
     def summaries(self) -> dict[str, str]:
-        """Returns the first sentence of each class's docstring by name, without importing its module."""
+        """Returns the first paragraph of each plug-in's docstring by plug-in name, without importing the modules."""
         return {name: _summary(path) for name, path in self._paths.items()}
 
 
 def config_of(found: Any, base: type[_Model]) -> type[_Model]:
-    """Returns the model of the YAML of a class.
+    """Returns the option model of a plug-in class: its attribute `Config`.
+
+    Args:
+        found: The plug-in class.
+        base: Class from which the model must derive.
 
     Raises:
-        ValueError: If it has none, or one of another base.
+        ValueError: If the class lacks a `Config`, or `Config` does not derive from `base`.
     """
     model = getattr(found, "Config", None)
     if isinstance(model, type) and issubclass(model, base):

@@ -1,4 +1,4 @@
-"""Classes of other packages, named as `module:Class`."""
+"""Imports classes of other packages that are named as `module:Class`, and restricts such imports."""
 
 import importlib
 import pkgutil
@@ -13,35 +13,42 @@ from typing import Any, NamedTuple
 from custom_ros_tools.errors import hint, shortened
 
 own_folders = [str(Path(__file__).parent)]
-"""Folders of the packages that look up and call plug-ins; `cause_of` reports the line outside of these folders."""
+"""Folders of the packages that look up and call plug-ins. `cause_of` reports the last line outside these folders."""
 _used: set[str] = set()
-"""Top-level packages of the classes that `find_class` has found."""
+"""Top-level packages from which `find_class` has returned a class."""
 
 
 class _Trust(NamedTuple):
-    """Packages that may be imported, and advice for the message of a refusal."""
+    """A restriction of imports.
+
+    Attributes:
+        packages: Top-level packages that may be imported.
+        how: Advice for the message of a refused import.
+    """
 
     packages: frozenset[str]
     how: str
 
 
 _trust: _Trust | None = None
-"""Trust of the whole process; None allows any package."""
+"""Restriction for the whole process; None allows all packages."""
 _trust_here: ContextVar[_Trust | None] = ContextVar("trust of the recording that is being read", default=None)
 
 
 class UntrustedError(ValueError):
-    """A name from outside belongs to a package that may not be imported."""
+    """An untrusted name belongs to a package that must not be imported."""
 
 
 def trust_only(packages: Iterable[str], how: str) -> None:
-    """Restricts `find_class` from now on to these top-level packages and to classes that are imported already.
+    """Restricts `find_class` in the whole process to trusted packages, see `check_trusted`.
 
-    Importing a module runs its code. Names read at the start come from the user. Names that arrive later, by services
-    or from a bag, are not trusted.
+    Importing a module runs its code. Names that a program reads at its start come from the user, and are trusted. Names
+    that arrive later, in service requests or from a bag, are not trusted. So programs call this function after their
+    start.
 
     Args:
-        how: Advice for the message on how to trust another package.
+        packages: The trusted top-level packages.
+        how: Advice for the error message: how to trust another package.
     """
     global _trust
     _trust = _Trust(frozenset(packages), how)
@@ -49,9 +56,9 @@ def trust_only(packages: Iterable[str], how: str) -> None:
 
 @contextmanager
 def trusting_only(packages: Iterable[str], how: str) -> Iterator[None]:
-    """Does the same as `trust_only` within a context, for a recording that is read in a script.
+    """Restricts `find_class` like `trust_only`, but only within a context, for example while a script reads a bag.
 
-    In a process that `trust_only` restricts, the packages that it names are trusted, too.
+    If `trust_only` was called before, its packages remain trusted as well.
     """
     token = _trust_here.set(_Trust(frozenset(packages), how))
     try:
@@ -61,13 +68,14 @@ def trusting_only(packages: Iterable[str], how: str) -> Iterator[None]:
 
 
 def check_trusted(name: str) -> None:
-    """Checks a `module:Class` from outside.
+    """Checks that an untrusted name `module:Class` may be imported.
 
-    A class is trusted if its package is, or if its module is imported already and `find_class` has found a class of its
-    package before.
+    Without a restriction, all names may be imported. With a restriction, a name may be imported in two cases: the
+    top-level package is trusted, or the module is already imported and `find_class` has returned a class from the same
+    package.
 
     Raises:
-        UntrustedError: If its package may not be imported.
+        UntrustedError: If the name must not be imported.
     """
     restrictions = [each for each in (_trust, _trust_here.get()) if each is not None]
     module = name.partition(":")[0]
@@ -78,10 +86,13 @@ def check_trusted(name: str) -> None:
 
 
 def find(name: str) -> Any:
-    """Returns the object of another package under a name, such as `my_robot_lab.conveyor:Conveyor`.
+    """Imports a module, and returns an object of the module.
+
+    Args:
+        name: Module and object, such as `my_robot_lab.conveyor:Conveyor`.
 
     Raises:
-        ValueError: If the module has no such object, or cannot be imported.
+        ValueError: If the module cannot be imported, or lacks the object.
     """
     module_name, _, attribute = name.partition(":")
     if not attribute or not all(part.isidentifier() for part in module_name.split(".")):
@@ -100,11 +111,15 @@ def find(name: str) -> Any:
 
 
 def find_class(name: str, base: type) -> Any:
-    """Returns a class of another package by its `module:Class`.
+    """Imports a class of another package.
+
+    Args:
+        name: `module:Class`.
+        base: Required base class.
 
     Raises:
-        UntrustedError: If it may not be imported, see `trust_only`.
-        ValueError: If there is no such class, or it is no subclass of `base`.
+        UntrustedError: If the class must not be imported, see `check_trusted`.
+        ValueError: If the class does not exist, or does not derive from `base`.
     """
     check_trusted(name)
     found = find(name)
@@ -115,16 +130,16 @@ def find_class(name: str, base: type) -> Any:
 
 
 def full_name(thing: Any) -> str:
-    """Returns the name by which `find` finds a class or function, or the class of anything else."""
+    """Returns the `module:name` of a class or function, which `find` accepts; for other objects, of their class."""
     named = thing if hasattr(thing, "__qualname__") else type(thing)
     return f"{named.__module__}:{named.__qualname__}"
 
 
 def cause_of(error: BaseException) -> str:
-    """Returns in one line the type and message of an error, and the line of the plug-in's package that raised it."""
+    """Describes an error: its type and message, and the last line of code outside `own_folders` in its traceback."""
     text = f"{type(error).__name__}: {error}"
     places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]
-    if not places or isinstance(error, SyntaxError):  # its text has file and line
+    if not places or isinstance(error, SyntaxError):  # a SyntaxError's message has file and line
         return text
     return f"{text} ({places[-1].filename}, line {places[-1].lineno})"
 

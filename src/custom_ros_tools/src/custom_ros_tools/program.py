@@ -1,4 +1,4 @@
-"""Entry points of the programs of nodes and commands; importing it starts no thread."""
+"""Entry points for the programs of nodes and commands. Importing this module does not start threads."""
 
 import os
 import pkgutil
@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from typing import Any
 
 MIN_MEMORY_BYTES = 500_000_000
-"""Bytes of address space that NumPy and PyBullet need; with less, they end the process."""
+"""Address space that NumPy and PyBullet need [bytes]. With less, they would end the process."""
 PARENT_PERIOD_S = 0.5
 """Time between two checks of whether the parent process has ended [s]."""
 MAX_END_S = 15.0
-"""Longest time for an orderly end [s], as roslaunch gives its nodes before it sends SIGTERM."""
+"""Time that a process has to end after SIGINT, before SIGKILL [s]. roslaunch waits as long before it sends SIGTERM."""
 
 
 def is_output_closed() -> bool:
@@ -28,10 +28,13 @@ def is_output_closed() -> bool:
 
 
 def run(main: str) -> None:
-    """Runs a node's `module:function` with SIGINT blocked for `custom_ros_tools.ros.lifecycle.run_node`.
+    """Imports and runs the main function of a node, with SIGINT blocked as `run_node` needs it.
 
-    A signal must be blocked before the first thread starts, and libraries start threads on import; therefore the
-    function is imported here. The node ends with the roslaunch that started it.
+    SIGINT must be blocked before the first thread starts. Libraries start threads on import, so the function is
+    imported here, after SIGINT is blocked. The node ends with the roslaunch that started it.
+
+    Args:
+        main: The main function, as `module:function`.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     end_with_roslaunch()
@@ -40,16 +43,16 @@ def run(main: str) -> None:
 
 
 def run_command(main: str, call: Callable[[Any], Any] = lambda function: function()) -> None:
-    """Runs a command's `module:function` and exits with its result; Ctrl-C ends it without a traceback.
+    """Imports and runs the function of a command, and exits with its result.
 
-    Until the function is imported, Ctrl-C ends the process at once; afterwards it raises a KeyboardInterrupt. A process
-    that starts with SIGINT blocked, as by `env --block-signal=INT`, is safe before that too. In a process that ignores
-    SIGINT, as behind the `&` of a script, it stays ignored. When the reader of its output has ended, as with `| head`,
-    it ends as by SIGPIPE, with 141.
+    Ctrl-C ends the command without a traceback, with exit code 130. During imports, Ctrl-C ends the process at once;
+    afterwards it raises a KeyboardInterrupt. A parent may start the process with SIGINT blocked, which delays Ctrl-C
+    until this function runs. If SIGINT is ignored, as for background jobs of a script, it stays ignored. If the reader
+    of the output has ended, as with `| head`, the exit code is 141, as after SIGPIPE.
 
     Args:
-        main: The function.
-        call: Calls the function, and returns the exit code.
+        main: The function, as `module:function`.
+        call: Function that calls the imported function, and returns the exit code.
     """
     heeds = signal.getsignal(signal.SIGINT) != signal.SIG_IGN
     if heeds:
@@ -70,18 +73,18 @@ def run_command(main: str, call: Callable[[Any], Any] = lambda function: functio
     except BrokenPipeError:
         if not is_output_closed():
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for output that Python writes when it exits
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python still flushes its output when it exits
         sys.exit(128 + signal.SIGPIPE)
     finally:
-        if heeds:  # while Python is ending, too
+        if heeds:  # Ctrl-C also ends Python's own shutdown
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @contextmanager
 def late_imports() -> Iterator[None]:
-    """Makes Ctrl-C end the process at once while a command imports libraries in its function.
+    """Makes Ctrl-C end the process at once within a context in which a command imports libraries.
 
-    Some libraries catch a KeyboardInterrupt in their imports, and continue or fail with a traceback.
+    Otherwise some libraries catch the KeyboardInterrupt during import, and continue, or fail with a traceback.
     """
     handler = signal.getsignal(signal.SIGINT)
     if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
@@ -95,10 +98,11 @@ def late_imports() -> Iterator[None]:
 
 
 def _prepare_for_numpy() -> None:
-    """Limits matrix computations to one thread, unless the environment sets another number; before NumPy is imported.
+    """Limits NumPy's matrix computations to one thread, and exits with 1 if the memory limit is too low for NumPy.
 
-    Our matrices are small. More threads would mostly wait for each other: the busier the machine, the longer; under a
-    memory limit, forever. With too little memory, the program ends with 1.
+    Must be called before NumPy is imported. A number of threads that is set in the environment is kept. The matrices of
+    this workspace are small, so that several threads would mostly wait for each other. Under a memory limit, they would
+    wait forever.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < MIN_MEMORY_BYTES:
@@ -109,11 +113,11 @@ def _prepare_for_numpy() -> None:
 
 
 def end_with_roslaunch() -> None:
-    """Ends this process soon after the roslaunch that started it, even if roslaunch was killed.
+    """Starts a thread that ends this process soon after the end of its roslaunch, even if roslaunch was killed.
 
-    Only nodes that roslaunch has started are affected; they have the argument `__log`. Other processes outlive their
-    parent, such as a node in the background of a closed shell. The process ends as by Ctrl-C, or by SIGKILL if that
-    takes longer than 15 s. SIGINT must be blocked already.
+    Only nodes that were started by roslaunch are affected, which have an argument `__log`. Other processes, such as a
+    node in the background of a closed shell, continue after the end of their parent. The thread sends SIGINT, and after
+    15 s SIGKILL. SIGINT must be blocked before this function is called.
     """
     if any(word.startswith("__log:=") for word in sys.argv):
         threading.Thread(target=_wait_and_end, args=(os.getppid(),), name="roslaunch", daemon=True).start()

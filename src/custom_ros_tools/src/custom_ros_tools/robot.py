@@ -1,4 +1,4 @@
-"""Joint states with the joints in the order of your own list."""
+"""Re-exports publishers and subscribers of joint states, for joints in an order that the caller chooses."""
 
 from custom_ros_tools.ros.joint_states import (
     JointStatePublisher,

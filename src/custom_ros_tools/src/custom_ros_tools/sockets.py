@@ -1,4 +1,4 @@
-"""Sockets that no client can block: connections that send without waiting, and a listening socket."""
+"""Sockets for rospy that a slow client cannot block: connections with buffered sending, and a listening socket."""
 
 from __future__ import annotations
 
@@ -14,37 +14,40 @@ from collections import deque
 from typing import Any, NamedTuple
 
 MAX_TOGETHER = 32
-"""Largest number of messages that are buffered until the next flush and sent by one system call."""
+"""Number of buffered messages at which a socket flushes, and largest number of messages per system call."""
 _at_once = threading.Event()
-"""Set when no thread flushes any longer."""
+"""Set when the loop that flushes has ended. From then on, every message is sent at once."""
 log = logging.getLogger(__name__)
 HEADER_TIMEOUT_S = 60.0
-"""Time within which a connection has to send its header [s]; then it is closed."""
+"""Time within which a new connection has to send its header [s]; otherwise it is closed."""
 MAX_HEADER_BYTES = 1 << 20
-"""Largest length of a header [bytes]; the first four bytes of other protocols, read as a length, exceed it."""
+"""Largest length of a header [bytes]. Clients with other protocols are recognised because their first four bytes, read
+as a length, are larger."""
 PEEKED = 1 << 15
-"""Number of bytes after which a longer header counts as arrived, since the kernel's buffer is limited."""
+"""Number of received bytes from which on a longer header counts as complete [bytes]. The kernel's buffer is limited."""
 OUT_OF_HANDLES_S = 0.5
-"""Time for which a node without free file handles waits before it accepts again [s]."""
+"""Time that a node without free file handles waits before it accepts connections again [s]."""
 
 
 class BufferedSocket:
-    """A connected socket whose `sendall` never waits: messages are buffered until the next flush, and sent in order.
+    """A connected socket whose `sendall` never waits: it buffers messages, and `flush` sends them in order.
 
-    A flush sends at once: rospy's subscribers request TCP_NODELAY only with an option, whatever the publisher's
-    setting. Without it, a message waits until the previous one is acknowledged, up to 40 ms.
+    Messages that the receiver does not accept yet stay in the buffer. The class is thread-safe. It always sets
+    TCP_NODELAY, which rospy sets only on request of the subscriber. Otherwise, a message would wait up to 40 ms for the
+    acknowledgement of the previous message.
 
-    Any thread may use it. Messages that the other side does not accept yet stay buffered; beyond `limit` messages the
-    oldest are dropped.
+    Args:
+        connection: The connected socket.
+        limit: Largest number of buffered messages. If there are more, the oldest messages are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
-        connection.setblocking(False)  # else Python would wait for rospy's timeout
+        connection.setblocking(False)  # otherwise Python would wait for up to rospy's timeout
         if connection.family in (socket.AF_INET, socket.AF_INET6):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connection
         self._lock = threading.Lock()
-        self._begun = b""  # rest of a partly sent message
+        self._begun = b""  # rest of partly sent data
         self._kept: deque[bytes] = deque(maxlen=limit)
         self._most_together = min(limit, MAX_TOGETHER)
         self._error: OSError | None = None
@@ -54,11 +57,10 @@ class BufferedSocket:
         return getattr(self._socket, name)
 
     def sendall(self, data: bytes) -> None:
-        """Buffers a message for the next flush; flushes now if many are buffered.
+        """Buffers a message for the next flush, and flushes at once if many messages are buffered.
 
         Raises:
-
-            OSError: If an earlier call found the connection closed.
+            OSError: If the connection failed in an earlier flush.
         """
         with self._lock:
             if self._error is not None:
@@ -69,8 +71,10 @@ class BufferedSocket:
                 self._send_kept()
 
     def flush(self) -> None:
-        """Sends buffered messages as far as the other side accepts them; if the connection is closed, sending the next
-        message raises an error."""
+        """Sends buffered messages as far as the receiver accepts them.
+
+        If the connection has failed, the messages are dropped, and the next `sendall` raises the error.
+        """
         with self._lock:
             self._send_kept()
 
@@ -92,23 +96,29 @@ class BufferedSocket:
 
 
 _unsent: dict[BufferedSocket, None] = {}
-"""Sockets with buffered messages, in the order of their first one."""
+"""Sockets with buffered messages, sorted by the time of their first buffered message."""
 
 
 def send_at_once() -> None:
-    """Flushes, and sends every message at once from now on; called when the loop that flushes ends."""
+    """Flushes all sockets, and makes every later message be sent at once. Call it when the loop that flushes ends."""
     _at_once.set()
     flush_buffered_sockets()
 
 
 def flush_buffered_sockets() -> None:
-    """Sends buffered messages as far as they are accepted; for every pass of a loop."""
+    """Flushes all sockets with buffered messages. A node's loop calls this function in each pass."""
     for each in tuple(_unsent):
         each.flush()
 
 
 class _Pending(NamedTuple):
-    """A connection whose header is incomplete; it is closed at `end_s` of the monotonic clock."""
+    """A connection whose header is incomplete.
+
+    Attributes:
+        connection: The socket.
+        address: Address of the client.
+        end_s: Time of the monotonic clock at which the connection is closed [s].
+    """
 
     connection: socket.socket
     address: Any
@@ -116,15 +126,15 @@ class _Pending(NamedTuple):
 
 
 class ServerSocket:
-    """A listening socket that returns connections whose TCPROS header has arrived, so that rospy need not wait for it.
+    """A listening socket whose `accept` only returns connections whose TCPROS header has arrived.
 
-    rospy reads the header of a connection in its only accepting thread. A client that sends none, for example a program
-    that was just stopped or one with another protocol, would keep all others from the topics and services of the node
-    forever. Here connections wait in parallel. A node without free file handles waits, where rospy would never accept a
-    connection again.
+    rospy reads the headers of all connections in one thread. A client that does not send a header, for example a
+    stopped program, would block all other clients of the node forever. Here, several connections wait for their headers
+    in parallel. If the node has no free file handles, `accept` waits and raises a TimeoutError, after which rospy calls
+    `accept` again. Other errors would end rospy's thread.
 
     Args:
-        server: The socket.
+        server: The listening socket.
     """
 
     def __init__(self, server: socket.socket) -> None:
@@ -138,7 +148,7 @@ class ServerSocket:
         return getattr(self._server, name)
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """Waits for the next connection whose header has arrived, and returns it with its address."""
+        """Waits for the next connection whose header has arrived, and returns the connection and its address."""
         while not self._ready:
             now_s = time.monotonic()
             for pending in [each for each in self._pending.values() if each.end_s <= now_s]:
@@ -172,7 +182,7 @@ class ServerSocket:
             return
         except OSError:
             peeked = b""
-        if not peeked:  # it is closed
+        if not peeked:  # the client has closed the connection
             self._forget(pending)
             pending.connection.close()
         elif len(peeked) >= 4:

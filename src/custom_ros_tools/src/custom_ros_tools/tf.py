@@ -1,4 +1,4 @@
-"""TF in one object."""
+"""Re-exports `TfInterface`, which reads and broadcasts TF transforms."""
 
 from custom_ros_tools.ros.tf_interface import TfInterface
 

@@ -1,6 +1,7 @@
-"""Rotations and poses: conversions between quaternions, roll-pitch-yaw and matrices.
+"""Converts rotations and poses between quaternions, roll-pitch-yaw and matrices.
 
-Quaternions are x, y, z, w. Roll, pitch and yaw rotate about the fixed x, y and z axis in this order, as in URDF.
+Quaternions are in the order x, y, z, w. Roll, pitch and yaw are rotations about the fixed x, y and z axes, in this
+order, as in URDF.
 """
 
 from __future__ import annotations
@@ -20,21 +21,21 @@ from .schema import ConfigModel, FrameId, KeyedError, Position, Quat
 Array = NDArray[np.float64]
 
 MATRIX_TOLERANCE = 1e-3
-"""Largest deviation of the rows of a rotation matrix from unit length and right angles; beyond it the matrix is
-rejected.
-"""
+"""Largest accepted deviation of R R^T from the identity matrix, entry by entry, for a rotation matrix R."""
 MIN_NORM = 1e-6
-"""Least length of a quaternion; shorter ones count as zero."""
+"""Least length of a quaternion; shorter quaternions count as zero."""
 
 
 def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
-    """Returns values as a vector, shape (length,).
+    """Converts numbers to an array of shape (length,), and checks that they are finite.
 
     Args:
+        values: The numbers.
+        length: Required number of values.
         name: Name of the values in messages.
 
     Raises:
-        ValueError: If the number of values differs, or one is not finite.
+        ValueError: If the number of values is wrong, or a value is not finite.
     """
     vector = np.asarray(values, dtype=float)
     if vector.shape != (length,):
@@ -45,10 +46,10 @@ def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
 
 
 def unit_quat(quat_xyzw: ArrayLike) -> Array:
-    """Returns a quaternion x, y, z, w of length 1.
+    """Scales a quaternion x, y, z, w to length 1.
 
     Raises:
-        ValueError: If it has not four finite numbers or is zero.
+        ValueError: If the quaternion is not four finite numbers, or its length is below 1e-6.
     """
     quat = finite_vector(quat_xyzw, 4, "quaternion")
     norm = np.linalg.norm(quat)
@@ -58,14 +59,14 @@ def unit_quat(quat_xyzw: ArrayLike) -> Array:
 
 
 def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
-    """Returns an orientation as a unit quaternion x, y, z, w.
+    """Converts an orientation to a unit quaternion x, y, z, w.
 
     Args:
-        orientation: Either roll, pitch, yaw or a quaternion x, y, z, w.
-        in_deg: Whether roll, pitch and yaw are in degrees rather than radians; a quaternion has no unit.
+        orientation: Roll, pitch and yaw, or a quaternion x, y, z, w.
+        in_deg: Whether roll, pitch and yaw are in degrees instead of radians; has no effect on a quaternion.
 
     Raises:
-        ValueError: If it is neither, is not finite or is a zero quaternion.
+        ValueError: If the orientation is not three or four finite numbers, or is a zero quaternion.
     """
     values = np.asarray(orientation, dtype=float)
     if values.shape == (4,):
@@ -77,25 +78,25 @@ def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
 
 
 def rpy_of(quat_xyzw: ArrayLike) -> Array:
-    """Returns roll, pitch, yaw [rad] of a quaternion x, y, z, w; pitch is within -pi/2 and pi/2.
+    """Converts a quaternion x, y, z, w to roll, pitch, yaw [rad]; pitch is from -pi/2 to pi/2.
 
     Raises:
-        ValueError: If it has not four finite numbers or is zero.
+        ValueError: If the quaternion is not four finite numbers, or is zero.
     """
     return np.asarray(Rotation.from_quat(unit_quat(quat_xyzw)).as_euler("xyz"))
 
 
 def yaw_of(quat_xyzw: Sequence[float] | Array) -> float:
-    """Returns the yaw [rad] of a unit quaternion x, y, z, w: the direction of the x axis about the vertical."""
+    """Returns the yaw of a unit quaternion x, y, z, w: the horizontal direction of the rotated x axis [rad]."""
     x, y, z, w = quat_xyzw
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
-    """Returns a position x, y, z [m] and a quaternion x, y, z, w as homogeneous matrix, shape (4, 4).
+    """Converts a position x, y, z [m] and a quaternion x, y, z, w to a homogeneous matrix, shape (4, 4).
 
     Raises:
-        ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
+        ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
     """
     T = np.eye(4)
     T[:3, :3] = Rotation.from_quat(unit_quat(quat_xyzw)).as_matrix()
@@ -104,10 +105,10 @@ def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
 
 
 def pose_of(matrix: ArrayLike) -> tuple[Array, Array]:
-    """Returns position [m] and unit quaternion x, y, z, w of a homogeneous matrix, shape (4, 4).
+    """Converts a homogeneous matrix, shape (4, 4), to a position x, y, z [m] and a unit quaternion x, y, z, w.
 
     Raises:
-        ValueError: If it is no rigid transform, rounding aside.
+        ValueError: If the matrix is not a rigid transform; rounding errors up to `MATRIX_TOLERANCE` are accepted.
     """
     T = np.asarray(matrix, dtype=float)
     if T.shape != (4, 4):
@@ -144,10 +145,13 @@ class StaticTransform(ConfigModel):
 
     @classmethod
     def from_arguments(cls, arguments: Sequence[str]) -> StaticTransform:
-        """Reads `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m, rad] of a command.
+        """Parses the arguments of a command line.
+
+        Args:
+            arguments: `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m and rad].
 
         Raises:
-            ConfigError: with one `Problem` for each fault.
+            ConfigError: If arguments are invalid; the error has a `Problem` for each fault.
         """
         keys = _KEYS.get(len(arguments))
         if keys is None:
@@ -155,7 +159,7 @@ class StaticTransform(ConfigModel):
             got = f"{len(arguments)} arguments" if arguments else "none"
             raise ConfigError([Problem(_ARGUMENTS, "", f"expected {wanted}, got {got}")])
         problems: list[Problem] = []
-        numbers = [1.0] * (len(keys) - 2)  # placeholders for invalid values, so that the rest is checked too
+        numbers = [1.0] * (len(keys) - 2)  # placeholders for invalid values, so that the other values are checked
         for index, text in enumerate(arguments[:-2]):
             try:
                 numbers[index] = float(text)
@@ -166,7 +170,7 @@ class StaticTransform(ConfigModel):
             data["quat_xyzw"] = quat_of(numbers[3:]).tolist()
         except ValueError as error:
             problems.append(Problem(_ARGUMENTS, "", str(error)))
-            data["quat_xyzw"] = [0.0, 0.0, 0.0, 1.0]  # likewise
+            data["quat_xyzw"] = [0.0, 0.0, 0.0, 1.0]  # placeholder
         try:
             transform = cls.parse(data, _ARGUMENTS)
         except ConfigError as error:

@@ -1,4 +1,4 @@
-"""Arguments of commands, as annotations of the parameters of their functions."""
+"""Describes the arguments of commands, in annotations of function parameters."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -8,21 +8,21 @@ from custom_ros_tools.errors import InterfaceError
 
 
 class Argument(NamedTuple):
-    """Metadata of a parameter, for `Annotated`.
+    """Describes how a function parameter is given on the command line; used as metadata in `Annotated`.
 
-    A keyword-only parameter is an option; all others are positional arguments.
+    A keyword-only parameter is an option. All other parameters are positional arguments.
 
     Attributes:
-        shown: Placeholders of its words on the page, such as `X Y Z`. `NAME ...` means one word or more,
-            `[NAME ...]` for any number of words.
-        flag: Name of an option, by default `--` and the name of the parameter.
-        parse: Returns the value of a word, or raises ValueError if the word is invalid.
-        choices: Returns the valid words.
-        is_open: Whether other words are valid too; the function checks them.
-        offers: Name of a function in `dev/tools/completion.bash` that prints the words for completion.
-        files: Pattern of the files that completion offers; empty for none.
-        excludes: Name of a group of options of which at most one may be given.
-        is_raw: Whether the function parses all words itself, options included.
+        shown: Placeholders for the words of the argument in the help, such as `X Y Z`. `NAME ...` means one or more
+            words, `[NAME ...]` means any number of words.
+        flag: Name of the option; by default `--` and the name of the parameter.
+        parse: Function that converts a word to a value, or raises a ValueError if the word is invalid.
+        choices: Function that returns the valid words; by default, `parse` decides.
+        is_open: Whether words that are not in `choices` are accepted as well; the command's function checks them.
+        offers: Name of a function in `dev/tools/completion.bash` that prints words for completion.
+        files: Pattern of the file names that completion offers; empty if completion does not offer files.
+        excludes: Name of a group of options; at most one option of a group may be given.
+        is_raw: Whether the command's function gets all words unparsed, including options.
     """
 
     shown: str
@@ -37,18 +37,18 @@ class Argument(NamedTuple):
 
 
 class UsageError(InterfaceError):
-    """The words of a command do not fit together; the message is printed after the usage, and the exit code is 2."""
+    """The arguments of a command are invalid. The usage and the message are printed, and the exit code is 2."""
 
 
 class WrongNumberError(InterfaceError, ValueError):
-    """A word is not a finite number."""
+    """An argument is not a finite number."""
 
 
 def number(text: str) -> float:
-    """Returns the number in a word; `30deg` is a number in radians.
+    """Converts a word to a number; a number in degrees, such as `30deg`, is converted to radians.
 
     Raises:
-        WrongNumberError: If the word is not a number, or not finite.
+        WrongNumberError: If the word is not a finite number.
     """
     is_angle = text.endswith("deg")
     try:

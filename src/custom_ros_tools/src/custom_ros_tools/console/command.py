@@ -1,4 +1,4 @@
-"""A command of `./rpbi`, derived from a function: its parser, its section of the page, its completion."""
+"""Makes a command of `./rpbi` from a function: argument parser, help text and completion."""
 
 import argparse
 import inspect
@@ -16,19 +16,19 @@ from .argument import Argument, UsageError
 
 PROGRAM = "./rpbi"
 NAME_WIDTH = 16
-"""Characters for the name of an argument on the page; longer ones are followed by three spaces."""
+"""Width of the column of argument names in the help text; longer names are followed by three spaces."""
 _NEGATIVE = re.compile(r"-[\d.]")
 _SECTION = re.compile(r"^(Usage|Args):\n((?:    .*\n|\n)*)", re.MULTILINE)
 
 
 class Parameter(NamedTuple):
-    """A parameter of the function of a command.
+    """A parameter of a command's function.
 
     Attributes:
-        name: Its name in Python.
-        argument: Its metadata.
-        kind: Its kind, as `inspect` has it.
-        default: Its default, `inspect.Parameter.empty` without one.
+        name: Name of the parameter in Python.
+        argument: Metadata from the parameter's annotation.
+        kind: Kind of the parameter, as in `inspect.Parameter`.
+        default: Default value; `inspect.Parameter.empty` for a parameter without default.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Parameter(NamedTuple):
 
     @property
     def is_option(self) -> bool:
-        """Whether it is an option; otherwise it is a positional argument."""
+        """Whether the parameter is an option; otherwise it is a positional argument."""
         return self.kind is inspect.Parameter.KEYWORD_ONLY
 
     @property
     def is_switch(self) -> bool:
-        """Whether it is an option without a value."""
+        """Whether the parameter is an option without a value."""
         return self.is_option and self.default is False
 
     @property
@@ -53,19 +53,19 @@ class Parameter(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name and placeholders on the page."""
+        """Placeholders of the argument in the help text; for an option, preceded by its name."""
         return (
             " ".join(filter(None, (self.flag, *self.placeholders))) if self.is_option else " ".join(self.placeholders)
         )
 
     @property
     def placeholders(self) -> tuple[str, ...]:
-        """Placeholders of its words, each once."""
+        """Placeholders of the argument's words, without brackets and dots."""
         return tuple(self.argument.shown.strip("[]").removesuffix(" ...").split())
 
     @property
     def words(self) -> int | str | None:
-        """Number of words, as `nargs` of argparse."""
+        """Number of words that the argument takes, in the notation of `nargs` in argparse."""
         shown = self.argument.shown
         if "..." in shown:
             return "*" if shown.startswith("[") else "+"
@@ -76,16 +76,19 @@ class Parameter(NamedTuple):
 
 
 class Command:
-    """A command.
+    """A command of `./rpbi`, made from a function.
 
-    The function has an `Argument` in the annotation of each parameter. It returns the text to print, or the exit code.
-    Its docstring has the summary in its first line. Then come paragraphs and examples in any order, a section `Usage:`
-    if the usage does not follow from the signature, and a section `Args:`, whose entries are names of parameters or
-    literal names of arguments.
+    Each parameter of the function has an `Argument` in its annotation. The function returns the text to print, or the
+    exit code. The first line of its docstring is the summary. Paragraphs and examples may follow in any order. The
+    section `Args:` describes parameters by name, or arguments by their literal text. The section `Usage:` is needed
+    only if the usage cannot be derived from the signature.
+
+    Args:
+        function: The function.
 
     Attributes:
-        name: Its name, that of the function.
-        summary: First line of its help.
+        name: Name of the command, which is the name of the function.
+        summary: First line of the help.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -99,7 +102,7 @@ class Command:
 
     @cached_property
     def parameters(self) -> list[Parameter]:
-        """The parameters of its function."""
+        """The parameters of the command's function."""
         hints = get_type_hints(self._function, include_extras=True)
         found = []
         for name, each in inspect.signature(self._function).parameters.items():
@@ -111,16 +114,16 @@ class Command:
 
     @property
     def section(self) -> str:
-        """Its section of the page without the heading; also the help text."""
+        """The help text, which is also the command's section in docs/commands.md, without the heading."""
         usage = self._usage or " ".join((PROGRAM, self.name, *self._usage_words()))
         blocks = [_indented(usage), self.summary, _indented("\n".join(self._rows())), self._text]
         return "\n\n".join(filter(None, blocks)) + "\n"
 
     def completions(self) -> Iterator[str]:
-        """Yields a line for each argument with completable values: the command, the position, and the source of the
-        values.
+        """Yields lines for the completion of arguments: command, position, and source of the values.
 
-        The position is the number of the word, `*` for the last positional argument, or the name of an option.
+        The position is the number of a positional argument, `*` for the last positional argument, or the name of an
+        option.
         """
         places = [each for each in self.parameters if not each.is_option]
         for each in self.parameters:
@@ -134,13 +137,14 @@ class Command:
                 yield f"{self.name} {where} files {argument.files}"
 
     def run(self, words: Sequence[str]) -> int:
-        """Runs the command with its words; characters of the text that a terminal may act on are escaped.
+        """Runs the command with the words of the command line, and prints its text with unsafe characters escaped.
 
         Returns:
-            The exit code: 0, 1 if something went wrong, with the message on stderr, or that of the function.
+            The exit code. If the function fails, the message is printed to stderr, and the code is 1. Otherwise the
+            code is the integer that the function returns, or 0.
 
         Raises:
-            BrokenPipeError: If the reader of the standard output has closed it, see `run_command`.
+            BrokenPipeError: If the reader of the standard output has closed the pipe, see `run_command`.
         """
         if {"-h", "--help"} & set(words):
             print(self.section, end="")
@@ -164,7 +168,7 @@ class Command:
         return any(each.argument.is_raw for each in self.parameters)
 
     def _call(self, words: Sequence[str]) -> Any:
-        # Arguments of ROS such as __name:=x are not ours; argparse takes no word with a leading space as an option
+        # Leaves out ROS arguments such as __name:=x. The leading space keeps argparse from reading -1 as an option.
         ours = [f" {word}" if _NEGATIVE.match(word) else word for word in words if not word.startswith("__")]
         parsed = vars(self._parser().parse_args(ours))
         arguments: list[Any] = []
@@ -202,7 +206,7 @@ class Command:
                 yield f"[{shown}]" if each.words == "?" else shown
 
     def _rows(self) -> Iterator[str]:
-        """Yields a line for each entry of the section `Args:`, with further lines as they are."""
+        """Yields the formatted text of each entry in the section `Args:`."""
         by_name = {each.name: each for each in self.parameters}
         for entry in re.split(r"\n(?! )", self._args) if self._args else ():
             name, _, text = entry.partition(": ")
@@ -217,7 +221,7 @@ class Command:
 
 
 def _parse(argument: Argument) -> Callable[[str], Any]:
-    """Returns the parser of a word, which checks it against the choices."""
+    """Returns the function that argparse calls for each word: it parses the word, or checks it against the choices."""
     choices = argument.choices
     if choices is None or argument.is_open:
         return argument.parse

@@ -1,4 +1,4 @@
-"""The command `docs`; the page of the commands, and the file with which bash completes their arguments."""
+"""The command `docs`, and the generators of docs/commands.md and of the completion file for bash."""
 
 import pkgutil
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ FIRST = (
     *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity"),
     *("save", "restore", "replay", "test", "docs", "bench", "shell", "setup"),
 )
-"""Commands at the beginning of the page, in this order; all others follow by name."""
+"""Commands at the beginning of docs/commands.md, in this order; all other commands follow, sorted by name."""
 _HEAD = f"""\
 <!-- Written by `{PROGRAM} docs` from the code: change it there, not here. -->
 
@@ -51,16 +51,16 @@ WRITERS = (
     "custom_ros_tools.console.docs:console_files",
     "rpbi_examples.plugins_page:plugin_files",
 )
-"""Functions that return the text of each file, given the workspace."""
+"""Functions that take the folder of the workspace, and return the texts of generated files by path."""
 
 
 def page(listed: Iterable[Command]) -> str:
-    """Returns the page of some commands."""
+    """Returns the text of docs/commands.md for the given commands."""
     return "\n".join([_HEAD, *(f"## {each.name}\n\n{each.section}" for each in listed), _TAIL])
 
 
 def console_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file that is generated from the commands of a workspace."""
+    """Generates docs/commands.md and the completion file for a workspace, and returns their texts by path."""
     order = {name: place for place, name in enumerate(FIRST)}
     listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
     lines = [line for each in listed for line in each.completions()]
@@ -68,7 +68,7 @@ def console_files(root: Path) -> dict[Path, str]:
 
 
 def files(root: Path) -> dict[Path, str]:
-    """Returns the text of each file of a workspace that is generated from the code."""
+    """Generates all files of a workspace that are made from code, and returns their texts by path."""
     return {path: text for writer in WRITERS for path, text in pkgutil.resolve_name(writer)(root).items()}
 
 

@@ -1,4 +1,4 @@
-"""The node `attach_marker`: a marker at a fixed pose in a TF frame, for RViz."""
+"""The node `attach_marker`: publishes a marker for RViz at a fixed pose in a TF frame."""
 
 import logging
 
@@ -17,10 +17,10 @@ log = logging.getLogger(__name__)
 
 
 class AttachMarkerNode:
-    """Repeats the marker of `~config` and, on request, the pose of the marker as TF.
+    """Publishes the marker in `~config` at a fixed rate, and the marker's pose on TF if `broadcast_offset` is true.
 
     Raises:
-        ConfigError: If the configuration is wrong.
+        ConfigError: If the configuration is invalid.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class AttachMarkerNode:
 
 
 def _marker(config: MarkerConfig) -> Marker:
-    """Returns the message except for its pose and stamp."""
+    """Makes the marker message, without pose and stamp."""
     marker = Marker(type=getattr(Marker, config.type), action=getattr(Marker, config.action))
     marker.header.frame_id = config.frame_id
     marker.ns = rospy.get_name()  # otherwise markers of several nodes on one topic would replace each other

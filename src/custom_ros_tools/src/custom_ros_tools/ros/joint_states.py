@@ -1,4 +1,4 @@
-"""Joint states as messages: reordered, published, stored."""
+"""Reorders, publishes and receives joint state messages."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -14,16 +14,16 @@ from custom_ros_tools.transforms import Array
 
 
 def values_in(message: JointState) -> JointValues:
-    """Returns the values in a message.
+    """Converts a message to checked values.
 
     Raises:
-        ValueError: If lengths differ, a joint is named twice or a value is not finite.
+        ValueError: If lengths differ, a joint name is repeated, or a value is not finite.
     """
     return JointValues.of(message.name, message.position, message.velocity, message.effort)
 
 
 def joint_state(values: JointValues, header: Header) -> JointState:
-    """Returns a message."""
+    """Converts values to a message."""
     return JointState(
         header=header,
         name=list(values.names),
@@ -34,16 +34,16 @@ def joint_state(values: JointValues, header: Header) -> JointState:
 
 
 def resolve_joint_order(msg: JointState, joint_names: Sequence[str], ns: str = "") -> JointState:
-    """Returns a joint state with its joints in the requested order; velocities or efforts that it lacks stay empty.
+    """Selects joints from a joint state, in a given order; quantities that the message lacks stay empty.
 
     Args:
-        msg: The joint state, in any order, perhaps with more joints.
-        joint_names: The requested joints, under which the result lists them.
-        ns: Prefix of their names in `msg`, as `ns` in `ns/joint`; empty for none.
+        msg: The joint state, in any order, possibly with further joints.
+        joint_names: Names of the joints in the result.
+        ns: Prefix of the names in `msg`: joint `a` is called `ns/a`. By default, names have no prefix.
 
     Raises:
-        MissingJointsError: If joints are missing; it names all of them.
-        ValueError: If lengths in `msg` differ, a joint is named twice or a value is not finite.
+        MissingJointsError: If joints are missing; the error names all of them.
+        ValueError: If lengths in `msg` differ, a joint name is repeated, or a value is not finite.
     """
     return joint_state(values_in(msg).in_order(joint_names, ns), msg.header)
 
@@ -54,15 +54,16 @@ def get_joint_state(
     joint_names: Sequence[str] | None = None,
     ns: str = "",
 ) -> JointState:
-    """Waits for one message of a topic and returns it.
+    """Waits for one joint state on a topic, and returns the message.
 
     Args:
-        timeout: Longest time to wait [s] of wall time; None waits forever.
-        joint_names: The requested joints; None returns all in the order received.
-        ns: As for `resolve_joint_order`.
+        topic: Name of the topic.
+        timeout: Longest time to wait, in wall time [s]; None waits without limit.
+        joint_names: Names and order of the joints in the result; None returns the message unchanged.
+        ns: Prefix of the names in the message, as for `resolve_joint_order`.
 
     Raises:
-        rospy.ROSException: If none arrived in time.
+        rospy.ROSException: If no message arrives in time.
         MissingJointsError: If the message lacks joints.
         ValueError: If the message is invalid.
     """
@@ -74,8 +75,9 @@ class JointStatePublisher(rospy.Publisher):
     """Publishes joint states of a fixed list of joints.
 
     Args:
-        joint_names: The n joints.
-        queue_size: Number of messages that are buffered for a slow subscriber.
+        topic_name: Name of the topic.
+        joint_names: Names of the n joints.
+        queue_size: Largest number of messages that are buffered for a slow subscriber.
     """
 
     def __init__(self, topic_name: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
@@ -88,7 +90,7 @@ class JointStatePublisher(rospy.Publisher):
         qd: Iterable[float] | None = None,
         eff: Iterable[float] | None = None,
     ) -> None:
-        """Publishes values with the present stamp.
+        """Publishes a joint state with the present time as stamp. Quantities that are not given stay empty.
 
         Args:
             q: n positions [rad or m].
@@ -96,25 +98,26 @@ class JointStatePublisher(rospy.Publisher):
             eff: n torques or forces [N m or N].
 
         Raises:
-            ValueError: If there are more or fewer than n, or a value is not finite.
+            ValueError: If a quantity does not have n values, or a value is not finite.
         """
         values = JointValues.of(self._names, q, qd, eff)
         super().publish(joint_state(values, Header(stamp=rospy.Time.now())))
 
 
 QUEUE_SIZE = 1000
-"""Messages that wait for a callback which needs each of them."""
+"""Queue size for subscribers with a callback, so that the callback misses no message on a busy machine."""
 
 
 class JointStateSubscriber(rospy.Subscriber):
-    """Stores the newest joint state of a topic, its joints in the order of a list.
+    """Stores the newest joint state of a topic, with its joints in a given order.
 
-    Messages that lack joints or are invalid are refused with a throttled warning; the previous one stays.
+    Messages that are invalid or lack joints are refused with a throttled warning; then the previous message stays.
 
     Args:
-        joint_names: The n joints.
-        ns: Prefix of their names in messages, as `ns` in `ns/joint`.
-        callback: Called with each joint state, its joints in order; on a busy machine up to 1,000 wait for it.
+        topic_name: Name of the topic.
+        joint_names: Names of the n joints, in the desired order.
+        ns: Prefix of the names in messages: joint `a` is called `ns/a`. By default, names have no prefix.
+        callback: Function that is called with each reordered joint state. Up to 1,000 messages are queued for it.
     """
 
     def __init__(
@@ -131,25 +134,25 @@ class JointStateSubscriber(rospy.Subscriber):
         super().__init__(self._topic, JointState, self._on_message, queue_size=queue_size, tcp_nodelay=True)
 
     def received(self) -> bool:
-        """Returns whether there is a joint state."""
+        """Returns whether a valid joint state has arrived."""
         return self._newest is not None
 
     recieved = received  # spelled as in the authors' release
 
     def get(self) -> JointState | None:
-        """Returns the newest joint state, None if there is none yet."""
+        """Returns the newest joint state; None before the first message."""
         return self._newest
 
     def get_position(self) -> Array | None:
-        """Returns n positions [rad or m]; none if the message has none, None if there is no message yet."""
+        """Returns n positions [rad or m]; empty if the message lacks positions, None before the first message."""
         return self._values("position")
 
     def get_velocity(self) -> Array | None:
-        """Returns n velocities [rad/s or m/s]; none if the message has none, None if there is no message yet."""
+        """Returns n velocities [rad/s or m/s]; empty if the message lacks velocities, None before the first message."""
         return self._values("velocity")
 
     def get_effort(self) -> Array | None:
-        """Returns n efforts [N m or N]; none if the message has none, None if there is no message yet."""
+        """Returns n efforts [N m or N]; empty if the message lacks efforts, None before the first message."""
         return self._values("effort")
 
     def _values(self, quantity: str) -> Array | None:

@@ -1,4 +1,4 @@
-"""Calls functions when keys are pressed."""
+"""A subscriber that calls functions when keys are pressed."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -8,10 +8,10 @@ from keyboard.msg import Key
 
 
 class KeyDownSubscriber(rospy.Subscriber):
-    """Calls functions when keys go down, as published on `keyboard/keydown`.
+    """Calls a function for each pressed key that is published on the topic `keyboard/keydown`.
 
     Args:
-        key_action_map: Functions by key code, such as `{Key.KEY_a: start}`.
+        key_action_map: Functions without arguments, by key code, such as `{Key.KEY_a: start}`. Other keys are ignored.
     """
 
     def __init__(self, key_action_map: Mapping[int, Callable[[], Any]]) -> None:

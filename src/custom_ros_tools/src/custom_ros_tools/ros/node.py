@@ -1,4 +1,4 @@
-"""Entry points of programs, under the path that programs of other packages import."""
+"""Re-exports the entry points of programs, for programs of other packages."""
 
 from custom_ros_tools.program import late_imports, run, run_command
 

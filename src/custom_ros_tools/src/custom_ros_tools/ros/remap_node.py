@@ -1,4 +1,4 @@
-"""Nodes that remap joint states: to another topic, or as bare numbers, with names and units of a driver."""
+"""Nodes that forward joint states to another topic, as joint states or arrays, with the names and units of a driver."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -22,17 +22,25 @@ Config = TypeVar("Config", bound=RemapConfig)
 TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
 QUEUE_SIZE = 100
-"""Largest number of queued messages on a busy machine: 0.1 s of joint states at 1 kHz."""
+"""Queue size: on a busy machine, 0.1 s of joint states at 1 kHz can wait."""
 START_WAIT_S = 2.0
-"""Longest time to wait for each of the joint states of the condition at the start [s]."""
+"""Longest time to wait for a command, and for a state of the robot, when the node is switched on [s]."""
 
 
 class RemapNode:
-    """Converts and publishes joint states while it is switched on; while off, it is not subscribed.
+    """Converts and publishes joint states while it is switched on. While it is off, it does not subscribe.
 
-    It has the service `remap_joint_state/toggle`, and the same service under the name of its executable. `convert`
-    returns the published message; it raises InterfaceError or ValueError for a message that must be refused. `config`
-    may have a condition for switching on.
+    The services `remap_joint_state/toggle` and `EXECUTABLE/toggle` switch the node on and off.
+
+    Args:
+        executable: Name of the executable.
+        source: Topic of the joint states to convert.
+        target: Topic of the converted messages.
+        target_type: Type of the converted messages.
+        convert: Function that converts a joint state to a message. It raises an InterfaceError or a ValueError if the
+            joint state is refused.
+        config: The configuration, which may have a condition for switching on.
+        start_on_init: Whether the node is on initially.
     """
 
     def __init__(
@@ -84,11 +92,15 @@ class RemapNode:
 
 
 def _check_start(config: RemapConfig, source: str) -> None:
-    """Waits for the first command and the state of the robot, and compares them.
+    """Waits for a command and for a measured state of the robot, and checks that they are near each other.
+
+    Args:
+        config: The configuration, with `start_within`.
+        source: Topic of the commands.
 
     Raises:
-        InterfaceError: If they are too far apart, lack joints or do not arrive.
-        ValueError: If one of the messages is no joint state.
+        InterfaceError: If a joint's command and state are too far apart, or a message lacks joints or does not arrive.
+        ValueError: If a message is invalid.
     """
     assert config.start_within is not None
     measured = _one_state(config.start_within.topic).converted([each.inverse() for each in config.conversions()])
@@ -110,10 +122,10 @@ def _one_state(topic: str) -> JointValues:
 
 
 def _float_array_node() -> RemapNode:
-    """Returns the node that publishes one quantity of joint states as bare numbers, in the order of `~config`.
+    """Makes the node that publishes one quantity of the joint states as an array of numbers, as `~config` says.
 
     Raises:
-        ConfigError: If the configuration or a parameter is wrong.
+        ConfigError: If the configuration or a parameter is invalid.
     """
     config, start_on_init = _parameters(FloatArrayConfig)
     conversions = config.conversions()
@@ -132,10 +144,10 @@ def _float_array_node() -> RemapNode:
 
 
 def _joint_state_node() -> RemapNode:
-    """Returns the node that publishes joint states on another topic, with names and units of `~config`.
+    """Makes the node that publishes joint states on another topic, with names and units as in `~config`.
 
     Raises:
-        ConfigError: If the configuration or a parameter is wrong.
+        ConfigError: If the configuration or a parameter is invalid.
     """
     config, start_on_init = _parameters(RemapConfig)
     conversions = config.conversions()
@@ -153,7 +165,7 @@ def _joint_state_node() -> RemapNode:
 
 
 def _parameters(model: type[Config]) -> tuple[Config, bool]:
-    """Returns the configuration and whether the node is on from the start."""
+    """Reads the configuration, and whether the node is on initially."""
     with collecting_problems() as part:
         with part():
             config = private_config(model)

@@ -1,4 +1,4 @@
-"""Services: a function that is switched on and off, and proxies that wait for their service."""
+"""Services that switch a function on and off, and service proxies that wait for their service."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -10,14 +10,17 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 from custom_ros_tools.errors import InterfaceError
 
 PATIENCE_S = 5.0
-"""Time of waiting after which it is reported [s]."""
+"""Time after which a wait for a service is reported with a warning [s]."""
 Handler = Callable[[], tuple[bool, str]]
 
 
 class Toggle:
-    """Stores whether a function is on; refuses to switch it to its present state.
+    """Switches a function of a node on and off, and refuses to switch it to its present state. Thread-safe.
 
-    `start` switches it on and `stop` off; `name` is its name in messages.
+    Args:
+        name: Name of the function in messages.
+        start: Called to switch the function on.
+        stop: Called to switch the function off.
     """
 
     def __init__(self, name: str, start: Callable[[], None], stop: Callable[[], None]) -> None:
@@ -26,11 +29,11 @@ class Toggle:
         self._lock = threading.Lock()
 
     def on(self) -> tuple[bool, str]:
-        """Switches it on; returns whether that changed anything, and a message."""
+        """Switches the function on; returns whether it was off before, and a message."""
         return self._switch(True, self._start, "on")
 
     def off(self) -> tuple[bool, str]:
-        """Switches it off; returns whether that changed anything, and a message."""
+        """Switches the function off; returns whether it was on before, and a message."""
         return self._switch(False, self._stop, "off")
 
     def _switch(self, to: bool, act: Callable[[], None], word: str) -> tuple[bool, str]:
@@ -45,14 +48,16 @@ class Toggle:
 def get_srv_handler(
     srv_name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
 ) -> rospy.ServiceProxy:
-    """Waits until a service is available, without a time limit, and returns its proxy.
+    """Waits until a service is available, without a time limit, and returns a proxy for the service.
 
     Args:
-        persistent: Whether to keep one connection open, which is faster and ends with the server.
+        srv_name: Name of the service.
+        srv_type: Type of the service.
+        persistent: Whether to keep one connection open. This is faster, but the proxy fails if the server restarts.
         headers: Further headers of the connection.
 
     Raises:
-        rospy.ROSInterruptException: If ROS shuts down meanwhile.
+        rospy.ROSInterruptException: If ROS shuts down during the wait.
     """
     try:
         rospy.wait_for_service(srv_name, timeout=PATIENCE_S)
@@ -65,15 +70,28 @@ def get_srv_handler(
 
 
 def get_srv_handlers(srvs: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
-    """Does the same for several services; `srvs` has their types by name; returns the proxies by name."""
+    """Waits for several services, see `get_srv_handler`.
+
+    Args:
+        srvs: Types of the services, by service name.
+        persistent: Whether to keep the connections open.
+
+    Returns:
+        The proxies, by service name.
+    """
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in srvs.items()}
 
 
 def call_service(name: str, srv_type: type, *arguments: object) -> Any:
-    """Calls a service once it is available, and returns its answer.
+    """Waits until a service is available, calls it once, and returns the response.
+
+    Args:
+        name: Name of the service.
+        srv_type: Type of the service; the response must have the fields `success` and `message`.
+        arguments: Fields of the request.
 
     Raises:
-        InterfaceError: If the answer reports a failure.
+        InterfaceError: If `success` is false in the response.
     """
     answer = get_srv_handler(name, srv_type)(*arguments)
     if not answer.success:
@@ -82,12 +100,12 @@ def call_service(name: str, srv_type: type, *arguments: object) -> Any:
 
 
 class ToggleService(rospy.Service):
-    """A std_srvs/SetBool service.
+    """A std_srvs/SetBool service that calls one function for true, and another function for false.
 
     Args:
-        name: Its name.
-        enable_handler: Called on true; returns success and a message, which are the answer.
-        disable_handler: The same on false.
+        name: Name of the service.
+        enable_handler: Function for true; returns the fields of the response, success and message.
+        disable_handler: Function for false; returns the fields of the response, success and message.
         options: Options of `rospy.Service`, such as `error_handler`.
     """
 
@@ -96,6 +114,6 @@ class ToggleService(rospy.Service):
         super().__init__(name, SetBool, self.toggle, **options)
 
     def toggle(self, req: SetBoolRequest) -> SetBoolResponse:
-        """Answers a request, which may come from Python code, too."""
+        """Handles a request of the service; Python code can call this method directly, too."""
         success, message = self._enable() if req.data else self._disable()
         return SetBoolResponse(success, message)

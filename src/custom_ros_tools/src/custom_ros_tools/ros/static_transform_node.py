@@ -1,4 +1,4 @@
-"""The node `resettable_static_transform_publisher`: a fixed transform that a service replaces."""
+"""The node `resettable_static_transform_publisher`: publishes a fixed transform, which a service can replace."""
 
 import sys
 
@@ -18,10 +18,10 @@ NAME = "resettable_static_transform_publisher"
 
 
 class StaticTransformNode:
-    """Repeats a transform on /tf; `reset_tf` sets another one.
+    """Publishes a transform on /tf at a fixed rate. The service `reset_tf` replaces the transform.
 
     Raises:
-        ConfigError: If arguments or parameters are wrong.
+        ConfigError: If arguments or parameters are invalid.
     """
 
     def __init__(self) -> None:

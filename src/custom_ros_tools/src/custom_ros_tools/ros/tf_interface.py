@@ -1,4 +1,4 @@
-"""TF in one object (broadcast, look up, wait, convert), and a listener that drops transforms that crash tf2."""
+"""`TfInterface`, which broadcasts, reads and converts transforms, and a TF listener that rejects invalid transforms."""
 
 import math
 import time
@@ -18,22 +18,22 @@ from .transform_messages import position_in, quat_in, transform_message
 
 QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01
-"""Largest deviation of the square of a quaternion's length from 1, as in tf2; transforms beyond it are dropped."""
+"""Largest deviation of a quaternion's squared length from 1, as in tf2. Other transforms are rejected."""
 END_OF_TIME_S = 2**31
-"""Stamp from which on tf2's C++ part reads invalid memory, which crashes the process [s]."""
+"""Transforms with this stamp or a later one are rejected, since tf2 would read invalid memory and crash [s]."""
 NS_PER_S = 1_000_000_000
 NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 POLL_S = 0.01
 
 
 class TfListener:
-    """Stores transforms of /tf and /tf_static in a buffer, like `tf2_ros.TransformListener`, but checks them.
+    """Stores transforms from /tf and /tf_static in a buffer, like `tf2_ros.TransformListener`, but checks them first.
 
-    tf2 rejects most invalid transforms, but prints two lines on the console each time; some of them crash the process.
+    Without the check, some invalid transforms crash the process in tf2. For all others, tf2 prints two lines each time.
 
     Args:
         buffer: The buffer.
-        noted: Called with the child frame of each stored transform.
+        noted: Function that is called with the child frame of each stored transform.
     """
 
     def __init__(self, buffer: tf2_ros.Buffer, noted: Callable[[str], None] = lambda _: None) -> None:
@@ -45,7 +45,7 @@ class TfListener:
         ]
 
     def unregister(self) -> None:
-        """Stops listening."""
+        """Unsubscribes from /tf and /tf_static."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 
@@ -61,14 +61,14 @@ class TfListener:
 
 
 def fault_in(transform: TransformStamped) -> str | None:
-    """Returns a description of the fault in a transform, None if it is valid."""
+    """Checks a transform; returns a description of its first fault, or None if the transform is valid."""
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     position, quat, stamp = transform.transform.translation, transform.transform.rotation, transform.header.stamp
     if not parent or not child or parent == child:
         return f"expected two frames, got '{parent}' and '{child}'"
     if not 0 <= stamp.secs + stamp.nsecs // NS_PER_S < END_OF_TIME_S:
         return f"expected a stamp before {END_OF_TIME_S} s, got {stamp.secs} s and {stamp.nsecs} ns"
-    # A sum is finite only if all of its parts are, unless they are far beyond any scene.
+    # A sum is finite only if all parts are finite. It may overflow for huge finite parts, which are invalid anyway.
     if not math.isfinite(position.x + position.y + position.z):
         return f"expected a finite translation, got {position.x:g}, {position.y:g}, {position.z:g}"
     norm = quat.x * quat.x + quat.y * quat.y + quat.z * quat.z + quat.w * quat.w
@@ -78,10 +78,11 @@ def fault_in(transform: TransformStamped) -> str | None:
 
 
 class TfInterface:
-    """Broadcasts transforms and listens to them.
+    """Broadcasts and receives TF transforms.
 
-    A transform from parent to child is the pose of the child expressed in the parent: position [m] and quaternion
-    x, y, z, w. Create one object per node, after `rospy.init_node`; it does not have transforms that were sent earlier.
+    A transform from parent to child is the pose of the child in the parent frame: position [m] and quaternion
+    x, y, z, w. Create one object per node, after `rospy.init_node`. The object does not know transforms that were sent
+    on /tf before.
     """
 
     def __init__(self) -> None:
@@ -97,37 +98,51 @@ class TfInterface:
         orientation: ArrayLike = NO_ROTATION,
         eul_deg: bool = False,
     ) -> None:
-        """Broadcasts a transform; `orientation` is `rot` of `pack_tf_msg`, which explains the arguments."""
+        """Broadcasts a transform with the present time as stamp.
+
+        Args:
+            parent_frame_id: Name of the parent frame.
+            child_frame_id: Name of the child frame.
+            pos: Position x, y, z of the child in the parent [m].
+            orientation: Orientation of the child in the parent: quaternion x, y, z, w, or roll, pitch, yaw.
+            eul_deg: Whether roll, pitch, yaw are in degrees instead of radians.
+        """
         self.tf_broadcaster.sendTransform(self.pack_tf_msg(parent_frame_id, child_frame_id, pos, orientation, eul_deg))
 
     def set_matrix(self, parent_frame_id: str, child_frame_id: str, T: ArrayLike) -> None:
-        """Broadcasts a transform given as homogeneous matrix, shape (4, 4).
+        """Broadcasts a transform that is given as a homogeneous matrix, shape (4, 4).
 
         Raises:
-            ValueError: If it is no rigid transform.
+            ValueError: If the matrix is not a rigid transform.
         """
         self.set_tf(parent_frame_id, child_frame_id, *pose_of(T))
 
     def get_tf_msg(self, parent_frame_id: str, child_frame_id: str) -> TransformStamped | None:
-        """Returns the newest transform, None if there is none."""
+        """Returns the newest transform; None if TF does not have the transform."""
         try:
             return self.tf_buffer.lookup_transform(parent_frame_id.strip("/"), child_frame_id.strip("/"), rospy.Time(0))
         except tf2_ros.TransformException:
             return None
 
     def get_tf(self, parent_frame_id: str, child_frame_id: str) -> tuple[Array, Array] | tuple[None, None]:
-        """Returns position and quaternion of the newest transform, (None, None) if there is none."""
+        """Returns position [m] and quaternion x, y, z, w of the newest transform; (None, None) if TF lacks it."""
         return _pose(self.get_tf_msg(parent_frame_id, child_frame_id))
 
     def wait_for_tf_msg(
         self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None
     ) -> TransformStamped | None:
-        """Waits until there is a transform and returns the newest, None if there was none in time.
+        """Waits until TF has a transform, and returns the newest.
 
-        `timeout` is in wall time [s]; None waits forever.
+        Args:
+            parent_frame_id: Name of the parent frame.
+            child_frame_id: Name of the child frame.
+            timeout: Longest time to wait, in wall time [s]; None waits without limit.
+
+        Returns:
+            The transform; None if TF does not have it in time.
 
         Raises:
-            rospy.ROSInterruptException: If ROS shuts down meanwhile.
+            rospy.ROSInterruptException: If ROS shuts down during the wait.
         """
         start_s = time.monotonic()
         while not rospy.is_shutdown():
@@ -142,7 +157,7 @@ class TfInterface:
     def wait_for_tf(
         self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None
     ) -> tuple[Array, Array] | tuple[None, None]:
-        """Waits as `wait_for_tf_msg` does; returns position and quaternion, (None, None) if there was none in time."""
+        """Waits like `wait_for_tf_msg`, and returns position [m] and quaternion x, y, z, w; (None, None) at timeout."""
         return _pose(self.wait_for_tf_msg(parent_frame_id, child_frame_id, timeout))
 
     @staticmethod
@@ -153,15 +168,17 @@ class TfInterface:
         rot: ArrayLike = NO_ROTATION,
         eul_deg: bool = False,
     ) -> TransformStamped:
-        """Returns a transform from parent to child with the present stamp.
+        """Makes a transform message with the present time as stamp.
 
         Args:
-            pos: Position x, y, z [m].
-            rot: Quaternion x, y, z, w, or roll, pitch, yaw.
-            eul_deg: Whether roll, pitch, yaw are in degrees rather than radians.
+            parent_frame_id: Name of the parent frame.
+            child_frame_id: Name of the child frame.
+            pos: Position x, y, z of the child in the parent [m].
+            rot: Orientation of the child in the parent: quaternion x, y, z, w, or roll, pitch, yaw.
+            eul_deg: Whether roll, pitch, yaw are in degrees instead of radians.
 
         Raises:
-            ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
+            ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
         """
         message = TransformStamped(child_frame_id=child_frame_id, transform=transform_message(pos, rot, eul_deg))
         message.header.frame_id = parent_frame_id
@@ -170,7 +187,7 @@ class TfInterface:
 
     @staticmethod
     def pack_tf(pos: ArrayLike, rot: ArrayLike = NO_ROTATION, eul_deg: bool = False) -> Transform:
-        """Returns a transform without frames; for the arguments see `pack_tf_msg`."""
+        """Makes a Transform message, which has neither frames nor stamp; for the arguments see `pack_tf_msg`."""
         return transform_message(pos, rot, eul_deg)
 
     @staticmethod
@@ -190,7 +207,7 @@ class TfInterface:
 
     @staticmethod
     def tf_msg_to_pos_magnitude(msg: Transform) -> float:
-        """Returns the distance [m] of a Transform."""
+        """Returns the length of the translation in a Transform [m]."""
         return float(np.linalg.norm(position_in(msg)))
 
     @staticmethod
@@ -210,7 +227,7 @@ class TfInterface:
 
     @staticmethod
     def msg_to_pos_magnitude(msg: TransformStamped) -> float:
-        """Returns the distance [m] of a TransformStamped."""
+        """Returns the length of the translation in a TransformStamped [m]."""
         return TfInterface.tf_msg_to_pos_magnitude(msg.transform)
 
     @staticmethod
@@ -225,12 +242,12 @@ class TfInterface:
 
     @staticmethod
     def msg_to_matrix(msg: TransformStamped) -> Array:
-        """Returns the homogeneous matrix, shape (4, 4), of a TransformStamped."""
+        """Converts a TransformStamped to a homogeneous matrix, shape (4, 4)."""
         return matrix_of(position_in(msg.transform), quat_in(msg.transform))
 
     @staticmethod
     def pos_quat_to_matrix(pos: ArrayLike, quat: ArrayLike = NO_ROTATION) -> Array:
-        """Returns the homogeneous matrix, shape (4, 4), of a position [m] and a quaternion x, y, z, w."""
+        """Converts a position [m] and a quaternion x, y, z, w to a homogeneous matrix, shape (4, 4)."""
         return matrix_of(pos, quat)
 
 

@@ -1,4 +1,4 @@
-"""Transforms as messages: conversions from and to vectors, and a topic that repeats one on /tf."""
+"""Converts transform messages to and from vectors, and publishes a transform on /tf repeatedly."""
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
@@ -9,44 +9,51 @@ from custom_ros_tools.transforms import Array, finite_vector, quat_of, unit_quat
 
 
 def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool = False) -> Transform:
-    """Returns a message.
+    """Makes a Transform message.
 
     Args:
-        position: x, y, z [m].
+        position: Position x, y, z [m].
         orientation: Quaternion x, y, z, w, or roll, pitch, yaw.
-        in_deg: Whether roll, pitch, yaw are in degrees rather than radians.
+        in_deg: Whether roll, pitch, yaw are in degrees instead of radians.
 
     Raises:
-        ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
+        ValueError: If a length is wrong, a number is not finite, or the quaternion is zero.
     """
     translation = Vector3(*finite_vector(position, 3, "position").tolist())
     return Transform(translation, Quaternion(*quat_of(orientation, in_deg).tolist()))
 
 
 def position_in(transform: Transform) -> Array:
-    """Returns the translation x, y, z [m]; raises a ValueError if a number is not finite."""
+    """Returns the translation x, y, z of a message [m]; raises a ValueError if a number is not finite."""
     v = transform.translation
     return finite_vector((v.x, v.y, v.z), 3, "position")
 
 
 def quat_in(transform: Transform) -> Array:
-    """Returns the rotation as a unit quaternion x, y, z, w; raises a ValueError if it is zero or not finite."""
+    """Returns the rotation of a message as a unit quaternion x, y, z, w.
+
+    Raises:
+        ValueError: If the quaternion is zero, or a number is not finite.
+    """
     q = transform.rotation
     return unit_quat((q.x, q.y, q.z, q.w))
 
 
 def as_pose(transform: Transform) -> Pose:
-    """Returns the transform as a pose message."""
+    """Converts a Transform message to a Pose message."""
     v = transform.translation
     return Pose(Point(v.x, v.y, v.z), transform.rotation)
 
 
 class TransformTopic:
-    """Sends the transform between two frames to /tf with the present stamp, unless neither transform nor stamp has
-    changed.
+    """Publishes the transform between two frames on /tf, with the present ROS time as stamp.
 
-    While simulated time is stopped, a repeated stamp would make each listener warn. New subscribers get the last
-    message, since the topic is latched.
+    A message that equals the last message is not published, since a repeated stamp makes TF listeners log warnings.
+    This happens while simulated time is stopped. The topic is latched, so that new subscribers get the last message.
+
+    Args:
+        parent: Name of the parent frame.
+        child: Name of the child frame.
     """
 
     def __init__(self, parent: str, child: str) -> None:
@@ -55,7 +62,7 @@ class TransformTopic:
         self._publisher = rospy.Publisher("/tf", TFMessage, latch=True, queue_size=10)
 
     def send(self, transform: Transform) -> rospy.Time:
-        """Sends the present pose of the child in the parent, and returns its stamp."""
+        """Publishes the pose of the child in the parent, see above, and returns the stamp of the message."""
         message = TransformStamped(child_frame_id=self._child, transform=transform)
         message.header.frame_id = self._parent
         message.header.stamp = rospy.Time.now()

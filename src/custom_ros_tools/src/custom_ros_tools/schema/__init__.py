@@ -1,6 +1,6 @@
-"""Strict configuration models: one base class, and the number and text types of YAML files.
+"""Base class of strict configuration models, and types for numbers and texts in YAML files.
 
-A model states its keys, units and limits once; validation, error messages and the JSON Schema follow from it.
+A model declares keys, units and limits once. Validation, error messages and the JSON Schema are derived from the model.
 """
 
 import copy
@@ -29,9 +29,9 @@ _FRAME_ID = r"[^\s/](\S*[^\s/])?"
 
 
 class ConfigModel(BaseModel):
-    """Base of all configuration: immutable, picklable, no unknown keys, no silent conversion.
+    """Base class of all configuration models, which are immutable and picklable, and reject unknown keys.
 
-    A whole number is accepted for a number and a list for a tuple; nothing else is converted.
+    A whole number is accepted for a number, and a list for a tuple. All other values of wrong types are rejected.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
@@ -41,12 +41,12 @@ class ConfigModel(BaseModel):
         """Validates the content of a file.
 
         Args:
-            data: The mapping; it is neither changed nor stored.
-            file: Name of the file, for messages; `"~config"` when it came from the parameter server.
+            data: Content of the file, which is copied.
+            file: Name of the file, for messages; `"~config"` for a configuration from the parameter server.
             context: Further entries of `info.context` for validators, such as the folders to search.
 
         Raises:
-            ConfigError: With one `Problem` for each fault.
+            ConfigError: If the content is invalid; the error has a `Problem` for each fault.
         """
         if not isinstance(data, Mapping):
             got = "nothing" if data is None else type(data).__name__
@@ -94,7 +94,7 @@ def _one_as_list(given: Any) -> Any:
 
 
 def _within(largest: float, unit: str = "") -> AfterValidator:
-    """Returns a validator that rejects numbers beyond a largest magnitude."""
+    """Makes a validator that rejects numbers whose magnitude exceeds `largest`; `unit` is for the message."""
 
     def check(value: Any) -> Any:
         for number in value if isinstance(value, tuple) else (value,):
@@ -107,7 +107,7 @@ def _within(largest: float, unit: str = "") -> AfterValidator:
 
 
 MAX_COORDINATE_M = 1e6
-"""Largest coordinate [m]; beyond it a body would not stay finite."""
+"""Largest magnitude of a coordinate [m]. With larger coordinates, a body's state may become infinite."""
 HEAVIEST_KG = 1e9
 _MAX_NUMBER, _MAX_COUNT = 1e12, 2**31 - 1
 
@@ -130,15 +130,15 @@ Degrees = Annotated[float, Unit("deg")]
 Vec3 = Annotated[tuple[float, float, float], Field(strict=False), _within(MAX_COORDINATE_M)]
 Position = Annotated[Vec3, Unit("m")]
 Direction = Annotated[Vec3, AfterValidator(_direction)]
-"""A direction of any length but zero."""
+"""A direction vector x, y, z of any length but zero."""
 Quat = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit_quaternion)]
-"""A rotation as x, y, z, w; any length but zero, normalised."""
+"""A quaternion x, y, z, w, which is normalised; its length must not be zero."""
 Rgba = Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)]
 Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
-"""A list of any length, kept as a tuple: `ListOf[float]`."""
+"""A list of any length, such as `ListOf[float]`, which is stored as a tuple."""
 OneAsList = BeforeValidator(_one_as_list)
-"""A list; a single number counts as a list of one."""
+"""Validator for lists that converts a single number to a list with one item."""
 
 Switch = Annotated[
     bool,

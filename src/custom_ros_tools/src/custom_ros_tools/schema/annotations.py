@@ -1,4 +1,4 @@
-"""Annotations for the fields of a configuration model, in addition to pydantic's own."""
+"""Annotations for fields of configuration models, in addition to pydantic's annotations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from custom_ros_tools.errors import Problem
 
 
 def optional(description: str) -> Any:
-    """Returns the field of an optional key, whose default is None."""
+    """Makes the field of an optional key, with the default None."""
     return Field(None, description=description)
 
 
 @dataclass(frozen=True)
 class _Keyword:
-    """Annotation that adds a text to the JSON Schema, under a keyword of ours."""
+    """Base class of annotations that add a text to the JSON Schema, under a keyword of this workspace."""
 
     text: str
     keyword: ClassVar[str]
@@ -33,14 +33,14 @@ class Unit(_Keyword):
 
 
 class Expects(_Keyword):
-    """Describes the expected value in words, where its type does not; for items of a list, the expected list."""
+    """Describes the expected value in words, if its type does not. For items of a list, describes the whole list."""
 
     keyword = "expects"
 
 
 @dataclass(frozen=True, eq=False)  # typing requires a hash, which a mapping lacks
 class AlsoTakes:
-    """Annotation with the JSON Schema of further values that a validator accepts, in addition to the type itself."""
+    """Annotation with the JSON Schema of values that a validator accepts in addition to values of the field's type."""
 
     schema: Mapping[str, Any]
 
@@ -50,8 +50,8 @@ class AlsoTakes:
 
 @dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """Raised by a validator for a value that has a model of its own; the keys of the problems are relative to the
-    value.
+    """A validator has validated a value with another model, and found faults. The keys of `problems` are relative to
+    the value.
     """
 
     problems: Sequence[Problem]
@@ -59,7 +59,12 @@ class InnerProblemsError(ValueError):
 
 @dataclass(eq=False)
 class KeyedError(ValueError):
-    """Raised by a validator of a whole model to report one of its keys, or a key path inside of it."""
+    """A validator of a whole model has found a fault in one key.
+
+    Attributes:
+        key: The key, or a key path such as `primitive.type`, relative to the model.
+        message: Description of the fault.
+    """
 
     key: str
     message: str

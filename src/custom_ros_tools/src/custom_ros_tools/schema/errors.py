@@ -1,4 +1,4 @@
-"""Translation of pydantic's errors to `Problem`s that name the key, the unit and the expected value."""
+"""Translates pydantic's errors to `Problem`s, which name the key, the unit and the expected value."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -14,7 +14,7 @@ from .json_schema import Schema, json_schema, mapping_in, resolved, unit_in
 from .type_names import TYPE_NAMES, number_advice, shown, type_name
 
 MAX_PROBLEMS = 100
-"""Largest number of reported problems per file; the search for similar keys is slow."""
+"""Largest number of reported problems per file, since the search for similar keys is slow."""
 _LENGTH_ERRORS = ("missing", "too_long", "too_short")
 _RULES = {
     "greater_than": "must be > {gt:g}",
@@ -31,11 +31,19 @@ _RULES = {
         ("dict_type", "model_type", "model_attributes_type", "mapping_type"), f"expected {TYPE_NAMES['object']}"
     ),
 }
-"""Description of the expected value by the kind of pydantic's error, whose context has the bounds."""
+"""Description of the expected value, by the type of pydantic's error. Names in braces are keys of the error's context.
+"""
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
-    """Translates pydantic's errors for the data of a file and a model."""
+    """Translates the errors of a failed validation to problems.
+
+    Args:
+        error: pydantic's error.
+        model: The model.
+        data: The validated data.
+        file: Name of the file, for messages.
+    """
     problems = []
     all_details = error.errors(include_url=False)
     for details in all_details[:MAX_PROBLEMS]:
@@ -47,11 +55,11 @@ def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[st
             problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
     if len(all_details) > MAX_PROBLEMS:
         problems.append(Problem(file, "", f"and {len(all_details) - MAX_PROBLEMS} more problems"))
-    return list(dict.fromkeys(problems))  # equal except for pydantic's additions to the location
+    return list(dict.fromkeys(problems))  # alternatives of a union may give equal problems
 
 
 def key_path(loc: Sequence[str | int]) -> str:
-    """Returns a location as `intrinsics.range[1]`."""
+    """Converts a location to a key path such as `intrinsics.range[1]`."""
     text = ""
     for part in loc:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -63,7 +71,7 @@ def _joined(outer: str, inner: str) -> str:
 
 
 def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
-    """Returns the location without the labels that pydantic adds for unions, validators and dict keys."""
+    """Returns an error's location in the data, without the labels that pydantic adds for unions and validators."""
     kept: list[str | int] = []
     here: Any = data
     for part in details["loc"]:
@@ -83,7 +91,7 @@ def _schema_of(model: type[BaseModel]) -> Schema:
 
 
 def _property_at(root: Schema, loc: Sequence[str | int]) -> Schema | None:
-    """Returns the schema of the innermost key in the path of a location; None if a key is unknown."""
+    """Returns the schema of the last key in a location; None if a key is unknown."""
     found, here = None, root
     for part in loc:
         mapping = mapping_in(here, root)
@@ -96,7 +104,13 @@ def _property_at(root: Schema, loc: Sequence[str | int]) -> Schema | None:
 
 
 def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) -> tuple[str, str]:
-    """Returns key path and message of one error."""
+    """Returns key path and message for one of pydantic's errors.
+
+    Args:
+        details: The error.
+        loc: Location of the error in the data.
+        root: JSON Schema of the file.
+    """
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     wanted = _property_at(root, loc)
     unit = f" [{unit_in(wanted)}]" if wanted and unit_in(wanted) else ""
@@ -118,7 +132,7 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
 
 
 def _expected(wanted: Schema | None, depth: int = 0) -> str:
-    """Describes the value of a key, or at depth 1 the items of its list, and so on."""
+    """Describes the expected value of a key; with depth 1, the expected items of its list, and so on."""
     if wanted is None:
         return "another value"
     for _ in range(depth):
@@ -127,6 +141,6 @@ def _expected(wanted: Schema | None, depth: int = 0) -> str:
 
 
 def _siblings(root: Schema, loc: Sequence[str | int]) -> list[str]:
-    """Returns the keys that are allowed at the place of an unknown one."""
+    """Returns the keys that are allowed at the location of an unknown key."""
     mapping = mapping_in(_property_at(root, loc[:-1]) or root, root)
     return list(resolved(mapping, root)["properties"]) if mapping else []

@@ -1,9 +1,9 @@
-"""JSON Schemas of configuration models; editors check YAML by them, and error messages and reference pages use them.
+"""JSON Schemas of configuration models, for editors that check YAML, for error messages and for reference pages.
 
-The dialect is draft-07, the newest that yaml-language-server understands. In addition, `unit` states units, `kind`
-families of constants, and `expects` describes the expected value in words. Models inside models are references to
-`$defs`; a description next to a reference is that of the key. The first alternative of an `anyOf` is the usual form;
-the others are accepted, too.
+The dialect is draft-07, the newest dialect that yaml-language-server supports. Three keywords are added: `unit` is the
+unit of a number, `kind` is the name of a family of constants, and `expects` describes the expected value in words. A
+model inside another model is a reference to `$defs`; a description next to the reference describes the key. In an
+`anyOf`, the first alternative is the usual form, and the other alternatives are accepted as well.
 """
 
 import json
@@ -21,13 +21,13 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 DEFINITIONS = "$defs"
 NULL: Schema = {"type": "null"}
 _FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
-"""Keywords that restrict values of whatever type."""
+"""JSON Schema keywords that restrict values of all types."""
 
 
 class EditorSchema(GenerateJsonSchema):
-    """pydantic's generator, in draft-07 and without entries that are useless in editors."""
+    """pydantic's schema generator, adapted to draft-07, without entries that are useless in editors."""
 
-    # constraints that no schema can express are checked by the model
+    # the model itself checks constraints that a schema cannot express
     ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}
 
     def field_title_should_be_set(self, schema: Any) -> bool:
@@ -39,7 +39,7 @@ class EditorSchema(GenerateJsonSchema):
         return result
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
-        """Drops a default that only means that the key is optional; editors would insert it."""
+        """Leaves out the default None, and defaults that are mappings, since editors would insert them."""
         result = super().default_schema(schema)
         if result.get("default") is None or isinstance(result["default"], dict):
             result.pop("default", None)
@@ -56,7 +56,10 @@ class EditorSchema(GenerateJsonSchema):
         return self.get_union_of_schemas([self.generate_inner(choice) for choice in schema["choices"].values()])
 
     def get_union_of_schemas(self, schemas: list[Schema]) -> Schema:
-        """Merges schemas of different types into one: a keyword of draft-07 restricts values of one type only."""
+        """Merges alternatives into one schema if their types and keywords differ; otherwise makes an `anyOf`.
+
+        Merging is possible because each keyword of draft-07 restricts values of one type only.
+        """
         types = [kind for each in schemas for kind in types_in(each)]
         keywords = [key for each in schemas for key in each if key != "type"]
         is_clear = all(map(types_in, schemas)) and not _FOR_ALL_TYPES.intersection(keywords)
@@ -70,14 +73,24 @@ class EditorSchema(GenerateJsonSchema):
 
 
 def json_schema(model: type[BaseModel], title: str) -> Schema:
-    """Returns the schema of a YAML file that is validated with a model; `title` names the kind of file, such as
-    `"robot"`.
+    """Generates the JSON Schema of a YAML file.
+
+    Args:
+        model: Model with which the file is validated.
+        title: Name for the kind of file, such as `"robot"`.
     """
     return json_schemas({title: model})[title]
 
 
 def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
-    """Returns the schemas of several YAML files, by title, in which the same mapping has the same name."""
+    """Generates the JSON Schemas of several kinds of YAML files; a model has the same name in all schemas.
+
+    Args:
+        models: Model of each kind of file, by title.
+
+    Returns:
+        The schemas, by title.
+    """
     mode: JsonSchemaMode = "validation"
     inputs = [(model, mode) for model in dict.fromkeys(models.values())]
     references, common = models_json_schema(inputs, schema_generator=EditorSchema)
@@ -89,7 +102,7 @@ def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
 
 
 def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Returns a self-contained schema, with the definitions that it refers to."""
+    """Adds to a schema all definitions that it refers to, directly or indirectly, and returns the new schema."""
     content = {key: value for key, value in schema.items() if key != DEFINITIONS}
     found: dict[str, Schema] = {}
     waiting = [*references_in(content)]
@@ -102,7 +115,7 @@ def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schem
 
 
 def references_in(value: Any) -> Iterator[str]:
-    """Yields the names of the referenced definitions anywhere in a schema."""
+    """Yields the names of all definitions that a schema refers to directly."""
     if isinstance(value, dict):
         if "$ref" in value:
             yield name_of(value)
@@ -112,20 +125,29 @@ def references_in(value: Any) -> Iterator[str]:
 
 
 def name_of(reference: Schema) -> str:
-    """Returns the name of the definition that a schema refers to."""
+    """Returns the name of the definition in a reference, `{"$ref": ...}`."""
     return str(reference["$ref"]).rsplit("/", 1)[-1]
 
 
 def resolved(schema: Schema, root: Schema) -> Schema:
-    """Returns a schema, or the definition in `root`, the schema of the file, that it refers to."""
+    """Follows a reference: returns the definition that `schema` refers to; other schemas are returned unchanged.
+
+    Args:
+        schema: The schema or reference.
+        root: Schema of the file, which has the definitions.
+    """
     return dict(root[DEFINITIONS][name_of(schema)]) if "$ref" in schema else schema
 
 
 def mapping_in(schema: Schema, root: Schema) -> Schema | None:
-    """Returns the schema of the mapping that describes a value, or each item of a list; None if the value is no
-    mapping.
+    """Returns the schema of a mapping that a key's value may be, or that the items of its list may be.
 
-    It may be a reference to the definitions in `root`, the schema of the file.
+    Args:
+        schema: Schema of the value.
+        root: Schema of the file, which has the definitions.
+
+    Returns:
+        The schema, which may be a reference; None if the value cannot be a mapping or a list of mappings.
     """
     for each in (schema, *schema.get("anyOf", ())):
         if "properties" in resolved(each, root):
@@ -135,13 +157,13 @@ def mapping_in(schema: Schema, root: Schema) -> Schema | None:
 
 
 def types_in(schema: Schema) -> list[str]:
-    """Returns the JSON types that a schema names."""
+    """Returns the JSON types that a schema allows, as far as it names them."""
     kinds = schema.get("type", [])
     return [kinds] if isinstance(kinds, str) else list(kinds)
 
 
 def unit_in(schema: Schema) -> str | None:
-    """Returns the unit of a value, or of the numbers in it; None if it has none."""
+    """Returns the unit of a value, or of the numbers inside the value; None for values without unit."""
     if "unit" in schema:
         return str(schema["unit"])
     inner = [*schema.get("anyOf", ()), *(schema.get(key) for key in ("items", "additionalProperties"))]
@@ -149,10 +171,10 @@ def unit_in(schema: Schema) -> str | None:
 
 
 def explained(value: Any) -> Any:
-    """Returns a schema whose descriptions end with unit and default, since editors show only descriptions.
+    """Returns a schema in which units and defaults are appended to the descriptions, since editors only show these.
 
-    The description of a key is also added to its alternatives with references; otherwise editors show the mapping's
-    description.
+    The description of a key is also added to alternatives that are references. Otherwise editors would show the
+    description of the referenced mapping instead.
     """
     if isinstance(value, list):
         return [explained(each) for each in value]
@@ -170,7 +192,7 @@ def explained(value: Any) -> Any:
 
 
 def yaml_text(value: Any) -> str:
-    """Returns plain data as it would be written in a line of YAML."""
+    """Formats plain data in one line, as in YAML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e6:
@@ -183,10 +205,15 @@ def yaml_text(value: Any) -> str:
 
 
 def schema_texts(folder: Path, by_name: Mapping[str, Schema]) -> dict[Path, str]:
-    """Returns the text of the file of each schema by its path in a folder."""
+    """Returns the texts of schema files by path.
+
+    Args:
+        folder: Folder of the files.
+        by_name: The schemas, by name of the file without extension.
+    """
     return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in by_name.items()}
 
 
 def schema_text(schema: Schema) -> str:
-    """Returns a schema as JSON for a file."""
+    """Formats a schema as the JSON text of a file."""
     return json.dumps(schema, ensure_ascii=False, indent=1) + "\n"

@@ -1,4 +1,4 @@
-"""Descriptions of expected and of given values in words."""
+"""Describes expected values and given values in words, for error messages and reference pages."""
 
 import math
 import re
@@ -16,13 +16,13 @@ TYPE_NAMES = {
     "array": "a list",
     "object": "a mapping",
 }
-"""Words for the types of JSON."""
+"""Words for JSON types."""
 _REPR = reprlib.Repr()
-_REPR.maxlevel = 2  # aliases can make a short YAML text expand without end
+_REPR.maxlevel = 2  # with aliases, a short YAML text can expand to a huge value
 
 
 def shown(value: Any) -> str:
-    """Returns a value as the user would have written it in YAML, shortened."""
+    """Formats a value about as in YAML, cut to at most 80 characters."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -39,11 +39,12 @@ def shown(value: Any) -> str:
 
 
 def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> str:
-    """Returns a description of the value that a JSON Schema expects, such as `a list of 3 numbers`.
+    """Describes the value that a JSON Schema expects, such as `a list of 3 numbers`.
 
     Args:
-        detailed: Whether to include bounds, and accepted forms other than the usual one.
-        plural: Whether it describes several, as in `lists of 3 numbers`.
+        schema: The schema.
+        detailed: Whether the description includes bounds, and all accepted forms instead of the usual form only.
+        plural: Whether the description is in the plural, as in `lists of 3 numbers`.
     """
     if "expects" in schema:
         return str(schema["expects"])
@@ -65,7 +66,7 @@ def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> s
 
 
 def constants_in(schema: Schema) -> list[str]:
-    """Returns the names in a family of constants."""
+    """Returns the names of the constants that a schema allows."""
     names = schema["anyOf"][0]["enum"] if "anyOf" in schema else schema["enum"]
     return [name for name in names if isinstance(name, str)]
 
@@ -99,7 +100,12 @@ def _bounds(schema: Schema) -> str:
 
 
 def number_advice(kind: str, value: Any) -> str:
-    """Returns advice where YAML read a number as text, as with 1e-3."""
+    """Returns advice for a number that YAML has read as text, such as `1e-3`; otherwise an empty text.
+
+    Args:
+        kind: Type of pydantic's error.
+        value: The given value.
+    """
     if kind not in ("float_type", "int_type") or not isinstance(value, str):
         return ""
     match = re.fullmatch(r"\s*([-+]?)(\d+|\d*\.\d*\d|\d+\.)[eE]([-+]?)(\d+)\s*", value)

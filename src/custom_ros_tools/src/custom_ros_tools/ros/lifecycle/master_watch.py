@@ -1,4 +1,4 @@
-"""Keeps a node registered when the ROS master restarts with an empty registry."""
+"""Registers a node again when the ROS master has restarted and lost its registrations."""
 
 import contextlib
 import threading
@@ -20,17 +20,17 @@ _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 
 
 class Registrations:
-    """Registers the topics and services of this node, instead of rospy's own code.
+    """Registers the topics and services of this node with the ROS master, in place of rospy's own code.
 
-    rospy's own code blocks all topics while the master is unreachable, and never registers them again. Here, changes
-    that are made without a master are registered with the next master.
+    rospy's own code blocks all topics while the master is unreachable, and does not register them again with a
+    restarted master. This class registers changes that were made without a master as soon as a master is reachable.
 
     Args:
         registry: The node's topics and services.
-        uri: The node's master.
+        uri: Address of the master.
 
     Attributes:
-        are_complete: Whether the master has all registrations, as far as is known.
+        are_complete: False after a failed call of the master, until all registrations have been repeated.
     """
 
     def __init__(self, registry: Registry, uri: str) -> None:
@@ -42,7 +42,13 @@ class Registrations:
         registry.hand_over(self)
 
     def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
-        """Registers a topic or service; called by rospy."""
+        """Registers a topic or service with the master; called by rospy.
+
+        Args:
+            name: Name of the topic or service.
+            type_or_uri: Type of the topic, or address of the service.
+            kind: `sub`, `pub` or `srv`.
+        """
         if not self.are_complete:
             return
         try:
@@ -55,7 +61,7 @@ class Registrations:
         self._on_answer(kind, name, answer)
 
     def reg_removed(self, name: str, type_or_uri: str, kind: str) -> None:
-        """Withdraws a topic or service; called by rospy."""
+        """Unregisters a topic or service from the master; called by rospy. For the arguments see `reg_added`."""
         uri = type_or_uri if kind == "srv" else self._node_uri
         method, arguments = f"unregister{_METHODS[kind]}", (self._name, name, uri)
         try:
@@ -68,8 +74,15 @@ class Registrations:
         self._withdrawn.append((method, arguments))
 
     def repeat(self, master: Any) -> tuple[int, int]:
-        """Registers everything again, and parameters with it; returns the numbers of topics and of services."""
-        with self._registry.entries() as entries:  # topics and services do not change meanwhile
+        """Registers all topics and services again, and restores the kept parameters.
+
+        Args:
+            master: Interface of the master, see `timed_master`.
+
+        Returns:
+            Number of topics, and number of services.
+        """
+        with self._registry.entries() as entries:  # locks topics and services
             kept_parameters.restore(master)
             calls: Any = MultiCall(master)
             for method, arguments in self._withdrawn:
@@ -85,7 +98,7 @@ class Registrations:
         return len(entries) - served, served
 
     def connect_missing(self) -> None:
-        """Connects subscriptions again whose connections were lost."""
+        """Reconnects subscriptions that have lost connections to publishers."""
         self._registry.subscriptions.connect_missing()
 
     def _on_answer(self, kind: str, name: str, answer: tuple[int, str, Any]) -> None:
@@ -97,14 +110,12 @@ class Registrations:
 
 
 class MasterWatch:
-    """Checks the ROS master once a second, until the node shuts down.
+    """Checks the ROS master once a second, until the node shuts down. Create one object, after `rospy.init_node`.
 
-    A master that cannot be reached is reported; existing connections do not need it. When the master is back, all
-    topics, services and parameters of the node are registered again, since rospy does that at the start only. If
-    another node has taken the name meanwhile, this one ends, as ROS requires when a master sees both. A rospy with
-    different internals registers nothing again, which is reported at the start.
-
-    Create it once, after `rospy.init_node`.
+    If the master cannot be reached, a warning is logged; existing connections continue. When a restarted master is
+    reachable, all topics, services and parameters of the node are registered again, which rospy itself does not do. If
+    another node has registered the same name in the meantime, this node ends, as ROS requires for duplicate names. If
+    rospy has unexpected internals, nothing can be registered again, which is reported at the start.
     """
 
     def __init__(self) -> None:
@@ -118,7 +129,7 @@ class MasterWatch:
             self._process = master.getPid(self._name)[2]
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
-            # rospy contacts the master for each logged line: one that hangs would block any thread that logs
+            # rospy reads this parameter for each logged line. A hanging master would block all threads that log.
             answer_cached(LOG_PARAMETER, rospy.get_param_cached(LOG_PARAMETER, False))
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
@@ -142,7 +153,7 @@ class MasterWatch:
                 self._registrations.are_complete = False
 
     def _compare(self, master: Any) -> None:
-        """Compares the master's registrations of this node with the actual ones."""
+        """Compares the master's data about this node with the actual state, and registers again or ends the node."""
         calls: Any = MultiCall(master)
         calls.getPid(self._name)
         calls.lookupNode(self._name, self._name)
@@ -173,6 +184,6 @@ class MasterWatch:
         )
 
     def _end(self) -> None:
-        """Prevents registrations after the node has unregistered."""
+        """Prevents further registrations; called when the node shuts down."""
         with self._registering:
             self._is_over = True

@@ -1,4 +1,4 @@
-"""Log records of a node: from Python's loggers to /rosout and the console, and the last lines before it ends."""
+"""Sends log records of Python's loggers to /rosout and the console, including the last lines before a node ends."""
 
 import contextlib
 import logging
@@ -15,17 +15,17 @@ from rosgraph_msgs.msg import Log
 ROSOUT = "/rosout"
 ROSPY_LOGGER = "rosout"
 MAX_WAIT_S = 10.0
-"""Longest time to wait for subscribers of /rosout [s]; a node that has just started is not connected to them yet."""
+"""Longest time to wait until the subscribers of /rosout have connected to a node that has just started [s]."""
 MAX_LOOK_S = 1.0
-"""Longest time for connecting to a subscriber, to see whether it lives [s]."""
+"""Timeout of the test connection that shows whether a subscriber is alive [s]."""
 SENDING_S = 0.2
-"""Time for rospy to send the last lines [s]; it drops unsent lines when the process ends."""
+"""Time that rospy gets to send the last lines before the process ends [s]."""
 LOG_PARAMETER = "/rosout_disable_topics_generation"
-"""Parameter to which rospy subscribes with the first line that it logs."""
+"""Parameter to which rospy subscribes when it logs the first line."""
 
 
 class _RosHandler(logging.Handler):
-    """Hands log records to rospy."""
+    """Logging handler that passes log records to rospy's functions, such as `rospy.loginfo`."""
 
     def emit(self, record: logging.LogRecord) -> None:
         levels = (
@@ -39,9 +39,9 @@ class _RosHandler(logging.Handler):
 
 
 def attach_logging(modules: Iterable[str]) -> None:
-    """Attaches the loggers of top-level Python modules to /rosout; call it once, after `rospy.init_node`.
+    """Sends the log records of top-level Python modules to /rosout. Call it once, after `rospy.init_node`.
 
-    From then on, a console that cannot be written raises no error.
+    Afterwards, errors on writing to the console are ignored.
     """
     handler = _RosHandler(level=logging.DEBUG)
     for module in modules:
@@ -54,9 +54,9 @@ def attach_logging(modules: Iterable[str]) -> None:
 
 
 def _keep_console_from_raising() -> None:
-    """Drops log lines that cannot be written to the console, for instance on a full disk; /rosout still gets them.
+    """Makes rospy drop log lines that cannot be written to the console, for example on a full disk.
 
-    rospy would raise in the thread that logs, and so end a timer, for instance.
+    Otherwise rospy would raise an error in the thread that logs, and could end a timer. /rosout gets the lines anyway.
     """
     for handler in logging.getLogger(ROSPY_LOGGER).handlers:
         if isinstance(handler, RosStreamHandler):
@@ -72,30 +72,29 @@ def _dropping_what_cannot_be_written(emit: Callable[[logging.LogRecord], None]) 
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Returns whether a message of rospy is logged; errors of callbacks that publish on a topic closed by the shutdown
-    are not.
+    """Returns whether a log record should be logged: false for errors of callbacks while ROS shuts down.
 
-    rospy closes topics first, and only then recognises exceptions of callbacks as a consequence.
+    During the shutdown, rospy closes topics, so that callbacks that publish raise errors.
     """
     return not (rospy.core.is_shutdown_requested() and record.getMessage().startswith("bad callback"))
 
 
 def log_fatal_lines(lines: Iterable[str]) -> None:
-    """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
-    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on rospy's log
+    """Logs lines with level fatal, on the console and on /rosout, and gives rospy time to send them."""
+    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # shares the connections of rospy's publisher
     end_s = time.monotonic() + MAX_WAIT_S
     expected = _count_subscribers()
     while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
         time.sleep(0.01)
-    with contextlib.suppress(OSError):  # of a full disk
-        print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
+    with contextlib.suppress(OSError):  # for example on a full disk
+        print(file=sys.stderr)  # libraries such as PyBullet may not have ended their last line
     for line in lines:
         rospy.logfatal(line)
     time.sleep(SENDING_S)
 
 
 def _count_subscribers() -> int:
-    """Returns the number of nodes that subscribe to /rosout, according to the master; killed ones may be among them."""
+    """Returns how many nodes subscribe to /rosout and accept connections; 0 if the master cannot be reached."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         master = rosgraph.Master(rospy.get_name())
         nodes = dict(master.getSystemState()[1]).get(ROSOUT, ())

@@ -1,9 +1,9 @@
-"""The life of a node: start, wait, end; Ctrl-C ends it at any time without a hang or traceback.
+"""Starts and runs a node such that Ctrl-C ends it at any time, without a hang or traceback.
 
-rospy would shut down inside the signal handler, at any point of the program. If the interrupted code holds a lock that
-the shutdown needs, or if a thread opens or closes a topic meanwhile, the process hangs forever. SIGINT therefore stays
-blocked (see `custom_ros_tools.program`), and a thread waits for it. Child processes inherit the block; this process
-ends them.
+rospy itself shuts down inside the signal handler, at any point of the program. The process may hang forever if the
+interrupted code holds a lock that the shutdown needs, or if a thread opens or closes a topic at the same time.
+Therefore SIGINT stays blocked (see `custom_ros_tools.program`), and a thread waits for the signal. Child processes
+inherit the blocked signal, so this process has to end them.
 """
 
 import atexit
@@ -30,15 +30,15 @@ from .timed_master import address_fault, allow_large_integers
 T = TypeVar("T")
 
 MAX_FAREWELL_S = 10.0
-"""Longest time for unregistering from the ROS master [s]; it may hang or be gone."""
+"""Longest time for unregistering from the ROS master, which may hang or have ended [s]."""
 MASTER_PERIOD_S = 0.2
 INTERRUPTED_TOO_S = 1.0
-"""Largest delay between an interrupt of the node of a service and of this one, if both are interrupted [s]."""
+"""Time to wait for an interrupt after a failed service call [s]: Ctrl-C may have ended the other node first."""
 MAX_FILES = 8192
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
-    """Initialises a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
+    """Initialises a node, and makes it register again at a restarted ROS master; for the arguments see `run_node`."""
     keep_accepting()
     keep_new_connections()
     allow_large_integers()
@@ -60,19 +60,19 @@ def run_node(
     ros_time: bool = True,
     loggers: Iterable[str] = (),
 ) -> None:
-    """Runs a node until it is interrupted; a wrong configuration ends it with 1.
+    """Runs a node until it is interrupted; after an error, such as an invalid configuration, exits with 1.
 
-    The program must be one that `custom_ros_tools.program.run` runs.
+    The program must have been started with `custom_ros_tools.program.run`, which blocks SIGINT.
 
     Args:
         name: Default name of the node.
-        start: Opens topics and services. It may do the node's work until ROS shuts down, and may end with
-            `rospy.ROSInterruptException`. Its result is kept until the node ends.
-        run: Does the work with the result of `start`, until ROS shuts down; if it is given, an interrupt waits until
-            `start` has returned.
+        start: Function that opens topics and services. It may also do the node's work until ROS shuts down, and may
+            raise `rospy.ROSInterruptException`. The returned object is kept until the node ends.
+        run: Function that does the node's work until ROS shuts down, with the object that `start` returned. If `run` is
+            given, an interrupt takes effect only after `start` has returned.
         anonymous: Whether the name is made unique.
-        ros_time: Whether the node uses ROS time; otherwise it never waits for a clock.
-        loggers: Top-level Python modules whose loggers go to /rosout, in addition to that of `start`.
+        ros_time: Whether the node uses ROS time; otherwise it never waits for /clock.
+        loggers: Top-level Python modules whose log records go to /rosout, in addition to the module of `start`.
     """
     if not _wait_for_master():
         return
@@ -107,7 +107,10 @@ def run_node(
 
 
 def _wait_for_master() -> bool:
-    """Waits for a ROS master; returns False if it was interrupted. From here on, SIGTERM acts like SIGINT."""
+    """Waits for a ROS master, and returns whether it is reachable; False after an interrupt.
+
+    Also makes SIGTERM act like SIGINT.
+    """
     signal.signal(signal.SIGTERM, lambda *_: _interrupt())
     is_reported = False
     while not rosgraph.is_master_online():
@@ -121,7 +124,7 @@ def _wait_for_master() -> bool:
 
 @contextmanager
 def _leaving_ros_on_interrupt() -> Iterator[None]:
-    """Shuts ROS down on SIGINT, and in any case when the block ends, in a thread of its own."""
+    """Shuts ROS down, in a separate thread, on SIGINT or when the context ends."""
     thread = threading.Thread(target=_wait_and_leave, name="interrupts", daemon=True)
     thread.start()
     try:
@@ -132,7 +135,7 @@ def _leaving_ros_on_interrupt() -> Iterator[None]:
 
 
 def leave_ros_on_signals() -> None:
-    """Shuts ROS down on SIGINT or SIGTERM in a thread of its own, for a script that `run_node` does not run.
+    """Makes SIGINT and SIGTERM shut ROS down, in a separate thread, for scripts that do not use `run_node`.
 
     Call it in the main thread, after `rospy.init_node(..., disable_signals=True)`.
     """
@@ -155,10 +158,10 @@ def leave_ros_on_signals() -> None:
 
 
 def _leave_parameters() -> None:
-    """Unsubscribes from the parameter to which rospy subscribes with the first line that it logs.
+    """Unsubscribes from the parameter `LOG_PARAMETER`, which rospy itself does not do.
 
-    rospy itself does not. A master that still has the subscription would shut down any node that has this address when
-    the name is used again.
+    Otherwise the master keeps the subscription. When another node uses the same name later, the master would shut down
+    the node that has this node's address then.
     """
     with contextlib.suppress(OSError, rosgraph.MasterException):
         rosgraph.Master(rospy.get_name()).unsubscribeParam(rospy.get_node_uri(), LOG_PARAMETER)
@@ -174,7 +177,7 @@ def _wait_and_leave() -> None:
 
 
 def _allow_many_files() -> None:
-    """Raises the limit of open files as far as permitted; every connection of a topic needs one."""
+    """Raises the process's limit of open files up to `MAX_FILES`, since every connection of a topic needs a file."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = MAX_FILES if hard == resource.RLIM_INFINITY else min(hard, MAX_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:

@@ -1,4 +1,4 @@
-"""XML-RPC: calls to the ROS master with a time limit, large integers, this node's address, a port for a master."""
+"""Calls the ROS master with a time limit, and checks the addresses and ports that nodes and masters use."""
 
 import http.client
 import os
@@ -12,42 +12,44 @@ from xmlrpc.client import MAXINT, MININT, Error, Marshaller, ServerProxy, Transp
 import rosgraph
 
 TIMEOUT_S = 2.0
-"""Longest time for an answer of the master [s]; a healthy one takes milliseconds."""
+"""Longest time to wait for an answer of the master [s]; usually, an answer takes milliseconds."""
 MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
-"""Exceptions of its calls if the master has ended, hangs or is another program."""
+"""Exceptions of calls to the master if it has ended or hangs, or if another program uses its port."""
 
 PORTS = range(22000, 32000)
-"""Ports for masters, below those that the kernel assigns for port 0."""
+"""Ports for private masters, outside the range that the kernel assigns automatically."""
 
 
 class TimedTransport(Transport):
-    """Waits for an answer for a limited time [s]: a process that is stopped accepts connections but never answers."""
+    """XML-RPC transport with a timeout [s], since a stopped process accepts connections but never answers."""
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
         self._timeout_s = timeout_s
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Returns the connection to a host; called by the base class."""
+        """Makes a connection with the timeout; called by the base class."""
         connection = super().make_connection(host)
         connection.timeout = self._timeout_s
         return connection
 
 
 def timed_master(uri: str | None = None) -> Any:
-    """Returns the XML-RPC interface of a master, by default that of the environment, as a context that closes the
-    connection.
+    """Returns the XML-RPC interface of a ROS master, as a context that closes the connection at its end.
 
-    Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
+    Calls return (code, message, value). They raise one of `MASTER_FAILURES` if the master does not answer in time.
+
+    Args:
+        uri: Address of the master; by default ROS_MASTER_URI.
     """
     return ServerProxy(uri or rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
 
 
 def allow_large_integers() -> None:
-    """Makes XML-RPC send integers of more than 32 bits as `i8`, which Python reads, instead of raising an error.
+    """Makes Python's XML-RPC send integers with more than 32 bits, as type `i8`, instead of raising an error.
 
-    rospy counts bytes in such integers: a node that has sent more than 2 GB could no longer answer `getBusStats`, from
-    which recorders read the number of sent messages.
+    rospy counts sent bytes. Without this change, a node that has sent more than 2 GB could not answer `getBusStats`,
+    from which recorders read the number of sent messages.
     """
 
     def dump(_: Marshaller, value: int, write: Callable[[str], object]) -> None:
@@ -59,12 +61,11 @@ def allow_large_integers() -> None:
 
 
 def address_fault() -> str | None:
-    """Returns in one line why other nodes cannot, or may be unable to, reach this node by its address; None if they
-    can.
+    """Checks the address under which other nodes reach this node; returns a warning in one line, or None.
 
-    The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to belong to this computer. If the
-    master is reached through a network, it must not be a loopback address. If the master is on another computer, it has
-    to be the address from which this computer reaches it.
+    The address comes from ROS_HOSTNAME, ROS_IP or this computer's name. Three conditions are checked. The address must
+    belong to this computer. It must not be a loopback address if the master is reached through a network. If the master
+    is on another computer, it should be the address from which this computer reaches the master.
     """
     variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name)), None)
     given = rosgraph.network.get_host_name()
@@ -103,12 +104,12 @@ def _is_of_this_computer(address: str) -> bool:
 
 
 def unused_port() -> int:
-    """Returns a port for a private master.
+    """Returns a free port for a private master, chosen at random from `PORTS`.
 
-    The kernel assigns it to no program, so no other node can take it before the master does.
+    The kernel does not assign these ports automatically, so that a node cannot get the port before the master uses it.
 
     Raises:
-        OSError: If there is none.
+        OSError: If all ports are in use.
     """
     for port in random.sample(PORTS, len(PORTS)):
         with socket.socket() as probe:

@@ -1,4 +1,4 @@
-"""Timers, rates and throttled warnings by the wall clock, which also run while simulated time is stopped."""
+"""Timers, rates and throttled warnings that use wall time, so that they also work while simulated time is stopped."""
 
 import re
 import threading
@@ -9,16 +9,16 @@ from collections.abc import Callable
 import rospy
 
 MAX_KINDS = 20
-"""Default number of kinds of warnings that are distinguished for each subject."""
+"""Default of the largest number of different warnings per subject that are logged at once."""
 _NUMBER = re.compile(r"-?\d[\d.]*(e[-+]?\d+)?")
 
 
 class WallRate:
-    """Schedules events at a rate; missed ones are skipped.
+    """Schedules events at a fixed rate in wall time; missed events are skipped.
 
     Args:
-        hz: The rate [Hz]; 0 is never.
-        delay_s: Time until it is due for the first time [s].
+        hz: Rate of the events [Hz]; 0 for no events.
+        delay_s: Time until the first event [s].
     """
 
     def __init__(self, hz: float, delay_s: float = 0.0) -> None:
@@ -27,11 +27,11 @@ class WallRate:
 
     @property
     def left_s(self) -> float:
-        """Time until it is due again [s]; 0 or less if it is due."""
+        """Time until the next event [s]; 0 or less if the event is due."""
         return self._due_s - time.monotonic()
 
     def is_due(self) -> bool:
-        """Returns whether it is due; if so, it is due again a period later."""
+        """Returns whether an event is due; if so, schedules the next event one period later."""
         now_s = time.monotonic()
         if now_s < self._due_s:
             return False
@@ -39,14 +39,18 @@ class WallRate:
         return True
 
     def rest(self, duration_s: float) -> None:
-        """Postpones the next event by some time from now [s]."""
+        """Postpones the next event such that it is at least `duration_s` from now [s]."""
         self._due_s = max(self._due_s, time.monotonic() + duration_s)
 
 
 class WallTimer:
-    """Calls a function at a rate [Hz], in a thread of its own, until it is stopped or ROS shuts down.
+    """Calls a function at a fixed rate in wall time, in a separate thread, until `stop` is called or ROS shuts down.
 
-    An exception is logged, and does not prevent the next call.
+    Exceptions of the function are logged, and do not stop the timer.
+
+    Args:
+        hz: The rate [Hz].
+        action: The function.
     """
 
     def __init__(self, hz: float, action: Callable[[], None]) -> None:
@@ -57,7 +61,7 @@ class WallTimer:
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
 
     def stop(self) -> None:
-        """Prevents further calls; a running one completes."""
+        """Prevents further calls of the function; a running call completes."""
         self._ended.set()
 
     def _run(self) -> None:
@@ -66,19 +70,19 @@ class WallTimer:
                 if self._rate.is_due():
                     self._action()
             except Exception:
-                if not self._ended.is_set():  # otherwise its topics may be closed already
+                if not self._ended.is_set():  # afterwards, errors about closed topics are expected
                     self._warn(threading.current_thread().name, traceback.format_exc())
 
 
 class ThrottledWarning:
-    """Warns at once of each new kind of fault of a subject, and of known kinds at most once in a period of wall time
-    [s].
+    """Logs warnings about subjects, such as topics, and suppresses frequent repetitions.
 
-    It counts the warnings that it suppresses. Messages are of one kind if they differ in numbers alone.
+    A message of a new kind is logged at once. Other messages about the same subject are logged at most once per period;
+    suppressed messages are counted. Two messages are of the same kind if they only differ in numbers.
 
     Args:
-        period_s: The period.
-        max_kinds: Number of kinds of a subject beyond which none counts as new.
+        period_s: The period, in wall time [s].
+        max_kinds: Largest number of kinds per subject. Further kinds do not count as new.
     """
 
     def __init__(self, period_s: float = 5.0, max_kinds: int = MAX_KINDS) -> None:
@@ -88,7 +92,7 @@ class ThrottledWarning:
         self._kinds: dict[str, set[str]] = {}
 
     def __call__(self, subject: str, message: str) -> None:
-        """Warns `SUBJECT: MESSAGE`, unless it did so within the period."""
+        """Logs the warning `SUBJECT: MESSAGE`, or suppresses and counts it."""
         now_s, kind = time.monotonic(), _NUMBER.sub("#", message)
         with self._lock:
             kinds = self._kinds.setdefault(subject, set())

@@ -1,8 +1,9 @@
-"""All private parts of rospy that this workspace uses.
+"""All uses of rospy's private parts in this workspace.
 
-rospy cannot send to many subscribers from one thread without waiting, cannot register again with a restarted ROS
-master, and confuses connections. Each use is tested when a node starts. If rospy has different internals, one warning
-names the expected part, the difference and the lost function, and the node continues without it.
+They are needed because rospy cannot send to many subscribers from one thread without waiting, cannot register again
+with a restarted ROS master, and sometimes confuses connections. Each use is tested when a node starts. If rospy has
+unexpected internals, a warning names the expected part, the difference and the function that is lost. Then the node
+continues without this function.
 """
 
 from .connections import close_poller_with, keep_accepting, keep_new_connections

@@ -1,4 +1,4 @@
-"""Connections of a node's topics: accepted, kept and closed."""
+"""Changes how rospy accepts, keeps and closes the connections of a node's topics."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .expecting import expecting
 
 
 def close_poller_with(topic: rospy.topics.Topic) -> None:
-    """Closes the poller of a topic's connections, a file, with the topic.
+    """Makes rospy free the poller of a topic's connections, which holds a file, as soon as the topic is closed.
 
-    It references its own methods, so only Python's garbage collector frees it, which may run late.
+    Otherwise the poller, which references its own methods, stays until Python's garbage collector runs.
     """
-    # Without these parts, a file only stays open for a while.
+    # If rospy lacks these parts, the file only stays open longer.
     poller = getattr(getattr(topic, "impl", None), "connection_poll", None)
     for name, method in list(vars(poller).items()) if poller is not None else ():
         if getattr(method, "__self__", None) is poller:
@@ -29,12 +29,15 @@ def close_poller_with(topic: rospy.topics.Topic) -> None:
 
 def _call(method: WeakMethod, *arguments: Any) -> Any:
     bound = method()
-    assert bound is not None  # the poller under test is there
+    assert bound is not None  # the caller has a reference to the poller
     return bound(*arguments)
 
 
 def keep_accepting() -> None:
-    """Makes the node that this process becomes accept connections regardless of other clients; see `ServerSocket`."""
+    """Makes rospy use a `ServerSocket`, so that a slow client does not block other clients.
+
+    Call it before `rospy.init_node`.
+    """
 
     def wrap() -> None:
         server = import_module("rospy.impl.tcpros_base").TCPServer
@@ -49,10 +52,10 @@ def keep_accepting() -> None:
 
 
 def keep_new_connections() -> None:
-    """Makes the node that this process becomes remove only closed connections from its topics.
+    """Makes rospy remove only closed connections from topics. Call it before `rospy.init_node`.
 
-    rospy also finds a connection by its file number, which a new connection may get when an earlier one is closed. It
-    may then remove the new one instead, and its subscriber waits forever or is disconnected.
+    rospy identifies a connection by its file number. After a connection is closed, a new connection may get the same
+    number. Then rospy may remove the new connection, and its subscriber waits forever or is disconnected.
     """
 
     def wrap() -> None:
@@ -66,8 +69,8 @@ def keep_new_connections() -> None:
         def check_locked(self: Any) -> None:
             lock = self.c_lock
             if lock is not None and [*self.connection_poll.error_iter()]:
-                with lock:  # connections in here are not closed before they are removed
-                    if self.c_lock is not None:  # else the topic was closed meanwhile
+                with lock:  # while locked, connections are removed before they are closed
+                    if self.c_lock is not None:  # None if the topic was closed in the meantime
                         check(self)
 
         topic.check, topic._remove_connection = check_locked, _remove_connection
@@ -80,9 +83,12 @@ def keep_new_connections() -> None:
 
 
 def _remove_connection(topic: Any, connections: list[Any], ended: Any) -> None:
-    """Closes a connection of a topic and removes it from a list, where a queue may wrap it."""
-    if not ended.done:  # otherwise its file is closed, and the number may be that of another connection
-        with suppress(OSError, TypeError, ValueError):  # it was not polled
+    """Closes the connection `ended` of a topic, and removes it from a list.
+
+    The list may contain the connection itself, or a queue that wraps the connection.
+    """
+    if not ended.done:  # otherwise the file is closed, and another connection may have the same number
+        with suppress(OSError, TypeError, ValueError):  # the connection was not polled
             topic.connection_poll.remove_fd(ended.fileno())
         with suppress(Exception):  # as rospy does
             ended.close()

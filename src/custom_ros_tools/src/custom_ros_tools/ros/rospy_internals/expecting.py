@@ -1,4 +1,4 @@
-"""Use of private parts of rospy, with a warning where they are missing or different."""
+"""Uses private parts of rospy, and logs a warning if they are missing or different."""
 
 from __future__ import annotations
 
@@ -11,9 +11,17 @@ T = TypeVar("T")
 
 
 def expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
-    """Returns the result of using private parts; None and a warning if they are not as expected.
+    """Calls a function that uses private parts of rospy. If it raises an error, logs a warning and returns None.
 
-    While rospy shuts down, differences are ignored: its parts are in another state then.
+    While rospy shuts down, the warning is not logged, since errors are expected then.
+
+    Args:
+        expected: Words for the expected parts, for the warning.
+        loss: Words for what does not work without these parts, for the warning.
+        use: The function.
+
+    Returns:
+        Result of the function; None after an error.
     """
     try:
         return use()

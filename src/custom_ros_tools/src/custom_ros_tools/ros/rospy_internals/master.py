@@ -1,4 +1,4 @@
-"""Registrations of a node with the ROS master, reports of publishers, and cached parameters."""
+"""Replaces rospy's handling of registrations at the ROS master, of reported publishers and of cached parameters."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .expecting import expecting
 class Subscriptions:
     """Connects the subscriptions of this node to all publishers that the ROS master has reported.
 
-    rospy handles only the last report of each topic, although reports may arrive out of order. It also counts closed
-    connections, so it overlooks a publisher that comes back or has lost one connection.
+    rospy itself has two faults. It only handles the last report about each topic, although reports may arrive out of
+    order. It also counts closed connections, so that it does not reconnect to a publisher after a lost connection.
 
     Args:
-        manager: The part of rospy that receives the reports; they come here instead.
-        topics: The topics of this node.
+        manager: rospy's receiver of the reports, which is redirected to this object.
+        topics: rospy's topic manager.
     """
 
     def __init__(self, manager: Any, topics: Any) -> None:
@@ -37,13 +37,18 @@ class Subscriptions:
         manager.publisher_update = self.on_report
 
     def on_report(self, topic: str, publishers: list[str]) -> None:
-        """Connects a subscription to publishers, given by their URIs; existing connections stay."""
+        """Handles a report: connects a subscription to publishers, and keeps existing connections.
+
+        Args:
+            topic: Name of the topic.
+            publishers: Addresses (URIs) of the publishers' nodes.
+        """
         with self._lock:
             self._reported.update({(topic, uri): next(self._reports) for uri in publishers})
         self.connect_missing()
 
     def connect_missing(self) -> None:
-        """Connects to all reported publishers without a connection, without waiting for them."""
+        """Starts threads that connect to all reported publishers without a connection; does not wait for them."""
         with self._lock:
             missing = [pair for pair in self._reported if pair not in self._connecting and not self._has(*pair)]
             self._connecting.update(missing)
@@ -54,19 +59,19 @@ class Subscriptions:
         subscription = self._topics.get_subscriber_impl(topic)
         if subscription is None:
             return False
-        for connection in getattr(subscription, "connections", ()):  # without this list, closed ones stay
+        for connection in getattr(subscription, "connections", ()):  # without a list, closed ones stay
             if connection.done:
                 subscription.remove_connection(connection)
         return bool(subscription.has_connection(uri))
 
     def _connect(self, topic: str, uri: str) -> None:
-        """Connects to one publisher; one that refuses is forgotten until it is reported again."""
+        """Connects to a publisher. If it refuses, it is not tried again until the master reports it again."""
         pair, code = (topic, uri), 0
         report = self._reported.get(pair)
         try:
             code, *_ = self._connect_topic(topic, uri)
         except Exception:
-            if not rospy.core.is_shutdown_requested():  # otherwise its parts are gone
+            if not rospy.core.is_shutdown_requested():  # during the shutdown, errors are expected
                 raise
         finally:
             with self._lock:
@@ -76,10 +81,10 @@ class Subscriptions:
 
 
 class Registry:
-    """The topics and services of this node, from rospy.
+    """Access to the topics and services of this node in rospy.
 
     Attributes:
-        subscriptions: Connects the node to the publishers of its topics.
+        subscriptions: Object that connects the node to the publishers of its topics.
     """
 
     def __init__(self) -> None:
@@ -91,14 +96,16 @@ class Registry:
         if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
             raise TypeError("other kinds of registrations")
         with self.entries():
-            pass  # otherwise it would fail when it is needed
+            pass  # tests at the start that `entries` works
         self.subscriptions = Subscriptions(self._rospys, self._topics)
-        rospy.core.add_shutdown_hook(lambda _: self._wake())  # rospy waits for its thread, up to 0.5 s
+        rospy.core.add_shutdown_hook(lambda _: self._wake())  # otherwise rospy waits up to 0.5 s for its thread
 
     @contextmanager
     def entries(self) -> Iterator[list[tuple[str, str, str]]]:
-        """Yields the kind (`sub`, `pub`, `srv`), name and type or URI of all entries, which do not change inside the
-        context."""
+        """Yields all topics and services, which do not change within the context.
+
+        Each entry has three texts: kind (`sub`, `pub` or `srv`), name, and type of the topic or address of the service.
+        """
         with self._topics.lock, self._services.lock:
             yield [
                 *(("sub", *each) for each in self._topics.get_subscriptions()),
@@ -111,13 +118,17 @@ class Registry:
             self._rospys.cond.notify_all()
 
     def hand_over(self, listener: Any) -> None:
-        """Redirects registrations to another listener, instead of rospy, with `reg_added` and `reg_removed`."""
+        """Makes rospy call another object for registrations, instead of its own.
+
+        Args:
+            listener: Object with the methods `reg_added` and `reg_removed`, such as `Registrations`.
+        """
         with self._listeners.lock:
             self._listeners.listeners[self._listeners.listeners.index(self._rospys)] = listener
 
 
 def registry() -> Registry | None:
-    """Returns the registry of this node, None if rospy's internals differ."""
+    """Makes the registry of this node; returns None, after a warning, if rospy has unexpected internals."""
     return expecting(
         "rospy.impl.registration to have RegManager among its listeners",
         "a restarted ROS master will not know this node: restart the node then",
@@ -126,7 +137,7 @@ def registry() -> Registry | None:
 
 
 def answer_cached(parameter: str, value: Any) -> None:
-    """Makes `rospy.get_param_cached` answer without contacting the master."""
+    """Stores a parameter in rospy's cache, so that `rospy.get_param_cached` does not contact the master."""
     expecting(
         "rospy.impl.paramserver to have a cache",
         "logging blocks while the master hangs",

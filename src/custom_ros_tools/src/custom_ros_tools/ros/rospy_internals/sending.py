@@ -1,4 +1,4 @@
-"""Publishers: sending to many subscribers without waiting, and longer queues for recorders."""
+"""Makes publishers send to many subscribers without waiting, and keep longer queues for recorders."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from .expecting import expecting
 
 
 class DirectSending:
-    """Makes a publisher send in the publishing thread, through sockets that buffer until `flush_buffered_sockets`.
+    """Makes a publisher send in the publishing thread, through `BufferedSocket`s.
 
-    With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers, the
-    contention of these threads for Python's lock costs more than the simulation. Without a queue size, one subscriber
-    that does not read blocks everybody.
+    With a queue size, rospy passes every message to a separate thread for each subscriber. At 1 kHz with a few
+    subscribers, these threads compete for Python's lock, which costs more time than the simulation. Without a queue
+    size, rospy sends in the publishing thread, but a subscriber that does not read blocks the publisher.
+
+    Args:
+        publisher: The publisher.
+        limit: Largest number of messages that are buffered for each subscriber.
     """
 
     _is_possible: bool | None = None
@@ -31,9 +35,11 @@ class DirectSending:
 
     @classmethod
     def of(cls, publisher: rospy.Publisher, limit: int) -> DirectSending | None:
-        """Returns this sender for a publisher, None if rospy's internals differ; then the publisher stays unchanged.
+        """Makes the sender for a publisher; returns None, without changes, if rospy has unexpected internals.
 
-        At most `limit` messages are buffered for each slow subscriber.
+        Args:
+            publisher: The publisher.
+            limit: Largest number of messages that are buffered for each subscriber.
         """
         if cls._is_possible is None:
             cls._is_possible = bool(
@@ -46,7 +52,7 @@ class DirectSending:
         return cls(publisher, limit) if cls._is_possible else None
 
     def wrap_connections(self) -> None:
-        """Replaces the sockets of new connections, so that sending never waits; called before each message."""
+        """Replaces the sockets of new connections by `BufferedSocket`s. Call it before publishing each message."""
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             for connection in connections:
@@ -56,10 +62,10 @@ class DirectSending:
 
     @classmethod
     def _try(cls, publisher: rospy.Publisher) -> bool:
-        """Tests the replacement on a private topic.
+        """Tests the replacement of a socket, on a topic that is not registered.
 
         Raises:
-            Exception: If it is not possible.
+            Exception: If the replacement does not work.
         """
         tcpros = import_module("rospy.impl.tcpros_base")
         ours, theirs = socket.socketpair()
@@ -84,13 +90,13 @@ class DirectSending:
 
 
 class RecorderQueues:
-    """Keeps more messages for recorders, which need all messages; a viewer needs the newest one.
+    """Gives recorders longer queues in a publisher, since recorders need all messages.
 
     A recorder is a node whose name begins with `record`, such as `rosbag record`.
 
     Args:
-        publisher: A publisher with a queue size, which stays unchanged for other subscribers.
-        limit: Number of messages that are kept for a recorder; beyond it, the oldest are dropped.
+        publisher: A publisher with a queue size, which continues to apply to other subscribers.
+        limit: Queue size for recorders; if more messages wait, the oldest are dropped.
     """
 
     def __init__(self, publisher: rospy.Publisher, limit: int) -> None:
@@ -98,7 +104,7 @@ class RecorderQueues:
         self._connections: Any = None
 
     def extend(self) -> None:
-        """Extends the queues of new recorders; called before each message."""
+        """Sets the queue size for new recorders. Call it before publishing each message."""
         connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             self._connections = connections
