@@ -8,9 +8,9 @@ _GREETING = b"pybullet build time: "
 
 
 def _import_pybullet() -> None:
-    """Imports PyBullet, and suppresses the line about PyBullet's build on standard error.
+    """Imports PyBullet, and suppresses the line with PyBullet's build time on standard error.
 
-    All other output of the import, such as a warning from NumPy, is printed after the import.
+    Other output on standard error, such as a warning from NumPy, is printed after the import.
     """
     try:
         stderr = os.dup(2)

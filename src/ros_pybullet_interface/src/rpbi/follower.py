@@ -1,4 +1,4 @@
-"""Entry point of a process that keeps a copy of a world and forks it on request: `python -m rpbi.follower FD`.
+"""Entry point of a process that keeps a copy of a world and forks the copy on request: `python -m rpbi.follower FD`.
 
 FD is the file descriptor of a connection to the process that runs the world.
 """
@@ -15,7 +15,7 @@ from .world import World
 
 
 def main() -> None:
-    """Receives the state of a world from the connection, and then follows the world."""
+    """Receives the state of a world, builds a copy of the world, and answers requests until the connection ends."""
     connection = Connection(int(sys.argv[1]))
     state: WorldState = connection.recv()
     serve(connection, lambda: World.from_state(state, trust=None, max_ticks=state.tick))

@@ -1,7 +1,7 @@
 """Poses, twists and wrenches of the simulator, computed by PyBullet.
 
-PyBullet multiplies poses and rotates vectors in single precision, and the results of a simulation depend on the last
-bit. PyBullet therefore computes all products of poses in which at least one pose is a `Pose` of this module.
+PyBullet multiplies poses and rotates vectors in single precision, and simulations depend on the rounding of the
+results. A product of poses is therefore computed by PyBullet if at least one pose is a `Pose` of this module.
 """
 
 from __future__ import annotations
@@ -62,12 +62,12 @@ class LinkWrench(NamedTuple):
 
 
 def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Rotates a vector by a quaternion: from the axes of a frame with this orientation to the parent frame's axes."""
+    """Converts a vector from the axes of a frame with orientation `quat_xyzw` to the axes of the parent frame."""
     result: Vector = pybullet.rotateVector(quat_xyzw, a)
     return result
 
 
 def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
-    """Rotates a vector by the inverse of a quaternion: from the parent frame's axes to a rotated frame's axes."""
+    """Converts a vector from the axes of the parent frame to the axes of a frame with orientation `quat_xyzw`."""
     x, y, z, w = quat_xyzw
     return rotated((-x, -y, -z, w), a)

@@ -34,7 +34,7 @@ LONGEST_S = 60.0
 class CameraImages:
     """Renders the cameras of a world at its present tick, also while the world is stopped.
 
-    The constructor opens the renderer. One thread must make all calls.
+    The constructor opens the renderer. All calls must come from the same thread.
 
     Args:
         world: The world, with at least one camera.
@@ -49,13 +49,13 @@ class CameraImages:
 
     @property
     def renderer(self) -> Renderer:
-        """The renderer, whose client has a copy of the world."""
+        """The renderer, whose PyBullet client holds a copy of the world."""
         return self._renderer
 
     def frame(self, camera: str = "") -> Frame:
-        """Applies waiting inputs of the world, and renders the present frame of a camera.
+        """Applies the world's waiting inputs, and renders an image of a camera at the present tick.
 
-        The camera's configured rate does not matter.
+        The camera's configured rate is ignored.
 
         Args:
             camera: Name of the camera; empty for the first one.
@@ -81,7 +81,7 @@ class CameraImages:
         return self._mirror.frame(self._renderer, DrawnScene(sample, body_ids), known, STREAMS)
 
     def close(self) -> None:
-        """Closes the renderer, and deletes the files that the renderer's copy of the world needed."""
+        """Closes the renderer, and deletes the temporary mesh files of the renderer's copy of the world."""
         self._mirror.close()
         self._renderer.pb.disconnect()
 
@@ -97,8 +97,8 @@ def drawing_times(world: World) -> dict[str, float]:
     """Measures how much processor time this machine needs to render an image of each camera.
 
     The processor time of all threads is divided by the number of processors. The result hardly depends on other
-    programs, and never exceeds the wall time of rendering. A fork of this process renders, since a graphics driver may
-    crash. Cameras with an unknown pose are at the origin.
+    programs, and never exceeds the wall time of rendering. The images are rendered in a forked process, since a
+    graphics driver may crash. Cameras with an unknown pose are placed at the origin of the world.
 
     Returns:
         Times [s], keyed by camera name; empty if they cannot be measured within `LONGEST_S`.

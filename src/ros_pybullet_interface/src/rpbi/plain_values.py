@@ -17,10 +17,10 @@ Tuple = TypeVar("Tuple", bound=tuple)
 
 
 def as_tuple(kind: type[Tuple], given: Any) -> Tuple:
-    """Converts plain data to a named tuple of a class; returns an instance of the class unchanged.
+    """Converts plain data to an instance of a named-tuple class; returns an instance of the class unchanged.
 
     Args:
-        kind: A class of named tuples.
+        kind: The named-tuple class.
         given: An instance of `kind`, a mapping from field names to values, or a list of the fields' values. Values may
             be arrays.
 

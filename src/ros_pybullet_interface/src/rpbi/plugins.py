@@ -1,4 +1,4 @@
-"""Errors in code of other packages, with the name of the failing class, and checks of sensors' samples."""
+"""Reports errors in other packages' code with the name of the failing class, and checks samples of sensors."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -38,7 +38,7 @@ def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
 
 @contextmanager
 def plugin_errors(thing: Any, doing: str) -> Iterator[None]:
-    """Converts errors in a `with` block as `raise_plugin_error` does; other errors are raised unchanged."""
+    """Passes an error in a `with` block to `raise_plugin_error`; raises the error unchanged if that call returns."""
     try:
         yield
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Offers `RosNode` under the import path that scripts for the authors' original release use."""
+"""Provides `RosNode` under the import path that scripts for the original ros_pybullet_interface use."""
 
 from rpbi.ros.ros_node import RosNode
 

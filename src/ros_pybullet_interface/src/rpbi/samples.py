@@ -1,4 +1,4 @@
-"""Samples of sensors: immutable values in SI units. Poses are in `rpbi/world` unless noted otherwise."""
+"""Sensor samples: immutable values in SI units. Poses are in the frame `rpbi/world` unless noted otherwise."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ class BaseStateSample(NamedTuple):
 
 
 class BodyState(NamedTuple):
-    """State of a body, from which a copy of the world can place the body.
+    """State that is needed to place a body in a copy of the world.
 
     Attributes:
         name: Name of the body.
         base: Position [m] and quaternion x, y, z, w of the base's inertial frame, as in PyBullet.
         joints: Positions of all joints [rad or m] in index order; for a ball joint a quaternion x, y, z, w.
-        nodes: Positions of the simulated corners of a soft body [m]; empty for a rigid body.
+        nodes: Positions of the simulated mesh nodes of a soft body [m]; empty for a rigid body.
     """
 
     name: str
@@ -112,7 +112,8 @@ class WrenchSample(NamedTuple):
 class ContactPoint(NamedTuple):
     """A contact point of a body with another body, or between two links of the body.
 
-    Forces act on the body. They are means over the last tick, or with `average` over all ticks since the last sample.
+    Forces act on the body. They are means over the last tick, or over all ticks since the last sample if YAML sets
+    `average`.
 
     Attributes:
         link: Link of the body.
@@ -178,7 +179,7 @@ class ContactsSample:
 
     @property
     def force(self) -> Vector:
-        """Sum of the contact forces of other bodies on the body [N]."""
+        """Sum of the contact forces that other bodies exert on the body [N]."""
         total = (0.0, 0.0, 0.0)
         for point in self.points:
             if point.other_body != self.name:

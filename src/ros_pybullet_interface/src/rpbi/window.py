@@ -49,7 +49,7 @@ class MouseEvent(NamedTuple):
 
 
 class Window:
-    """Reads events and images of a client's window, and controls its camera.
+    """Reads events and images of a client's window, and controls the window's camera.
 
     Only the simulation thread may make calls.
 
@@ -66,10 +66,7 @@ class Window:
         self._pb.configureDebugVisualizer(pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS, 0)
 
     def key_events(self) -> Iterator[WindowKeyEvent]:
-        """Yields key events since the last call, and one event for each key that is held.
-
-        A call takes half a microsecond.
-        """
+        """Yields key events since the last call, and one event for each key that is held."""
         for key, state in self._pb.getKeyboardEvents().items():
             if key >= 0:  # PyBullet reports all keys without a code as -1
                 for happened in self._keys.observe(key, state):
@@ -97,7 +94,7 @@ class Window:
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
 
     def seconds_per_call(self) -> float:
-        """Measures the mean duration of a call of PyBullet [s]. PyBullet answers calls between frames of the window."""
+        """Measures the mean duration of a PyBullet call [s], which includes the wait for the window's present frame."""
         begin_s = time.monotonic()
         for _ in range(MEASURED_CALLS):
             self._pb.getPhysicsEngineParameters()
@@ -130,10 +127,10 @@ class Window:
 
 
 def check_recording(options: str) -> None:
-    """Checks that a video of the window can be recorded, if the options request one.
+    """Checks that ffmpeg is available if the options request a video of the window.
 
     Args:
-        options: The options of `connect`.
+        options: The argument `options` of `pybullet.connect`.
 
     Raises:
         MissingDependency: If ffmpeg is missing. PyBullet would not report this.

@@ -1,4 +1,4 @@
-"""Entries of the main YAML file's lists of objects: an object's file, and keys that override the file."""
+"""Entries of object lists in the main YAML file. An entry names an object's file and may override the file's keys."""
 
 import copy
 from collections.abc import Mapping
@@ -40,7 +40,7 @@ def parse_object_entry(entry: Any) -> ObjectEntry:
         entry: A file name, or a mapping with the key `file` and the keys to override.
 
     Raises:
-        ValueError: If the entry is neither.
+        ValueError: If the entry is neither a file name nor such a mapping.
     """
     file = entry.get(FILE) if isinstance(entry, Mapping) else entry
     if not isinstance(file, str) or not file:

@@ -58,14 +58,14 @@ class Constants:
         return {"kind": self.kind, "enum": [*self.names, *sorted(set(map(self._named, self.names)))]}
 
     def one_or_several_schema(self) -> dict[str, Any]:
-        """Returns the JSON Schema of one name, of names as `A|B`, or of one number."""
+        """Returns a JSON Schema that accepts one name, names joined as in `A|B`, or one number."""
         several = {"type": "string", "pattern": r"^\s*[A-Z]\w*\s*(\|\s*[A-Z]\w*\s*)+$"}
         return {"kind": self.kind, "anyOf": [{"enum": list(self.names)}, several, {"type": "integer", "minimum": 0}]}
 
 
 @dataclass(frozen=True)
 class Flags(Constants):
-    """A family of PyBullet constants that are bits and can be combined."""
+    """A family of PyBullet constants that are bit flags, so several constants can be combined."""
 
     def parse(self, given: Any) -> int:
         """Combines constants with bitwise or, and returns the number.

@@ -1,7 +1,7 @@
-"""YAML keys for the arguments of PyBullet's functions for bodies, including soft bodies.
+"""Models of the YAML keys that set arguments of PyBullet's functions for rigid and soft bodies.
 
-Each model is named after a PyBullet function. Its fields are the function's keyword arguments, without those that
-identify the body. A test checks that PyBullet accepts each field with values of the field's type.
+Each model is named after a PyBullet function. Its fields are the function's keyword arguments, except the ids of
+bodies. A test checks that PyBullet accepts each field with values of the field's type.
 """
 
 from __future__ import annotations
@@ -262,11 +262,11 @@ class ChangeVisualShape(PybulletModel):
 
 
 class CreateSoftBodyAnchor(PybulletModel):
-    """A corner of a soft body that is tied to the world or to a link, at the distance between both at the start.
+    """A corner of a soft body that keeps its initial position relative to the world or to a link.
 
     In YAML, this is a list of the function's arguments, `[node, body, link, position]`. All arguments but `node` are
-    optional. `body` is a name, or -1 for the world. `link` is a name or an index, where -1 is the base. A leading id of
-    the soft body itself, as in PyBullet, is accepted and ignored.
+    optional. `body` is a name, or -1 for the world. `link` is a name or an index, where -1 is the base. The soft body's
+    own id may come first, as in PyBullet, and is ignored.
     """
 
     node: Count = Field(description="Number of the corner in the simulated mesh.")
@@ -302,7 +302,7 @@ AnchorEntry = Annotated[
 
 
 def _has_own_id(arguments: list[Any]) -> bool:
-    """Returns whether a list of arguments begins with the id of the soft body itself, as in PyBullet."""
+    """Returns whether a list of arguments begins with the soft body's own id, as in PyBullet."""
     texts = [index for index, each in enumerate(arguments) if isinstance(each, str)]
     if texts:
         return texts[0] == 2

@@ -1,4 +1,4 @@
-"""YAML keys for the arguments of PyBullet's functions for the world; each model is named after a function."""
+"""Models of the YAML keys that set arguments of PyBullet's functions for the world. Models have functions' names."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Connect(PybulletModel):
         return self
 
     def kwargs(self) -> dict[str, Any]:
-        """Returns the keyword arguments that YAML sets, and `connection_mode` in any case."""
+        """Returns the keyword arguments that YAML sets, and always `connection_mode`."""
         return {"connection_mode": self.connection_mode, **super().kwargs()}
 
 
@@ -75,7 +75,7 @@ class SetGravity(PybulletModel):
 
 
 class SetPhysicsEngineParameter(PybulletModel):
-    """Solver of contacts and joints; without `fixedTimeStep`, which is `timeStep`."""
+    """Parameters of the solver, except `fixedTimeStep`, which the main file's key `timeStep` sets."""
 
     numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
     useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
@@ -114,7 +114,7 @@ PhysicsChange = SetGravity | SetPhysicsEngineParameter
 
 
 def _as_list(given: Any) -> Any:
-    """Converts one flag, or flags as `A|B`, to a list; returns a list unchanged."""
+    """Converts one flag, or a text `A|B` of several flags, to a list; returns a list unchanged."""
     if isinstance(given, str):
         return given.split("|")
     return given if isinstance(given, (list, tuple)) else [given]
@@ -143,7 +143,7 @@ class ConfigureDebugVisualizer(PybulletModel):
     rgbBackground: Rgb | None = optional("Colour of the background, each from 0 to 1.")
 
     def calls(self) -> list[dict[str, Any]]:
-        """Returns keyword arguments of one call per flag, since PyBullet accepts only one flag in a call."""
+        """Returns one set of keyword arguments per flag, since PyBullet accepts only one flag in a call."""
         others = {"enable": self.enable, **self.kwargs()}
         return [{**others, "flag": flag} for flag in self.flag]
 

@@ -235,7 +235,7 @@ class WorldConfig(ConfigModel):
         return self
 
     def pose_of(self, frame: str) -> Pose | None:
-        """Returns the pose of a TF frame in the world, computed from `poses`; None if `poses` lacks a frame."""
+        """Returns the pose of a TF frame in the world, computed from `poses`; None if a frame on the way is missing."""
         poses = {each.tf_id: each for each in self.poses}
         pose = Pose()
         while (frame := self.without_prefix(frame)) != WORLD_FRAME:

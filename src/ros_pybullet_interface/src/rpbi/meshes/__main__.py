@@ -1,7 +1,7 @@
-"""Loads meshes in a process of its own: `python -m rpbi.meshes FD USE FILE ...`.
+"""Loads meshes as a test, in a separate process: `python -m rpbi.meshes FD USE FILE [USE FILE ...]`.
 
-The process writes one line per mesh to the file descriptor FD. The line is empty, or holds the reason why PyBullet
-cannot load the mesh. A broken mesh may crash this process, but not the caller's.
+USE is a value of `trial.Use`. The process writes one line per mesh to the file descriptor FD. The line is empty, or
+holds the reason why PyBullet cannot load the mesh. A broken mesh may crash this process, but not its parent process.
 """
 
 import ctypes

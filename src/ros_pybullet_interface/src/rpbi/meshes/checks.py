@@ -1,4 +1,4 @@
-"""Checks for errors in meshes that PyBullet does not report."""
+"""Checks meshes for errors that PyBullet does not report."""
 
 import math
 import os
@@ -27,17 +27,14 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
 
 
 def mesh_file_problem(path: str) -> str:
-    """Returns a description of the error in a mesh file that PyBullet would omit without a message.
-
-    Returns an empty string if no error is found.
-    """
+    """Returns why PyBullet would silently ignore a mesh file; empty if no reason is found."""
     if path.lower().endswith(".stl") and not _is_binary_stl(path):
         return "expected a whole binary STL file, got another kind or a part"
     return ""
 
 
 def check_obj(lines: Iterable[bytes]) -> None:
-    """Checks that the faces of an OBJ file refer to existing corners. Otherwise PyBullet would read invalid memory.
+    """Checks corners and faces of an OBJ file. PyBullet reads invalid memory if a face refers to a missing corner.
 
     Args:
         lines: Lines of the file.

@@ -1,7 +1,7 @@
-"""Tries meshes: loads each mesh that is new on this machine in a separate process first.
+"""Tries meshes: before a mesh is used for the first time, a separate process loads the mesh as a test.
 
 PyBullet's loaders of OBJ, STL and COLLADA do not check files, so a broken file may crash the process. The user's cache
-folder keeps the hashes of meshes that were loaded, so that each mesh is tried once.
+folder keeps the hashes of meshes that passed the test, so that each mesh is tried only once.
 """
 
 import enum
@@ -71,7 +71,7 @@ def limit_resources(cpu_s: int) -> None:
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
-    """Tries meshes as needed, and returns a message for each mesh that PyBullet cannot load."""
+    """Tries those meshes that have not passed yet. Returns an error message for each mesh that PyBullet cannot load."""
     faults: dict[Mesh, str] = {}
     unknown: dict[Mesh, Path] = {}
     for mesh in dict.fromkeys(meshes):
@@ -95,7 +95,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
 
 
 def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
-    """Tries meshes in child processes, and yields an error message for each one; empty if the mesh is good."""
+    """Tries meshes in child processes. Yields one message per mesh, empty if PyBullet can load the mesh."""
     done = 0
     while done < len(meshes):
         batch = meshes[done : done + MAX_BATCH]
@@ -111,7 +111,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     """Runs one trial process.
 
     Returns:
-        Messages for the meshes that the process finished, and a message for the next mesh if the process ended early.
+        One message for each mesh that the process finished, and the message for the mesh at which the process failed.
+        The caller ignores the latter if all meshes are finished.
     """
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]

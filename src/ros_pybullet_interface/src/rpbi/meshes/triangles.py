@@ -16,7 +16,9 @@ Triangles = npt.NDArray[np.float64]
 
 
 def read_triangles(path: str) -> list[Triangles]:
-    """Reads the triangles of an OBJ or STL file, one array per part. PyBullet makes a convex hull of each part.
+    """Reads the triangles of an OBJ or STL file, one array per part.
+
+    A part is a whole STL file, or an object or group of an OBJ file. PyBullet makes a convex hull of each part.
 
     Raises:
         ValueError: If the file has another format, contains no triangles, or is broken.

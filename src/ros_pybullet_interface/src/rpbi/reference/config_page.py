@@ -65,7 +65,7 @@ _SCHEMA_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 class Place(NamedTuple):
-    """Section of the page about one mapping inside files.
+    """Section of the page that documents a mapping which occurs inside one or more kinds of files.
 
     Attributes:
         heading: Heading of the section: the mapping's path in the first file that contains the mapping.
@@ -99,7 +99,7 @@ def config_files(root: Path) -> dict[Path, str]:
 
 
 def _examples(root: Path) -> dict[str, str]:
-    """Returns one example text per kind of file, without the first line, which names the schema for editors."""
+    """Returns an example per kind of file, without the first line, which tells editors the schema of the file."""
     examples: dict[str, str] = {}
     paths = (root / "src/rpbi_examples/configs").rglob("*.yaml")
     for path in sorted(paths, key=lambda path: (path.parent.name != FIRST_EXAMPLES, len(path.parts), path)):
@@ -115,7 +115,7 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
 
     Args:
         files: Schema of each kind of file, keyed by kind.
-        nodes: Schema of the parameter `~config` of nodes, keyed by node.
+        nodes: Schema of each node's parameter `~config`, keyed by node.
         examples: YAML text to show for some kinds of files, keyed by kind.
     """
     places = _places(files)
@@ -148,7 +148,7 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
 
 
 def _places(files: Mapping[str, Schema]) -> Places:
-    """Returns the place of each mapping inside the files."""
+    """Returns a `Place` for each mapping inside the files."""
     places: Places = {}
     for kind, root in files.items():
         for path, reference in _inside(root, root, "", files):
@@ -158,7 +158,7 @@ def _places(files: Mapping[str, Schema]) -> Places:
 
 
 def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> Iterator[tuple[str, Schema]]:
-    """Yields path and schema of each mapping inside a mapping, recursively, except mappings that are files too.
+    """Yields path and schema of each mapping at any depth inside a mapping, except mappings that are files too.
 
     Args:
         mapping: Schema of the outer mapping.
@@ -175,7 +175,7 @@ def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> 
 
 
 def _values(mapping: Schema) -> dict[str, Schema]:
-    """Returns the schemas of a mapping's keys. If users may add keys, `NAME` has the schema of the added values."""
+    """Returns the schema of each key's value. If users may add keys, the key `NAME` stands for the added keys."""
     more = mapping.get("additionalProperties")
     return {**mapping["properties"], **({"NAME": more} if isinstance(more, dict) else {})}
 

@@ -17,7 +17,7 @@ def link(title: str, page: str = "") -> str:
 
     Args:
         title: The heading.
-        page: File of the page; empty for the same page.
+        page: File of the page with the heading; empty if the link is on the same page.
     """
     anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
     return f"[{title}]({page}#{anchor})"

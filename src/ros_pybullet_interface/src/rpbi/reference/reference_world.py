@@ -28,7 +28,7 @@ _CAMERA = {"name": "camera", "pointcloud": True, "object_tf": {"tf_id": FOLLOWED
 
 
 def reference_world() -> World:
-    """Builds the world without a window, although its configuration has one."""
+    """Builds the world without opening PyBullet's window."""
     objects = tuple(
         ObjectConfig(kind, load_object(kind, {"name": kind, **BODY_TYPES[kind].example}, _FILE), _FILE)
         for kind in BODY_TYPES
