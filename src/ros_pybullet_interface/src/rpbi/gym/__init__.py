@@ -1,4 +1,4 @@
-"""Worlds as environments of Gymnasium: tasks, their spaces, random variation, and many worlds at once.
+"""Gymnasium environments of worlds: tasks, their spaces, random variation, and vectors of environments.
 
 This package needs the extra `gym`; see docs/gym.md.
 """

@@ -40,11 +40,13 @@ class ActionPart(Protocol):
 
 
 class JointAction:
-    """Moves joint targets of a robot: each value, from -1 to 1, is a fraction of the largest change per action.
+    """Moves joint targets of a robot.
+
+    Each value, from -1 to 1, is multiplied by the maximum change per action to give the change of a joint's target.
 
     Args:
-        joints: Names of the joints that move; by default all joints with motors.
-        speed: Largest speed, as a share of the URDF's velocity limits.
+        joints: Names of the joints that move; all joints with motors if empty.
+        speed: Maximum speed of each joint, as a fraction of the joint's velocity limit in the URDF.
         period_s: Duration of an action [s].
     """
 
@@ -71,18 +73,19 @@ class JointAction:
 
 
 class PoseAction:
-    """Moves the target pose of a link's controller.
+    """Moves the target pose of a controller that controls the pose of a point on a link.
 
-    The values are three translations along, then three rotations about the world's x, y and z axes. The target starts
-    at the controlled point. While the controller is not active, actions have no effect.
+    The first three values are translations along the world's x, y and z axes. The last three values are rotations about
+    these axes. The target starts at the pose of the controlled point. While the controller is inactive, actions have no
+    effect.
 
     Args:
         controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
         link: Name of the controlled link.
-        low: Lower corner of the box that the target stays in, in the world [m].
-        high: Upper corner of that box [m].
-        step: Largest translation per action along each axis [m].
-        turn: Largest rotation per action about each axis [rad].
+        low: Lower corner of the target's box-shaped workspace, in the world [m].
+        high: Upper corner of the workspace, in the world [m].
+        step: Maximum translation per action along each axis [m].
+        turn: Maximum rotation per action about each axis [rad].
     """
 
     size = 6
@@ -111,7 +114,7 @@ class PoseAction:
         self.goal = robot_of(self._world, self._robot).link_pose(self._link) @ self._point
 
     def apply(self, values: Values) -> None:
-        """Moves the target within the box; while the controller is not active, resets the target."""
+        """Moves the target within the workspace; if the controller is inactive, resets the target instead."""
         if not robot_of(self._world, self._robot).controllers.is_active(self._controller):
             self.reset()
             return
@@ -129,9 +132,9 @@ class HandAction:
         link: Name of the link, whose URDF frame moves.
         axes: Axes along which the link moves, such as `xy`; along the remaining axes, the link keeps its start
             position.
-        low: Lower corner of the box that the link's target stays in, in the world [m].
-        high: Upper corner of that box [m].
-        step: Largest translation per action along each axis [m].
+        low: Lower corner of the target's box-shaped workspace, in the world [m].
+        high: Upper corner of the workspace, in the world [m].
+        step: Maximum translation per action along each axis [m].
     """
 
     def __init__(
@@ -158,12 +161,15 @@ class HandAction:
         self.size = len(axes)
 
     def reset(self) -> None:
-        """Sets start pose and target to the present pose of the link."""
+        """Sets the start pose and the target position to the link's present values."""
         self._start = robot_of(self._world, self._robot).link_pose(self._link)
         self.goal = list(self._start.position)
 
     def apply(self, values: Values) -> None:
-        """Moves the target within the box; sends joint targets from a damped inverse of the Jacobian to the robot."""
+        """Moves the target within the workspace, and sends the joint targets for it to the robot.
+
+        The joint targets are computed with a damped inverse of the Jacobian.
+        """
         for axis, value in zip(self._axes, values.tolist()):
             self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])
         robot = robot_of(self._world, self._robot)
@@ -185,11 +191,13 @@ class HandAction:
 
 
 class GripperAction:
-    """Opens (1) or closes (-1) the fingers of a gripper; the value is a fraction of the largest change per action.
+    """Opens or closes the fingers of a gripper.
+
+    The value, from -1 (close) to 1 (open), is multiplied by `step` to give the change of the target.
 
     Args:
         joints: Finger joints, which all get the same target.
-        step: Largest change of the target per action [m or rad].
+        step: Maximum change of the target per action [m or rad].
     """
 
     size = 1

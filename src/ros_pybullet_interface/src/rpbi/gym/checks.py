@@ -1,4 +1,4 @@
-"""Calls to tasks, with checks of their results: a task from another package may fail or return invalid values."""
+"""Calls tasks and checks the results: a task from another package may fail or return invalid values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from .task import WorldTask
 class CheckedTask:
     """Wraps a task and checks the values that it returns.
 
-    An error in a task from another package becomes a PluginError that names the class, the method and the action.
+    An error in a task from another package becomes a PluginError that names the class, the method, and the number of
+    the action in the episode.
 
     Args:
         task: The wrapped task.
@@ -60,7 +61,7 @@ class CheckedTask:
         self._call("after_tick", self.task.after_tick)
 
     def observation(self) -> Any:
-        """Returns the present observation, which is in the observation space."""
+        """Returns the present observation, after a check that it is in the observation space."""
         return self._call("observation", self._observation)
 
     def reward(self) -> float:
@@ -105,7 +106,7 @@ class CheckedTask:
 
 
 def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> list[str]:
-    """Returns a message for each entry of a value that is not in a space: key, expected and actual value."""
+    """Returns a message for each entry of a value that is not in a space, with key, expected and actual value."""
     if isinstance(space, spaces.Dict):
         if not isinstance(value, dict) or value.keys() != space.spaces.keys():
             got = sorted(value) if isinstance(value, dict) else type(value).__name__

@@ -37,9 +37,9 @@ class WorldEnv(gymnasium.Env[Any, Any]):
 
     Args:
         world: Main YAML file of the world.
-        task: A YAML file or a mapping with the task's `type` and options, a name in `TASKS`, `module:Class`, or a
-            class.
-        randomization: YAML file, or mapping, of what varies from episode to episode; nothing by default.
+        task: The task: a YAML file or a mapping with `type` and options, a name in `TASKS`, `module:Class`, or a class.
+        randomization: Configuration of random variation, as YAML file or mapping, see `Randomization`. None: nothing
+            varies.
         cameras: Names of the world's cameras whose images are part of observations.
         render_mode: `rgb_array` for images of the world's first camera, `human` for PyBullet's window.
 
@@ -50,7 +50,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     Raises:
         ConfigError: If a file is not valid; the error lists all problems.
         PluginError: If a task from another package fails.
-        UnknownNameError: If there is no such task, camera or argument.
+        UnknownNameError: If the task, a camera or an argument is unknown.
         ValueError: If the render mode is unknown.
     """
 
@@ -106,10 +106,10 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         return first, {"is_success": self._task.has_succeeded()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Applies an action, and advances the world by the ticks of an action.
+        """Applies an action, and advances the world by the duration of an action.
 
         Returns:
-            Observation, reward, `terminated` (whether the task has ended the episode), `truncated` (whether the largest
+            Observation, reward, `terminated` (whether the task has ended the episode), `truncated` (whether the maximum
             number of actions per episode is reached), and an information dictionary with `is_success`.
 
         Raises:
@@ -130,8 +130,8 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     def render(self) -> Image | None:
         """Returns the image of the world's first camera, uint8, shape (height, width, 3).
 
-        With PyBullet's window, waits instead until the duration of an action has passed since the last call, and
-        returns None.
+        In render mode `human`, waits instead until the duration of an action has passed since the last call, and
+        returns None. Without a render mode, returns None.
         """
         return self._views.render()
 
@@ -169,7 +169,7 @@ def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) ->
 
     Raises:
         ConfigError: If the task's options are wrong or do not fit the world.
-        UnknownNameError: If there is no such task.
+        UnknownNameError: If the task is unknown.
         PluginError: If the task's class is from another package and fails.
     """
     file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"

@@ -24,19 +24,19 @@ except ImportError:
 Observation = dict[str, npt.NDArray[np.float32]]
 
 FARTHEST = 1e3
-"""Largest bound of joint positions [rad or m] and velocities [rad/s or m/s], also without a limit in the URDF."""
+"""Maximum bound of joint positions [rad or m] and velocities [rad/s or m/s], also without a limit in the URDF."""
 LARGEST_FORCE_N, LARGEST_TORQUE_NM = 1e3, 1e2
 """Bounds of measured forces and torques; larger values are clipped."""
 
 
 class ObservationPart(NamedTuple):
-    """An entry of an observation.
+    """A part of an observation: one entry of the observation dictionary, an array of n numbers.
 
     Attributes:
         name: Key of the entry.
-        low: Lower bounds of the n numbers.
-        high: Upper bounds of the n numbers.
-        read: Returns the n numbers.
+        low: Lower bounds of the numbers, length n.
+        high: Upper bounds of the numbers, length n.
+        read: Function that returns the present numbers.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Parts:
         )
 
     def read(self) -> Observation:
-        """Returns the present observation, clipped to its space.
+        """Returns the present observation, clipped to the bounds.
 
         Raises:
             PhysicsError: If a number is not finite.
@@ -93,7 +93,7 @@ def joint_part(world: World, robot: str) -> ObservationPart:
 
 
 def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
-    """Yields a part for each force-torque sensor of a robot: force [N], then torque [N m]; 0 before a measurement."""
+    """Yields a part for each force-torque sensor of a robot: force [N], then torque [N m]; 0 without a measurement."""
     high = (LARGEST_FORCE_N,) * 3 + (LARGEST_TORQUE_NM,) * 3
 
     def read(number: int) -> Sequence[float]:
@@ -105,7 +105,10 @@ def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
 
 
 def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> ObservationPart:
-    """Returns the part for a body's base pose in the world: position [m] within bounds, then quaternion x, y, z, w."""
+    """Returns the part for a body's base pose in the world: position [m], then quaternion x, y, z, w.
+
+    The arguments `low` and `high` are the bounds of the position [m].
+    """
 
     def read() -> Sequence[float]:
         position, quat = world.bodies[name].base_pose()
@@ -115,10 +118,10 @@ def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[floa
 
 
 def robot_of(world: World, name: str) -> Robot:
-    """Returns the robot with motors of a given name.
+    """Returns the robot with a given name; the robot must have motors.
 
     Raises:
-        UnknownNameError: If the world has no such robot.
+        UnknownNameError: If the world has no robot of this name with motors.
     """
     found = world.bodies.get(name)
     if not isinstance(found, Robot):

@@ -1,4 +1,4 @@
-"""Random variation of a world from episode to episode, configured in YAML."""
+"""Varies a world randomly from episode to episode, as configured in YAML."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Randomization(ConfigModel):
 
     @classmethod
     def read(cls, given: str | Mapping[str, Any] | None) -> Randomization:
-        """Reads the variation from a YAML file or from a mapping of its keys; None means that nothing varies.
+        """Reads the configuration from a YAML file or a mapping; None means that nothing varies.
 
         Raises:
             ConfigError: If a key or value is not valid.
@@ -143,8 +143,8 @@ class Randomizer:
 
     Args:
         world: The world, before its first tick.
-        config: What varies, and how much.
-        file: File of the configuration, for messages.
+        config: Configuration of the variation.
+        file: Name of the configuration file, for messages.
 
     Raises:
         ConfigError: If a configured object is not in the world, or cannot be varied as configured.

@@ -13,7 +13,7 @@ TYPE = "type"
 def schemas() -> dict[str, Schema]:
     """Returns the schemas indexed by kind of file: `gym_TASK` for each task, and `gym_randomization`.
 
-    Without an installed Gymnasium, the schemas of tasks are left out.
+    If Gymnasium is not installed, the schemas of tasks are left out.
     """
     found = {f"gym_{name}": _of_task(name, schema) for name, schema in TASKS.schemas().items()}
     return {**found, "gym_randomization": json_schema(Randomization, "gym_randomization")}
@@ -29,5 +29,5 @@ def _of_task(name: str, schema: Schema) -> Schema:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each schema file of a workspace, indexed by path."""
+    """Returns the text of each schema file, indexed by path; `root` is the root folder of the workspace."""
     return schema_texts(root / "src/ros_pybullet_interface/schema", schemas())

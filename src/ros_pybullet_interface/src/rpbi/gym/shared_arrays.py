@@ -1,4 +1,4 @@
-"""Arrays that processes share."""
+"""Arrays in memory that several processes share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ALIGNMENT = 64
 
 
 def leaves(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], spaces.Box]]:
-    """Yields each box of an observation space, preceded by the dictionary keys that lead to it.
+    """Yields, for each box of an observation space, the dictionary keys that lead to the box, and the box.
 
     Raises:
         InterfaceError: If the space contains anything but boxes and dictionaries.
@@ -36,12 +36,12 @@ def leaves(space: spaces.Space[Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 class SharedArrays:
-    """The results of n environments in memory that processes share: observations, rewards and ends of episodes.
+    """Results of n environments, in memory that processes share: observations, rewards and flags of ended episodes.
 
     Args:
         space: Observation space of one environment.
         count: Number n of environments.
-        file: File descriptor of the memory, which this object then owns; by default, new memory is allocated.
+        file: File descriptor of existing memory; `close` closes the descriptor. None: allocates new memory.
 
     Attributes:
         file: File descriptor of the memory.
@@ -86,7 +86,7 @@ class SharedArrays:
         return nested
 
     def close(self) -> None:
-        """Closes the file; the memory lives as long as arrays use it."""
+        """Closes the file descriptor. The arrays remain valid."""
         os.close(self.file)
 
     def _array(self, shape: tuple[int, ...], dtype: Any) -> Array:

@@ -58,7 +58,7 @@ class WorldTask(ABC):
 
     @abstractmethod
     def actions(self) -> Sequence[ActionPart]:
-        """Returns the parts of an action, in their order."""
+        """Returns the parts of an action, in the order of their numbers in the action's array."""
 
     def parts(self) -> Iterator[ObservationPart]:
         """Yields the parts of an observation: by default joints and force-torque sensors of all robots."""
@@ -107,7 +107,7 @@ class WorldTask(ABC):
             begin += part.size
 
     def after_tick(self) -> None:  # noqa: B027 (most tasks need nothing)
-        """Evaluates the last tick, if the task needs every tick."""
+        """Evaluates the last tick. Is called after every tick if a subclass overrides this method."""
 
     def observation(self) -> Any:
         """Returns the present observation."""
@@ -115,11 +115,11 @@ class WorldTask(ABC):
 
     @abstractmethod
     def reward(self) -> float:
-        """Returns the reward of the last action, from the present state; called once per action."""
+        """Returns the reward of the last action, computed from the present state. Is called once per action."""
 
     @abstractmethod
     def has_succeeded(self) -> bool:
-        """Returns whether the task is done, judged from the simulation state, never from the reward."""
+        """Returns whether the task is done. A subclass decides this from the simulation state, not from the reward."""
 
     def has_ended(self) -> bool:
         """Returns whether the episode is over: by default when the task is done."""

@@ -1,4 +1,4 @@
-"""Environments in worker processes, as one vector environment of Gymnasium."""
+"""A vector environment of Gymnasium whose environments run in worker processes."""
 
 from __future__ import annotations
 
@@ -33,22 +33,24 @@ Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[
 
 
 class WorldVectorEnv(VectorEnv[Any, Any, Any]):
-    """A vector of environments in worker processes, each with one or more environments.
+    """A vector of environments in worker processes; each process has one or more environments.
 
     For a step, each process gets a single request. Observations are transferred in shared memory. Processes are not
     forked but started as new programs. Therefore scripts do not need `if __name__ == "__main__"`, and the calling
     process may have threads.
 
     Args:
-        makers: Functions that make one environment each; lambdas of a script are allowed.
-        workers: Number of processes; by default one for each processor, at most one for each environment.
+        makers: Functions without arguments, each of which makes one environment. Lambdas are allowed.
+        workers: Number of processes, by default the number of processors; reduced to the number of environments.
         autoreset_mode: When an environment whose episode has ended is reset, see docs/gym.md.
 
     Attributes:
         workers: Number of processes.
 
     Raises:
-        InterfaceError: If spaces differ, observations are not made of boxes, or an environment cannot be made.
+        InterfaceError: If the environments' spaces differ, or an observation space contains other spaces than boxes
+            and dictionaries.
+        ValueError: If `makers` is empty, or `workers` is not positive.
     """
 
     def __init__(
@@ -81,8 +83,9 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         """Starts episodes in all environments, or in the environments that a mask selects.
 
         Args:
-            seed: A seed for each environment, or one number to which each environment's index is added.
-            options: `reset_mask`, bool, shape (n,), selects the environments to reset; other options are passed on.
+            seed: A seed for each environment; or a number, to which the index of each environment is added.
+            options: `reset_mask`, bool, shape (n,), selects the environments to reset. All other options are passed to
+                the environments.
 
         Returns:
             Observations of all environments, and information from the environments that were reset.
@@ -116,8 +119,8 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
             Observations, rewards, terminations, truncations, and information.
 
         Raises:
-            ValueError: If there are more or fewer actions than environments, or an action does not fit its space; no
-                environment has then changed. Also if an episode has ended and autoreset is disabled.
+            ValueError: If there are more or fewer actions than environments, or an action does not fit its space. The
+                environments are then unchanged. Also if an episode has ended and autoreset is disabled.
             PluginError: If a task from another package fails.
             InterfaceError: If a worker process has ended.
         """
@@ -142,7 +145,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call("render")
 
     def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
-        """Returns an attribute of each environment; a callable attribute is called and its result returned."""
+        """Returns the named attribute of each environment. If the attribute is callable, returns its result instead."""
         answers = self._ask_all("call", [(name, arguments, options)] * self.workers)
         return tuple(each for answer in answers for each in answer)
 
@@ -151,7 +154,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Sets an attribute of each environment, either to the values of a list or to the same value."""
+        """Sets an attribute; `values` is a list or tuple with a value for each environment, or one value for all."""
         each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ValueError(f"expected {self.num_envs} values, got {len(each)}")
@@ -204,7 +207,7 @@ class WorldVectorEnv(VectorEnv[Any, Any, Any]):
 
 
 class _Process:
-    """A worker process, as the calling process sees it."""
+    """The calling process's connection to a worker process."""
 
     def __init__(self, index: int) -> None:
         self._index = index
@@ -234,7 +237,7 @@ class _Process:
         os.set_blocking(self._connection.fileno(), True)  # non-blocking by now if sockets have a default timeout
 
     def answer(self) -> tuple[bool, Any]:
-        """Waits for the answer to a request, and returns whether the request succeeded, and its result or error."""
+        """Waits for an answer; returns whether the request succeeded, and the result or the error."""
         try:
             is_good, answer = pickle.loads(self._connection.recv_bytes())
         except (EOFError, OSError) as error:
@@ -259,13 +262,13 @@ class _Process:
 
 
 def request(name: str, *arguments: Any) -> bytes:
-    """Serializes a request to a worker; requests for steps only hold arrays, so the faster `pickle` is enough."""
+    """Serializes a request to a worker. Requests for steps contain only arrays, for which `pickle` is faster."""
     dumps = pickle.dumps if name == "step" else cloudpickle.dumps
     return dumps((name, arguments), pickle.HIGHEST_PROTOCOL)
 
 
 def _parts(count: int, workers: int) -> list[tuple[int, int]]:
-    """Divides environments evenly among workers; returns each worker's first index, and its last index plus 1."""
+    """Divides environments evenly among workers; returns each worker's first index, and the last index plus 1."""
     ends = [count * each // workers for each in range(workers + 1)]
     return list(zip(ends, ends[1:]))
 
@@ -277,7 +280,13 @@ def make_vector(
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     **options: Any,
 ) -> WorldVectorEnv:
-    """Makes a vector of equal environments, for `gymnasium.make_vec`; `options` are arguments of `WorldEnv`.
+    """Makes a vector of equal environments, for `gymnasium.make_vec`.
+
+    Args:
+        num_envs: Number of environments.
+        workers: Number of worker processes, see `WorldVectorEnv`.
+        autoreset_mode: See `WorldVectorEnv`.
+        options: Arguments of `WorldEnv`.
 
     Raises:
         UnknownNameError: If an option is not an argument of `WorldEnv`.

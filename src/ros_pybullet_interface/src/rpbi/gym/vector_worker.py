@@ -1,4 +1,7 @@
-"""Entry point of a process with environments: `python -m rpbi.gym.vector_worker FD`."""
+"""Entry point of a worker process with environments: `python -m rpbi.gym.vector_worker FD`.
+
+FD is the file descriptor of the connection to the calling process.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +31,13 @@ class StepResult(NamedTuple):
     """Outcome of a step.
 
     Attributes:
-        observation: Observation before the next action; after a reset, the first observation of the new episode.
+        observation: Observation after the step; if the step reset the environment, the new episode's first observation.
         reward: Reward of the action.
         terminated: Whether the task has ended the episode.
         truncated: Whether the episode was truncated.
         info: Further information.
-        final: In mode `SAME_STEP`, if the episode has just ended, its last observation (`final_obs`) and information
-            (`final_info`); otherwise None.
+        final: Last observation (`final_obs`) and information (`final_info`) of an episode that has just ended in mode
+            `SAME_STEP`; otherwise None.
     """
 
     observation: Any
@@ -50,8 +53,8 @@ class Slot:
 
     Args:
         env: The environment.
-        mode: `NEXT_STEP` resets in place of the next step, whose action is ignored; `SAME_STEP` resets in the step that
-            ends the episode; `DISABLED` leaves resets to the caller.
+        mode: `NEXT_STEP`: the step after the end of an episode ignores the action and resets. `SAME_STEP`: the step
+            that ends the episode also resets. `DISABLED`: the caller resets.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], mode: AutoresetMode) -> None:
@@ -67,7 +70,7 @@ class Slot:
         """Takes a step, or resets the environment as the mode requires.
 
         Raises:
-            ValueError: If the episode has ended, and in mode `DISABLED` the caller has not reset the environment.
+            ValueError: If the episode has ended in mode `DISABLED`, and the caller has not reset the environment.
         """
         if self._has_ended and self._mode is AutoresetMode.DISABLED:
             raise ValueError("the episode has ended: expected reset(options={'reset_mask': ...}) before the next step")
@@ -99,17 +102,17 @@ class Worker:
         self._shared: SharedArrays | None = None
 
     def spaces(self) -> tuple[list[tuple[spaces.Space[Any], spaces.Space[Any]]], dict[str, Any], str | None]:
-        """Returns observation and action space of each environment, and the first one's metadata and render mode."""
+        """Returns each environment's observation and action space, and the first one's metadata and render mode."""
         env = self._slots[0].env
         each = [(slot.env.observation_space, slot.env.action_space) for slot in self._slots]
         return each, dict(env.metadata), env.render_mode
 
     def share(self, shared: SharedArrays) -> None:
-        """Writes results to shared memory from now on."""
+        """Sets the shared memory to which all later results are written."""
         self._shared = shared
 
     def reset(self, seeds: Sequence[int | None], mask: Sequence[bool], options: Info | None) -> list[Info | None]:
-        """Starts episodes where the mask is true; returns the information from each reset, None elsewhere."""
+        """Starts episodes where the mask is true; returns the information from each reset, and None elsewhere."""
         assert self._shared is not None
         infos: list[Info | None] = []
         for index, (slot, seed, is_reset) in enumerate(zip(self._slots, seeds, mask), self._first):
@@ -135,12 +138,12 @@ class Worker:
         return infos
 
     def call(self, name: str, arguments: tuple[Any, ...], options: Mapping[str, Any]) -> list[Any]:
-        """Returns an attribute of each environment; a callable attribute is called and its result returned."""
+        """Returns the named attribute of each environment. If the attribute is callable, returns its result instead."""
         found = [slot.env.get_wrapper_attr(name) for slot in self._slots]
         return [each(*arguments, **options) if callable(each) else each for each in found]
 
     def set(self, name: str, values: Sequence[Any]) -> None:
-        """Sets an attribute of each environment, from a value for each."""
+        """Sets an attribute of each environment to the environment's entry in `values`."""
         for slot, value in zip(self._slots, values):
             slot.env.set_wrapper_attr(name, value)
 
@@ -151,7 +154,7 @@ class Worker:
 
 
 def main() -> None:
-    """Answers requests until the calling process closes the connection."""
+    """Answers requests of the calling process until that process closes the connection."""
     connection = Connection(int(sys.argv[1]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the calling process handles Ctrl-C
     worker: Worker | None = None
@@ -181,7 +184,7 @@ def main() -> None:
 
 
 def as_sent(error: Exception) -> Exception:
-    """Returns the given error if another process can unpickle it, otherwise an InterfaceError with its text."""
+    """Returns `error` if another process can unpickle it, otherwise an InterfaceError with the text of `error`."""
     try:
         if str(pickle.loads(pickle.dumps(error))) == str(error):
             return error

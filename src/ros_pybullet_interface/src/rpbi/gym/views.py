@@ -1,4 +1,4 @@
-"""Images of a world's cameras, for observations and for rendering."""
+"""Renders the images of a world's cameras, for observations and for `render`."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Views:
         world: The world.
         names: Cameras whose images are in observations.
         mode: Render mode: `rgb_array`, `human`, or None.
-        period_s: Time between two renderings in a window [s].
+        period_s: Minimum wall time between two returns of `render` in mode `human` [s].
 
     Attributes:
         spaces: Space of each image of an observation: `CAMERA/colour`, uint8, shape (height, width, 3), and
             `CAMERA/depth` [m], float32, shape (height, width).
 
     Raises:
-        ConfigError: If images are needed, and no camera has a pose.
-        UnknownNameError: If the world has no such camera.
+        ConfigError: If images are needed, but no camera has a pose.
+        UnknownNameError: If the world does not have one of the cameras.
     """
 
     def __init__(self, world: World, names: Sequence[str], mode: str | None, period_s: float) -> None:
@@ -62,7 +62,7 @@ class Views:
     def render(self) -> Image | None:
         """Returns the image of the world's first camera, uint8, shape (height, width, 3); None if `mode` is None.
 
-        With a window, waits instead until `period_s` has passed since the last call, and returns None.
+        In mode `human`, waits instead until `period_s` has passed since the last call, and returns None.
         """
         if self._mode == "rgb_array":
             colour: Image = self._drawn("").colour

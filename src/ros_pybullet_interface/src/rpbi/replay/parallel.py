@@ -35,10 +35,10 @@ def in_forks(
     Args:
         work: Function that takes a group and returns a picklable result.
         groups: Groups of parts, see `groups_of`.
-        cpu_s: Largest processor time of each fork [s]; None means no limit.
+        cpu_s: Maximum processor time of each fork [s]; None means no limit.
 
     Raises:
-        InterfaceError: If the function raises an error in a fork, or a fork ends early.
+        InterfaceError: If the function raises an error in a fork, or a fork ends without a result.
         TooSlowError: If a fork needs more processor time than `cpu_s`.
     """
     if len(groups) == 1:
@@ -51,20 +51,20 @@ def in_limited_fork(work: Callable[[], Result], cpu_s: int) -> Result:
 
     Args:
         work: Function without arguments that returns a picklable result.
-        cpu_s: Largest processor time of the fork [s].
+        cpu_s: Maximum processor time of the fork [s].
 
     Raises:
-        InterfaceError: If the function raises an error, or the fork ends early.
+        InterfaceError: If the function raises an error, or the fork ends without a result.
         TooSlowError: If the fork needs more processor time than `cpu_s`.
     """
     return _results([work], cpu_s)[0]
 
 
 def limit_cpu_time(cpu_s: int) -> None:
-    """Limits the processor time that this process may use from now on; the signal SIGXCPU ends it at the limit.
+    """Limits the further processor time of this process. At the limit, the signal SIGXCPU ends this process.
 
     Args:
-        cpu_s: Further processor time [s].
+        cpu_s: Processor time that this process may still use [s].
     """
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = cpu_s + int(used.ru_utime + used.ru_stime) + 1

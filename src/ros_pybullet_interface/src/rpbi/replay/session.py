@@ -38,8 +38,8 @@ class Recording:
 
     Attributes:
         description: Description of the world.
-        commands: `commands[resets][index]` is the command with position `index` among the commands after reset number
-            `resets`; 0 stands for the start of the session.
+        commands: Commands, indexed by the number of resets before the command, and then by the number of earlier
+            commands since the last reset (or since the start of the session).
         checkpoints: The recorded hashes.
     """
 
@@ -73,7 +73,7 @@ class RecordedPart(NamedTuple):
 
     Attributes:
         resets: Number of resets of the world before the part.
-        first: Index of the part's first command, counted from the last reset.
+        first: Index of the part's first command among the commands since the last reset.
         keyframe: Command that made the keyframe at which the part begins; None if the part begins with a built or reset
             world.
         checkpoints: Checkpoints of the part, sorted by time.
@@ -93,8 +93,8 @@ class Difference(NamedTuple):
     Attributes:
         checkpoint: The checkpoint.
         state_hash: Hash of the replayed state.
-        last_agreement: The last earlier checkpoint at which both states agreed. None if there is no such checkpoint
-            since the replay last began with a built or reset world or with a recorded keyframe.
+        last_agreement: The last earlier checkpoint at which both states agreed, since the replay last began with a
+            built or reset world, or with a recorded keyframe. None without such a checkpoint.
     """
 
     checkpoint: Checkpoint
@@ -109,7 +109,8 @@ class ReplayResult(NamedTuple):
         agreed: Number of checkpoints at which the replayed state agreed with the recording.
         ticks: Number of replayed ticks.
         difference: The first difference from the recording, at which the replay ended; None without a difference.
-        left_out: A message for each section of the recording that could not be replayed, with its begin and the reason.
+        left_out: A message for each section of the recording that could not be replayed. The message names the begin of
+            the section and the reason.
     """
 
     agreed: int
@@ -183,7 +184,8 @@ class Replay:
         """Replays a part from the present state of the world.
 
         Returns:
-            The first difference, or None; and whether the next part can continue from the present state.
+            The first difference, or None without a difference; and whether the next part can continue from the present
+            state.
         """
         commands = self._recording.commands.get(part.resets, {})
         done = part.first
@@ -217,11 +219,11 @@ class Replay:
 
         Args:
             to: The checkpoint.
-            commands: Commands since the last reset, indexed by position.
-            done: Index of the next command to apply.
+            commands: Commands since the last reset, indexed by the number of earlier commands since this reset.
+            done: Number of commands already applied, which is the index of the next command.
 
         Returns:
-            Index of the next command to apply after the checkpoint.
+            The new value of `done`.
         """
         world, start = self._world, self._world.clock.tick
         while True:

@@ -1,4 +1,4 @@
-"""Joints of a robot with PyBullet's indices, and couplings of mimic joints."""
+"""Joints of a robot, with their PyBullet indices and the couplings of mimic joints."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class Joint:
         link: Name of the child link.
         lower: Lower position limit [rad or m]; -inf without a limit.
         upper: Upper position limit [rad or m]; inf without a limit.
-        max_effort: Largest torque or force [N m or N]; inf without a limit.
-        max_velocity: Largest speed [rad/s or m/s]; inf without a limit.
+        max_effort: Maximum torque or force [N m or N]; inf without a limit.
+        max_velocity: Maximum speed [rad/s or m/s]; inf without a limit.
     """
 
     index: int
@@ -103,13 +103,13 @@ class Joint:
         return min(max(position, self.lower), self.upper)
 
     def limit_violation(self, position: float) -> str:
-        """Returns a message about a position [rad or m] that is outside the limits."""
+        """Returns the error message for a position [rad or m] that is outside the limits."""
         limits = f"{self.lower:.6g} to {self.upper:.6g} {self.unit}"
         return f"joint '{self.name}' must be within {limits}, got {position:.6g}"
 
     @property
     def is_driven(self) -> bool:
-        """Whether the joint is revolute or prismatic, so that a motor can move it."""
+        """Whether a motor can move the joint, which must be revolute or prismatic."""
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
 
 
@@ -141,7 +141,7 @@ class JointModel:
         own: Joints of the robot itself.
         moving: The revolute and prismatic joints in `own`.
         couplings: Couplings of mimic joints, indexed by PyBullet's joint index.
-        driven: The joints in `moving` that are not mimic joints, so that motors drive them.
+        driven: The joints in `moving` that motors drive: all except mimic joints.
 
     Raises:
         ValueError: If a mimic joint cannot follow its leader; the message names the joint.
@@ -177,7 +177,7 @@ class JointModel:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
     def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
-        """Returns the coupling of a mimic joint to its leader, even if there are other mimic joints between both."""
+        """Returns the coupling of a mimic joint to the leader at the end of a chain of mimic joints."""
         leader, multiplier, offset = followed(name, mimics)
         if leader not in self._by_name or not self[leader].is_driven:
             movable = ", ".join(joint.name for joint in self.moving)
@@ -187,10 +187,10 @@ class JointModel:
         return Coupling(self[leader].index, multiplier, offset)
 
     def effort_limit(self, joint: Joint) -> float:
-        """Returns the largest effort of a driven joint's motor [N m or N].
+        """Returns the maximum effort of a driven joint's motor [N m or N].
 
-        The motor also drives the mimic joints that follow the joint. Therefore, the largest efforts of these mimic
-        joints are added, each multiplied by the absolute multiplier of the coupling.
+        The motor also drives the mimic joints that follow the joint. Therefore, the maximum efforts of these mimic
+        joints are added, each multiplied by the absolute value of the coupling's multiplier.
         """
         return joint.max_effort + sum(
             abs(multiplier) * self.joints[index].max_effort
@@ -199,14 +199,14 @@ class JointModel:
         )
 
     def with_mimic_joints(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
-        """Adds the values of mimic joints to values of their leaders.
+        """Computes the values of mimic joints from the values of their leaders.
 
         Args:
             positions: Positions [rad or m] or velocities [rad/s or m/s], indexed by PyBullet's joint index.
             offsets: Whether to add the offsets of couplings: True for positions, False for velocities.
 
         Returns:
-            The given values and the values of the mimic joints that follow these joints.
+            The given values, and the values of the mimic joints whose leaders are in `positions`.
         """
         followers = {
             index: multiplier * positions[leader] + (offset if offsets else 0.0)
@@ -216,7 +216,7 @@ class JointModel:
         return {**positions, **followers}
 
     def resolve(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Checks values of joints, and returns the values of driven joints indexed by PyBullet's joint index.
+        """Checks values of joints, and returns the values of the driven joints, indexed by PyBullet's joint index.
 
         Values of other joints, such as fixed joints and mimic joints, are accepted but left out of the result.
 
@@ -244,7 +244,7 @@ class JointModel:
         return resolved
 
     def resolve_driven(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Checks and converts values as `resolve` does; also refuses values if none of the named joints is driven.
+        """Checks and converts values as `resolve` does; also requires that at least one of the named joints is driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -283,7 +283,7 @@ class JointModel:
 
 
 def couple(pb: Client, body_id: int, couplings: Mapping[int, Coupling]) -> None:
-    """Makes mimic joints follow their leaders in PyBullet by gear constraints, and disables the mimic joints' motors.
+    """Adds gear constraints that make mimic joints follow their leaders, and disables the mimic joints' motors.
 
     Args:
         pb: Client of the body.

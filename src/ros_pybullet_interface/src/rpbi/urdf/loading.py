@@ -33,7 +33,7 @@ from rpbi.meshes.trial import Mesh, Use, faults_in
 log = logging.getLogger(__name__)
 
 MAX_JOINTS = 127
-"""Largest number of joints, including fixed joints, that PyBullet reports for a robot.
+"""Maximum number of joints, including fixed joints, that PyBullet reports for a robot.
 
 Fixed joints of a robot with more joints are merged.
 """
@@ -41,14 +41,14 @@ MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
 """Names of robot formats that cannot be read, indexed by the tag of the file's root element."""
 PLACEHOLDER_FACTOR = 10.0
-"""Moments of inertia are taken for placeholders above this multiple of the largest possible for the link's size."""
+"""Multiple of the maximum for a link's size above which moments of inertia count as placeholders."""
 
 
 def urdf_problems(path: str) -> list[str]:
     """Checks a URDF file for faults that would make PyBullet refuse the file or crash.
 
-    Checks first the structure, then the number of joints, then the named files, and stops after a check with faults.
-    Meshes that were not loaded on this machine before are loaded in another process as a trial.
+    The checks are, in this order: structure, number of joints, files that the URDF names. The first check that finds
+    faults is the last. Meshes that were never loaded on this machine are loaded in another process as a trial.
 
     Returns:
         A sentence for each fault; empty if no fault was found.
@@ -76,7 +76,7 @@ def urdf_problems(path: str) -> list[str]:
 
 
 def check_joints(file: str, robot: Element) -> None:
-    """Checks that PyBullet can load all joints of a robot, if necessary with its fixed joints merged.
+    """Checks that PyBullet can load all joints of a robot, if necessary after merging fixed joints.
 
     Raises:
         ConfigError: If more than `MAX_JOINTS` joints are not fixed.
@@ -115,8 +115,8 @@ class PreparedUrdf(NamedTuple):
     """Text that PyBullet loads instead of a URDF file.
 
     Attributes:
-        text: URDF with only the parts that PyBullet reads. It contains nothing that PyBullet's parser would read
-            wrongly; the parser stops at null characters, cuts long lines and ignores errors.
+        text: URDF with only the parts that PyBullet reads. Text that PyBullet's parser would misread is avoided: the
+            parser stops at null characters, cuts long lines and ignores errors.
         joints: Number of joints in the text, including fixed joints.
         without_inertial: Names of the links that do not have an `<inertial>` element.
     """
@@ -127,7 +127,7 @@ class PreparedUrdf(NamedTuple):
 
 
 Prepare = Callable[[UrdfDocument, Files], Element]
-"""A function that returns the elements of a URDF for PyBullet; its result depends on its arguments alone."""
+"""A function that converts the XML elements of a URDF to a form that PyBullet can load, depending on nothing else."""
 
 
 def prepared_urdf(
@@ -139,7 +139,7 @@ def prepared_urdf(
 
     Args:
         arguments: Arguments of PyBullet's `loadURDF`.
-        prepare: Function that returns the elements of the URDF for PyBullet.
+        prepare: Function that converts the XML elements of the URDF to a form that PyBullet can load.
         has_window: Whether PyBullet has a window, in which the robot will be drawn.
 
     Raises:
@@ -177,9 +177,9 @@ def load_urdf(
         pb: Client into which the file is loaded.
         name: Name of the body, for messages.
         arguments: Arguments of PyBullet's `loadURDF`.
-        prepare: Function that returns the elements of the URDF for PyBullet.
-        inertia_from_urdf: Whether to use the URDF's moments of inertia. Otherwise PyBullet guesses them from the
-            shapes, unless `flags` in the arguments say otherwise.
+        prepare: Function that converts the XML elements of the URDF to a form that PyBullet can load.
+        inertia_from_urdf: True: uses the URDF's moments of inertia. False: PyBullet guesses the moments from the
+            shapes, unless `flags` in `arguments` contains URDF_USE_INERTIA_FROM_FILE.
 
     Raises:
         ConfigError: If the file cannot be loaded; the message names the problem.
@@ -212,11 +212,11 @@ def load_urdf(
 def flags_for(joints: int, flags: int) -> int:
     """Returns flags for `loadURDF`; adds `URDF_MERGE_FIXED_LINKS` if a robot has more than MAX_JOINTS joints.
 
-    PyBullet can load more joints, but would not report the poses of their links.
+    PyBullet can load further joints, but would not report the poses of the links below.
 
     Args:
         joints: Number of joints in the URDF.
-        flags: Other flags for `loadURDF`.
+        flags: Flags to which the flag is added.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 
@@ -224,8 +224,8 @@ def flags_for(joints: int, flags: int) -> int:
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
     """Completes the moments of inertia of a body that was loaded with the URDF's moments of inertia.
 
-    Lets PyBullet guess missing or impossible moments, and scales the others if the body is scaled. Logs a warning for
-    moments that are impossible or far too large.
+    Lets PyBullet guess missing or impossible moments. If the body is scaled, scales the remaining moments. Logs a
+    warning for moments that are impossible or far too large.
 
     Args:
         pb: Client of the body.

@@ -31,7 +31,7 @@ class Momentum(NamedTuple):
 
 
 class Subtree:
-    """A link of a body with joints, and all links below this link in the kinematic tree.
+    """A link of an articulated body, and all links below this link in the kinematic tree.
 
     Args:
         pb: Client of the body.

@@ -1,4 +1,4 @@
-"""The tasks of environments; to add one, write a class in its own file and a line here."""
+"""The tasks of environments. To add a task, write its class in a new file, and add a line to `TASKS`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The common part of tasks in which a hand moves in a box."""
+"""Base class of tasks in which a robot's hand moves within a box-shaped workspace."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rpbi.world import World
 
 
 class HandConfig(WorldTaskConfig):
-    """Options of tasks in which a hand moves in a box."""
+    """Options of tasks in which a robot's hand moves within a box-shaped workspace."""
 
     robot: Name = Field(description="The robot.")
     link: Text = Field(description="Its hand: the link that actions move.")
@@ -37,7 +37,7 @@ class HandTask(WorldTask):
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the position of the hand [m]."""
+        """Yields the inherited parts, then the position of the hand [m]."""
         yield from super().parts()
         yield ObservationPart("hand", self.config.low, self.config.high, self.hand)
 
@@ -50,7 +50,7 @@ class HandTask(WorldTask):
         return self.world.bodies[name].base_pose().position
 
     def touches(self, name: str) -> Sequence[tuple[str, float]]:
-        """Returns, for each contact of a body in the last tick, the name of the other body and the normal force [N]."""
+        """Returns, for each of a body's contacts in the last tick, the other body's name and the normal force [N]."""
         body = self.world.bodies[name]
         points = self.world.contacts.sample(body, self.world.clock.tick).points
         return [(point.other_body, point.normal_force) for point in points]

@@ -36,12 +36,12 @@ class LiftTask(HandTask):
         self._start_height = 0.0
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns translations of the hand, and the motion of the fingers: 1 opens, -1 closes them."""
+        """Returns the action parts for translating the hand and for moving the fingers."""
         config = self.config
         return [self.hand_action(), GripperAction(self.world, config.robot, config.fingers, config.finger_step)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the pose of the body."""
+        """Yields the inherited parts, then the pose of the body."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
 
@@ -51,11 +51,11 @@ class LiftTask(HandTask):
         super().reset(random)
 
     def lifted(self) -> float:
-        """Returns the height of the body above its start [m]."""
+        """Returns the height of the body above its start height [m]."""
         return self.position_of(self.config.object)[2] - self._start_height
 
     def reward(self) -> float:
-        """Returns the height of the body above its start, minus the distance between hand and body [m]."""
+        """Returns the height of the body above its start height, minus the distance between hand and body [m]."""
         return self.lifted() - math.dist(self.hand(), self.position_of(self.config.object))
 
     def has_succeeded(self) -> bool:

@@ -29,7 +29,7 @@ class PegConfig(HandConfig):
 
 
 class PegTask(HandTask):
-    """Inserts a peg into a hole; the hand is the tip of the peg."""
+    """Inserts a peg into a hole. The link that serves as the hand must be at the tip of the peg."""
 
     Config = PegConfig
 
@@ -41,16 +41,16 @@ class PegTask(HandTask):
         """Middle of the hole's opening, in the world [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns translations of the hand."""
+        """Returns the action part for translating the hand."""
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the vector from the tip to the hole's opening [m]."""
+        """Yields the inherited parts, then the vector from the tip to the hole's opening, in the world [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 
     def reset(self, random: np.random.Generator) -> None:
-        """Moves the hole by a random offset."""
+        """Moves the hole, with its walls, by a random offset."""
         x, y = random.uniform(-self.config.hole_offset, self.config.hole_offset, 2).tolist()
         self.hole = plus(self.config.hole, (x, y, 0.0))
         for name in self.config.walls:
@@ -59,10 +59,10 @@ class PegTask(HandTask):
         super().reset(random)
 
     def reward(self) -> float:
-        """Returns the negative distance between the tip and the target depth in the hole [m]."""
+        """Returns the negative distance between the tip and the target point in the hole [m]."""
         return -math.dist(minus(self.hole, (0.0, 0.0, self.config.depth)), self.hand())
 
     def has_succeeded(self) -> bool:
-        """Returns whether the tip is deep enough within the walls."""
+        """Returns whether the tip is between the walls and deep enough in the hole."""
         x, y, z = minus(self.hand(), self.hole)
         return bool(max(abs(x), abs(y)) <= self.config.half_width and z <= -self.config.depth)

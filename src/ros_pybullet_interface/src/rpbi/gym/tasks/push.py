@@ -37,17 +37,17 @@ class PushTask(HandTask):
         """Goal of the body, x and y in the world [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns horizontal translations of the hand."""
+        """Returns the action part for translating the hand horizontally."""
         return [self.hand_action("xy")]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the pose of the body, and the goal [m]."""
+        """Yields the inherited parts, then the pose of the body and the goal [m]."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
         yield ObservationPart("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Draws a goal."""
+        """Draws a random goal."""
         x, y = random.uniform(self.config.goal_low[:2], self.config.goal_high[:2]).tolist()
         self.goal = x, y
         super().reset(random)
@@ -65,6 +65,6 @@ class PushTask(HandTask):
         return bool(self.distance() <= self.config.tolerance)
 
     def has_ended(self) -> bool:
-        """Returns whether the body is at the goal, or horizontally outside the hand's box."""
+        """Returns whether the body is at the goal, or horizontally outside the workspace."""
         position, low, high = self.position_of(self.config.object), self.config.low, self.config.high
         return self.has_succeeded() or not all(low[i] <= position[i] <= high[i] for i in (0, 1))

@@ -41,17 +41,17 @@ class ReachTask(WorldTask):
         """The goal in the world [m]."""
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns changes of joint targets."""
+        """Returns the action part for changing joint targets."""
         config = self.config
         return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the vector from the link to the goal [m]."""
+        """Yields the inherited parts, then the vector from the link to the goal, in the world [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
 
     def reset(self, random: np.random.Generator) -> None:
-        """Draws a goal."""
+        """Draws a random goal."""
         x, y, z = random.uniform(self.config.goal_low, self.config.goal_high).tolist()
         self.goal = x, y, z
         super().reset(random)

@@ -48,11 +48,11 @@ class WipeTask(HandTask):
         self._rewarded = 0.0
 
     def actions(self) -> Sequence[ActionPart]:
-        """Returns translations of the hand."""
+        """Returns the action part for translating the hand."""
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Adds the force on the surface [N], and 1 for each cell that was wiped."""
+        """Yields the inherited parts, then the force on the surface [N], and for each cell 1 if wiped, otherwise 0."""
         yield from super().parts()
         yield ObservationPart("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
         count = len(self.cells)
@@ -69,12 +69,12 @@ class WipeTask(HandTask):
         return sum(force for other, force in self.touches(self.config.surface) if other == self.config.robot)
 
     def after_tick(self) -> None:
-        """Marks the cells around the hand as wiped if the hand presses hard enough; checked every `TICKS` ticks."""
+        """Every `TICKS` ticks, marks the cells around the hand as wiped if the hand presses hard enough."""
         if self.world.clock.tick % TICKS == 0 and self.force() >= self.config.force:
             self.is_wiped |= np.linalg.norm(self.cells - self.hand()[:2], axis=1) <= self.config.radius
 
     def reward(self) -> float:
-        """Returns the share of all cells that were newly wiped in the last action."""
+        """Returns the number of cells that were newly wiped in the last action, divided by the number of all cells."""
         before, self._rewarded = self._rewarded, float(self.is_wiped.mean())
         return self._rewarded - before
 
