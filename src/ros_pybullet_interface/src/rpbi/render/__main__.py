@@ -1,6 +1,6 @@
 """Entry point of the renderer process: `python -m rpbi.render --socket FD --sink module:factory`.
 
-The simulator starts this process. Further arguments are for the sink, which reads them from `sys.argv`.
+The simulator starts this process. The sink reads further arguments from `sys.argv`.
 """
 
 import argparse

@@ -33,7 +33,7 @@ class Intrinsics:
         height_px: Number of rows of the image.
         fov_deg: Vertical field of view, from the upper edge of the first row to the lower edge of the last row [deg].
         near_m: Nearest depth that is drawn, along the optical axis [m].
-        far_m: Farthest depth that is drawn [m]; background pixels have this depth.
+        far_m: Farthest depth that is drawn, along the optical axis [m]; background pixels have this depth.
     """
 
     width_px: int = 640
@@ -86,7 +86,7 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
 def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
     """Returns the pose in the world of an optical frame that looks at a target, with a level horizon.
 
-    If the camera looks straight up or down, the world's x axis points to its right.
+    If the camera looks straight up or down, the world's x axis points to the right in the image.
 
     Args:
         position: Position of the camera in the world, x, y, z [m].
@@ -125,7 +125,7 @@ def view_matrix(camera: geometry.Pose) -> Array:
 def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> npt.NDArray[np.float32]:
     """Converts a depth buffer to distances along the optical axis.
 
-    The formula keeps single precision, since `1 - buffer` is exact for large depths.
+    The formula is accurate in single precision, since `1 - buffer` is exact for large depths.
 
     Args:
         buffer: Depth buffer of the renderer, 0 at the near plane and 1 at the far plane, any shape.
@@ -164,8 +164,8 @@ class DepthNoise(NamedTuple):
         Args:
             depth_m: Depths [m], any shape; background pixels, whose depth is `far_m`, do not change.
             tick: Number of the tick.
-            near_m: Nearest depth of the camera [m]; results are clipped to it.
-            far_m: Farthest depth of the camera [m]; results are clipped to it.
+            near_m: Nearest depth of the camera [m], the lower limit of results.
+            far_m: Farthest depth of the camera [m], the upper limit of results.
         """
         generator = np.random.Generator(np.random.SFC64((self.seed, tick)))
         noise = generator.standard_normal(depth_m.shape, np.float32)
@@ -176,7 +176,7 @@ class DepthNoise(NamedTuple):
 
 
 class PointCloud:
-    """Converts the depth and colour images of one camera to points; all results share one array."""
+    """Converts the depth and colour images of one camera to points; each call overwrites the array of the last one."""
 
     def __init__(self, intrinsics: Intrinsics) -> None:
         K = intrinsics.K
@@ -196,8 +196,7 @@ class PointCloud:
 
         Returns:
             x, y, z in the optical frame [m] and the packed colour of each pixel, shape (height, width, 4). For
-            background pixels, x, y and z are NaN. The bytes of the colour are blue, green, red and 0, as in PCL. The
-            next call overwrites the array.
+            background pixels, x, y and z are NaN. The bytes of the colour are blue, green, red and 0, as in PCL.
         """
         z = self._points[..., 2]
         np.copyto(z, depth_m)

@@ -1,6 +1,6 @@
 """Messages between the simulator and the renderer process, and a non-blocking connection for them.
 
-The docstring of each message says who receives it.
+The docstring of each message names the receiver.
 """
 
 import pickle
@@ -30,7 +30,7 @@ class CameraAdded(NamedTuple):
 
 
 class CameraRemoved(NamedTuple):
-    """To the renderer: the camera of this name was removed."""
+    """To the renderer: the camera with this name was removed."""
 
     name: str
 
@@ -60,7 +60,7 @@ class Ready(NamedTuple):
 
 
 class Alive(NamedTuple):
-    """To the simulator: the renderer process is running; sent twice a second, or after a frame that takes longer."""
+    """To the simulator: the renderer process is running; sent twice a second, except while a frame is drawn."""
 
 
 class SceneAccepted(NamedTuple):
@@ -70,7 +70,7 @@ class SceneAccepted(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """To the simulator: the frame of a synchronous camera was passed to the sink, or has no viewers.
+    """To the simulator: the frame of a synchronous camera was passed to the sink, or skipped for lack of viewers.
 
     Attributes:
         camera: Name of the camera.
@@ -82,13 +82,13 @@ class Shown(NamedTuple):
 
 
 class Demanded(NamedTuple):
-    """To the simulator: the demand for each camera's images, indexed by camera name; sent on changes."""
+    """To the simulator: the demand for each camera's images, indexed by camera name; sent when a demand changes."""
 
     demands: Mapping[str, Demand]
 
 
 class Report(NamedTuple):
-    """To the simulator: a message for its log, with a level of the module `logging`."""
+    """To the simulator: a message for the simulator's log, with a level of the module `logging`."""
 
     level: int
     text: str
@@ -101,8 +101,8 @@ _CHUNK = 1 << 18
 class Channel:
     """Sends and receives picklable objects over a connected stream socket, without blocking.
 
-    Each object is preceded by its length. Data that the socket does not accept yet is buffered without limit, so the
-    sender must limit the amount. Only one thread may use a channel.
+    The channel sends an object's length before the object. Data that the socket does not accept yet is buffered without
+    limit, so the caller must limit the amount. Only one thread may use a channel.
     """
 
     def __init__(self, connection: socket.socket) -> None:

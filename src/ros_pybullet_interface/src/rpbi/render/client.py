@@ -40,15 +40,15 @@ SILENT_AFTER_S = 5.0
 
 
 class RenderClient:
-    """Runs the renderer process and sends scenes to it; only `wait` and `stop` wait for the process.
+    """Runs the renderer process and sends scenes to the process; only the methods `wait` and `stop` block.
 
-    The process starts with the first camera. For each camera, at most one scene is on its way to the renderer; until
-    the renderer accepts that scene, only the newest further scene is kept. Only the simulation thread may call the
+    The process starts with the first camera. After a scene was sent, later scenes of the same camera wait until the
+    renderer has accepted the sent one, and only the newest of them is kept. Only the simulation thread may call the
     methods.
 
     Args:
         cameras: The initial cameras.
-        load_log: The world's load log, which may grow at any time; the process gets all entries.
+        load_log: The world's load log, which may grow at any time; all entries are sent to the process.
         body_ids: Returns the simulator's PyBullet ids of all bodies, indexed by name.
         sink: Factory of the object that receives frames in the renderer process, as `module:factory`; see `frame.Sink`.
         arguments: Further command-line arguments of the process, for the sink.
@@ -76,7 +76,7 @@ class RenderClient:
         self._channel: Channel | None = None
         self._use_egl = use_egl
         self.fault = ""
-        """Why the renderer does not answer, empty if it does."""
+        """Why the renderer does not answer; empty if the renderer answers."""
         self._heard_s = 0.0
         self._started_s = 0.0
         self._start_at_s = 0.0
@@ -94,11 +94,11 @@ class RenderClient:
 
     @property
     def process_id(self) -> int | None:
-        """Id of the renderer process; None while it is not running."""
+        """Id of the renderer process; None while the process is not running."""
         return None if self._process is None else self._process.pid
 
     def poll(self) -> None:
-        """Starts the process if necessary, also after a failure, and handles its messages.
+        """Starts the process if necessary, also after a failure, and handles the process's messages.
 
         Call this method in every pass of the simulation loop.
         """
@@ -160,7 +160,7 @@ class RenderClient:
     def send(self, sample: SceneSample) -> None:
         """Sends a scene to the renderer, or keeps it until the renderer has accepted the camera's previous scene.
 
-        A newer scene of the same camera replaces a kept one.
+        A newer scene of the same camera replaces a scene that is being kept.
         """
         self._waiting[sample.name] = DrawnScene(sample, dict(self._body_ids()))
         self._send_waiting(sample.name)
@@ -173,7 +173,7 @@ class RenderClient:
                 self._send_waiting(name)
 
     def forget_scenes(self) -> None:
-        """Drops the scenes that wait to be sent, and those kept for new viewers."""
+        """Drops the scenes that wait to be sent, and the scenes that are kept for new viewers."""
         self._waiting.clear()
         self._last.clear()
 
@@ -185,7 +185,7 @@ class RenderClient:
                 scenes[camera] = scene._replace(sample=scene.sample._replace(bodies=bodies))
 
     def stop(self) -> bool:
-        """Ends the process, and kills it if it does not end within STOP_TIMEOUT_S.
+        """Ends the process, and kills the process if it does not end within STOP_TIMEOUT_S.
 
         Returns:
             False if the process was killed.
@@ -221,7 +221,7 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Logs a warning when the process stops sending messages, and when it sends messages again."""
+        """Logs a warning when the process has not sent messages for SILENT_AFTER_S, and when messages arrive again."""
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s
@@ -235,7 +235,7 @@ class RenderClient:
             log.warning("camera: %s: no images for %g s", self.fault, SILENT_AFTER_S)
 
     def _bury(self) -> None:
-        """Logs that the process has ended, and decides when to restart it and whether to try EGL again."""
+        """If the process has ended, logs why, and decides when to restart the process and whether to try EGL again."""
         assert self._process is not None
         code = self._process.poll()
         if code is None:

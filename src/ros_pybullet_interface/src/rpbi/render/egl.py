@@ -1,9 +1,9 @@
 """Gives PyBullet's EGL renderer a depth buffer of 24 bits.
 
-PyBullet's EGL plugin requests a depth buffer of at least 8 bits, and Mesa chooses its smallest one, which has 16 bits.
-With a near plane at 1 cm, the depth of a wall at 2 m is then wrong by up to 3 mm. This module therefore replaces the
-plugin's context by a context with a 24-bit depth buffer, after the plugin was loaded and before shapes are loaded. The
-new context shares the plugin's shaders and textures. From then on, this thread draws to the new context's surface.
+PyBullet's EGL plugin requests a depth buffer of at least 8 bits, for which Mesa chooses 16 bits. With a near plane at
+1 cm, the depth of a wall at 2 m is then wrong by up to 3 mm. After the plugin was loaded and before shapes are loaded,
+this module therefore replaces the plugin's context by a context with a 24-bit depth buffer. The new context shares the
+plugin's shaders and textures. From then on, the calling thread draws to the new context's surface.
 """
 
 import ctypes
@@ -32,7 +32,7 @@ class EglError(RuntimeError):
 
 
 class Egl:
-    """The EGL context that is current in this thread.
+    """The EGL context that is current in the calling thread.
 
     Raises:
         EglError: If there is no EGL library or no current context.
@@ -65,8 +65,8 @@ class Egl:
         """Creates a context with a 24-bit depth buffer and makes it current; call this before shapes are loaded.
 
         Args:
-            width_px: Largest number of columns of all images.
-            height_px: Largest number of rows of all images.
+            width_px: Maximum number of columns of an image.
+            height_px: Maximum number of rows of an image.
 
         Raises:
             EglError: If EGL cannot create such a context; the old context then stays current.
@@ -87,7 +87,7 @@ class Egl:
         self._use(surface, context)
 
     def resize(self, width_px: int, height_px: int) -> None:
-        """Creates a drawing surface of another size and makes it current; call `deepen` before.
+        """Creates a drawing surface of another size and makes it current; `deepen` must have been called before.
 
         Raises:
             EglError: If EGL cannot create such a surface; the old surface then stays current.

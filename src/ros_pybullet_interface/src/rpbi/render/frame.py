@@ -21,7 +21,7 @@ class Camera(NamedTuple):
         name: Unique name of the camera.
         frame_id: Name of the camera's optical frame on TF.
         intrinsics: Intrinsics of the camera.
-        topic_name: Name of the camera in topics, which may differ from `name`.
+        topic_name: Name of the camera in the names of topics, which may differ from `name`.
         pointcloud: Whether the camera has a point cloud topic.
         synchronous: Whether the simulation waits for every frame; otherwise frames may be dropped.
         noise: Noise of the depth image; None for exact depths.
@@ -55,7 +55,7 @@ class Camera(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Images of a camera at one tick; images without demand are None.
+    """Images of a camera at one tick; images that were not requested are None.
 
     Attributes:
         camera: The camera.
@@ -80,7 +80,7 @@ class Demand(NamedTuple):
     Attributes:
         streams: Streams with viewers, a subset of `colour`, `jpeg`, `depth`, `segmentation`, `points` and `info`. For
             `jpeg`, the colour image is drawn; for `points`, colour and depth.
-        seen: Number of viewers that have ever connected; an increase means that there is a new viewer.
+        seen: Number of viewers that have ever connected, which increases with each new viewer.
     """
 
     streams: frozenset[str] = frozenset()

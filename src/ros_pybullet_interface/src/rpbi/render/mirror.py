@@ -28,8 +28,8 @@ SHORTEST_STEP_S = 1e-9
 class SoftShapes:
     """Sets the shapes of soft bodies in a client without physics.
 
-    PyBullet draws a soft body in the shape that it had after the last step. A new shape therefore needs a step, which
-    is made so short that bodies practically do not move.
+    PyBullet draws a soft body in the shape that the body had after the last simulation step. A new shape therefore
+    needs a step, whose length is so short that bodies practically do not move.
 
     Args:
         pb: The client, right after its world was set up.
@@ -52,7 +52,7 @@ class SoftShapes:
         """Moves the nodes of soft bodies; the caller must set the poses of rigid bodies afterwards.
 
         Args:
-            nodes: Each soft body, with the positions of all its simulated nodes in the world [m].
+            nodes: Pairs of a soft body and the positions of all its simulated nodes in the world [m].
         """
         for body, places in nodes:
             self._pb.resetMeshData(body.body_id, places)
@@ -62,7 +62,7 @@ class SoftShapes:
 class Mirror:
     """A copy of the simulator's world without physics.
 
-    Its bodies are built from the load log, and their poses are set from scenes.
+    The bodies are built from the load log, and their poses are set from scenes.
     """
 
     def __init__(self, pb: Client) -> None:
@@ -79,7 +79,7 @@ class Mirror:
         return self._transparency.shapes
 
     def apply(self, entry: LogEntry) -> None:
-        """Applies an entry of the load log; if that fails, logs a warning, and images do not show the body."""
+        """Applies an entry of the load log; after a failure, logs a warning, and images may lack the entry's body."""
         if entry.what == "physics":
             return  # no physics here
         if entry.what == "world":
@@ -102,7 +102,7 @@ class Mirror:
         self._fine_shapes.close()
 
     def _as_drawn(self, entry: LogEntry) -> LogEntry:
-        """Returns the entry with its visual shape replaced by the mesh to draw, see `FineShapes`."""
+        """Returns a copy of an entry, with the mesh to draw in place of the body's visual shape; see `FineShapes`."""
         if entry.what != "add":
             return entry
         kind, config = entry.arguments
@@ -113,7 +113,7 @@ class Mirror:
         return entry._replace(arguments=(kind, drawn))
 
     def show(self, states: Iterable[BodyState]) -> None:
-        """Sets all bodies to the given states of the simulator."""
+        """Sets bodies to given states of the simulator's bodies."""
         states = tuple(states)
         soft = [state for state in states if state.nodes and state.name in self._bodies]
         if any(self._shown.get(state.name) != state for state in soft):
@@ -151,7 +151,7 @@ class Mirror:
         return frame._replace(**images)
 
     def pose(self, state: BodyState) -> None:
-        """Sets a rigid body to a given state of the simulator."""
+        """Sets a rigid body to a given state of the same body in the simulator."""
         body = self._bodies.get(state.name)
         shown = self._shown.get(state.name)
         if body is None or shown == state:

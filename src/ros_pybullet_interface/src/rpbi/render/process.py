@@ -46,7 +46,7 @@ class RenderProcess:
     Args:
         channel: Connection to the simulator.
         make_sink: Creates the object that receives the frames.
-        gives_way: Whether to lower the process's priority after the start.
+        gives_way: Whether to lower the process's priority after the start; without effect with synchronous cameras.
     """
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:

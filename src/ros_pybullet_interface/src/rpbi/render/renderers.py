@@ -38,8 +38,8 @@ class TransparentShape(NamedTuple):
 class Transparency:
     """Lists the transparent shapes of the bodies in a client, while bodies are added and removed.
 
-    For a body whose id was used before, PyBullet's EGL plugin also reports the shapes of the removed body, before those
-    of the new one. This class skips them.
+    For a body whose id was used before, PyBullet's EGL plugin first reports the shapes of the removed body, then the
+    shapes of the new body. This class skips the shapes of the removed body.
     """
 
     def __init__(self, pb: Client) -> None:
@@ -122,9 +122,9 @@ class Renderer(Protocol):
 class TinyRenderer:
     """PyBullet's software renderer.
 
-    PyBullet samples each pixel at its upper left corner instead of its centre, and each row one pixel too low. The
-    image would therefore be shifted half a pixel to the right and half a pixel up from the image that K describes.
-    `draw` shifts the projection by the same amount in the opposite direction.
+    PyBullet samples each pixel at its upper left corner instead of its centre, and in addition each row one pixel too
+    low. The image would therefore be shifted half a pixel to the right and half a pixel up from the image that K
+    describes. `draw` shifts the projection by the same amount in the opposite direction.
     """
 
     name = "TinyRenderer"
@@ -141,7 +141,7 @@ class TinyRenderer:
         """Draws the image of a camera.
 
         The renderer draws transparent shapes as if they were opaque. This method therefore draws a second image without
-        them and blends both. A transparent shape behind another one is not visible.
+        transparent shapes and blends both images. A transparent shape behind another transparent shape is not visible.
         """
         projection = intrinsics.projection
         projection[0, 2] += 1.0 / intrinsics.width_px
@@ -170,15 +170,15 @@ class TinyRenderer:
 
 
 class EglRenderer:
-    """Draws with OpenGL without a screen: on the graphics card, or on all processor cores with Mesa's llvmpipe.
+    """Draws off-screen with OpenGL: on the graphics card, or on all processor cores with Mesa's llvmpipe.
 
     Only the thread that created the object may call its methods.
 
     Args:
-        cameras: The initial cameras, at least one; the largest determines the size of the drawing surface.
+        cameras: The initial cameras, at least one; the largest image determines the size of the drawing surface.
 
     Raises:
-        EglError: If EGL cannot be loaded or draws a wrong test image. Some failures end the process instead.
+        EglError: If EGL cannot be loaded or draws a wrong test image. Some failures of EGL end the process instead.
     """
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
@@ -214,8 +214,8 @@ class EglRenderer:
     ) -> Drawing:
         """Draws the image of a camera.
 
-        PyBullet's colour pass does not write transparent shapes to the depth buffer, but its segmentation pass does.
-        With transparent shapes, the depth is therefore read after the segmentation pass.
+        PyBullet's colour pass does not write transparent shapes to the depth buffer, but the segmentation pass does. If
+        there are transparent shapes, this method therefore reads the depth after the segmentation pass.
         """
         both = segmentation or bool(transparent)
         flags = 0 if both else self.pb.ER_NO_SEGMENTATION_MASK

@@ -38,16 +38,16 @@ class SurfaceMesh(NamedTuple):
 
 
 def box(half_extents: Sequence[float]) -> SurfaceMesh:
-    """Returns a box centred at the origin, with half its size along x, y and z given in metres.
+    """Returns a box centred at the origin; `half_extents` is half the size along x, y and z [m].
 
-    The corners of each side have that side's normal.
+    Each side has its own corners, with the side's normal.
     """
     unit = _concatenated([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
     return unit._replace(points=unit.points * np.asarray(half_extents))
 
 
 def plane(normal: Sequence[float]) -> SurfaceMesh:
-    """Returns a large square centred at the origin, visible from both sides; the normal may have any length."""
+    """Returns a large square centred at the origin, visible from both sides; `normal` may have any length."""
     upwards = np.asarray(normal) / np.linalg.norm(normal)
     both = _concatenated([_square(upwards), _square(-upwards)])
     on_plane = both.points - (both.points @ upwards)[:, None] * upwards
@@ -72,7 +72,7 @@ def capsule(radius: float, length: float) -> SurfaceMesh:
 
 
 def cylinder(radius: float, length: float) -> SurfaceMesh:
-    """Returns a cylinder with closed ends, centred at the origin with its axis along z; radius and length are in m."""
+    """Returns a cylinder with closed ends, centred at the origin with its axis along z; all lengths are in metres."""
     half = length / 2
     outline = np.array([[0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0, half]])
     normals = np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float)

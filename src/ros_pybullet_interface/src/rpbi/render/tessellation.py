@@ -1,9 +1,9 @@
 """Replaces PyBullet's primitive visual shapes by meshes.
 
 PyBullet draws spheres and cylinders with few triangles (the error of a sphere of 0.2 m is up to 13 mm), and smooths the
-edges of boxes in its shading. With EGL, it crashes on visual planes and on meshes without a file. The renderer process
-therefore draws meshes instead. EGL confuses transparent shapes from the same path, so each transparent shape gets its
-own path to the file, such as `./shape_0.obj`.
+edges of boxes in its shading. With EGL, PyBullet crashes on visual planes and on meshes without a file. The renderer
+process therefore draws meshes from files instead. PyBullet's EGL plugin confuses transparent shapes from the same path,
+so each transparent shape gets its own path to the file, such as `./shape_0.obj`.
 """
 
 import os
@@ -46,8 +46,8 @@ class FineShapes:
     def of(self, shape: CreateVisualShape) -> CreateVisualShape:
         """Returns the shape to draw in place of a given visual shape.
 
-        Primitive and invisible shapes become meshes from files. A mesh from a file stays the same; a transparent one
-        gets its own path to the file. Other shapes are returned unchanged.
+        Primitive shapes, invisible shapes and meshes without a file become meshes from files. A transparent mesh gets
+        its own path to its file. Other shapes are returned unchanged.
         """
         opacity = 1.0 if shape.rgbaColor is None else shape.rgbaColor[3]
         make = self._surface_of.get(shape.shapeType)

@@ -1,4 +1,4 @@
-"""Publishes camera images in ROS, as a node of its own in the renderer process."""
+"""Publishes camera images in ROS, as a separate node in the renderer process."""
 
 import sys
 import time
@@ -70,7 +70,7 @@ class ImagePublisher:
 
 
 def camera_node(simulator: str) -> str:
-    """Returns the name of the node that publishes the images: the simulator's node name with `_camera` appended."""
+    """Returns the name of the node that publishes the images: the simulator's node name and `_camera`."""
     return f"{simulator}_camera"
 
 
@@ -92,7 +92,7 @@ class _Topic(StateTopic):
     """A topic that counts all subscribers that have ever connected.
 
     Args:
-        waits: Whether `publish` waits until the message is sent; otherwise messages are buffered.
+        waits: Whether `publish` waits until the message is sent; if not, messages are buffered.
     """
 
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
@@ -129,9 +129,9 @@ class _CameraTopics:
         self._published_ns = -1
 
     def wait_for_subscribers(self) -> None:
-        """Waits until all subscribers that are registered at the ROS master have connected.
+        """Waits at most `LONGEST_WAIT_S` until all subscribers that are registered at the ROS master have connected.
 
-        It waits for `LONGEST_WAIT_S` at most, since registered subscribers may have ended.
+        The wait is limited, since registered subscribers may have ended.
         """
         registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
         end_s = time.monotonic() + LONGEST_WAIT_S
@@ -141,13 +141,13 @@ class _CameraTopics:
                 time.sleep(0.01)
 
     def demand(self) -> Demand:
-        """Returns the streams that have subscribers, and the number of subscribers so far."""
+        """Returns the streams that have subscribers, and the number of subscribers that have ever connected."""
         topics = self._topics.values()
         streams = frozenset(stream for stream, topic in topics if topic.has_subscribers)
         return Demand(streams, sum(topic.seen for _, topic in topics))
 
     def publish(self, frame: Frame) -> None:
-        """Publishes the images of a frame; a frame with the same stamp as the last one goes to new subscribers only."""
+        """Publishes the images of a frame; sends a frame with the last frame's stamp to new subscribers only."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
         again = frame.stamp_ns == self._published_ns
         for stream, topic in self._topics.values():

@@ -59,7 +59,8 @@ class ScenePublisher:
     def before_tick(self) -> None:
         """Waits until all synchronous cameras are ready for the next tick.
 
-        A camera is ready if the renderer has reported its subscribers and, with subscribers, if its pose is known.
+        A camera is ready if the renderer has reported that it has no subscribers, or that it has subscribers and its
+        pose is known.
 
         Raises:
             PhysicsError: If a camera is not ready after LONGEST_WAIT_S.
@@ -75,7 +76,7 @@ class ScenePublisher:
                 self._wait_for(partial(_is_placed_or_unwanted, sensor), name, missing)
 
     def publish(self, sample: SceneSample, stamp_ns: int) -> None:
-        """Sends a scene to the renderer process, which draws and publishes its images."""
+        """Sends a scene to the renderer process, which draws and publishes the scene's images."""
         self._renderer.send(sample)
         if self._sensors[sample.name].config.synchronous:
             self._awaited.append(sample)
@@ -106,7 +107,7 @@ class ScenePublisher:
         self._renderer.forget_scenes()
 
     def forget(self, name: str) -> None:
-        """Deletes a removed body from the scenes that are stored."""
+        """Deletes a removed body from the stored scenes."""
         self._renderer.forget_body(name)
 
     def facts(self) -> dict[str, str]:
@@ -144,8 +145,8 @@ class ScenePublisher:
 
         Args:
             condition: Returns whether the condition holds.
-            name: The camera.
-            missing: What is missing, for the error message.
+            name: Name of the camera.
+            missing: Text that says what is missing, for the error message.
             needs_renderer: Whether to fail at once if the renderer process has ended.
 
         Raises:

@@ -57,7 +57,12 @@ CLOUD_TOPIC = (
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
-    """Returns the streams and topics of a camera, indexed by topic name; `topic_name` is the camera's name in them."""
+    """Returns a camera's streams and topics, indexed by ROS name.
+
+    Args:
+        topic_name: Name of the camera in the ROS names.
+        pointcloud: Whether the camera has a point cloud topic.
+    """
     rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
     return {topic.name.format(name=topic_name): (stream, topic) for stream, topic in rows}
 

@@ -19,9 +19,9 @@ from rpbi.world.world_warnings import world_warnings
 
 
 def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
-    """Reports all problems of a world at once, or lists its topics and services; needs no ROS master.
+    """Reports all problems of a world, or if there are none, lists its topics and services; needs no ROS master.
 
-    It ends with 1 if there are problems. `{package}/PATH` is resolved.
+    The exit code is 1 if there are problems. `{package}/PATH` is resolved.
     """
     warnings = _Warnings()
     logging.getLogger().addHandler(warnings)

@@ -46,7 +46,7 @@ class _CommandTopic(FastTopic):
 
 
 class CommandPublisher:
-    """Publishes the description of a world once, and its commands in small messages, one in each pass of the loop."""
+    """Publishes the description of a world once, and the world's commands in small messages, one for each `spin`."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -58,7 +58,7 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends the next new commands to all subscribers, and the next earlier commands to new subscribers."""
+        """Sends a message with new commands to all subscribers, and with earlier commands to each new subscriber."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())

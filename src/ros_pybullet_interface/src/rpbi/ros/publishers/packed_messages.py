@@ -1,6 +1,6 @@
 """Message types with fast serialisation, for messages that are sent often.
 
-They pack all fields in one call, and write the same bytes as the standard types.
+These types pack all fields in one call, and write the same bytes as the standard types.
 """
 
 import struct

@@ -27,7 +27,7 @@ class TopicPublisher:
 
     def __init__(self) -> None:
         self._routes: dict[SampleKey, tuple[FastTopic, Callable[[Any, int], Any]]] = {}
-        """The topic of each sensor, and what makes its messages."""
+        """The topic of each sensor, and the function that converts the sensor's samples to messages."""
         self._last: dict[SampleKey, tuple[Any, int]] = {}
 
     def open(self, key: SampleKey, row: Topic) -> None:
@@ -86,12 +86,12 @@ class SamplePublishers:
         self._elsewhere: dict[type, Any] = {LinkPoseSample: self._transforms, SceneSample: self.cameras}
         self._all = (self._topics, self._transforms, self.cameras)
         self._on_tf: dict[type, Callable[[Any, int], tuple[LinkPoseSample, int]]] = {}
-        """Conversion of the types of samples that go to TF too."""
+        """For types of samples that also go to TF: the function that converts a sample to poses."""
         self._open: dict[str, list[SampleKey]] = {}
-        """The sensors of each body whose topics are open."""
+        """For each body whose topics are open: the keys of the body's sensors."""
 
     def find_topics(self, name: str) -> None:
-        """Looks up the topics of a body's sensors and inputs, before the body's first sample.
+        """Finds the topics of a body's sensors and inputs; call this method before the body's first sample.
 
         Raises:
             InterfaceError: If a topic that another package defines cannot be found.
@@ -155,7 +155,7 @@ class TickPublisher:
     """Publishes the time of a tick on /clock, then the samples of the tick.
 
     Args:
-        idle_ticks: Number of ticks that a running world would advance between two calls of `publish_idle`.
+        idle_ticks: Number of ticks that fit between two calls of `publish_idle`, at the pace of a running world.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
@@ -164,7 +164,7 @@ class TickPublisher:
         self._clock = ClockPublisher(world) if world.clock.simulated else None
         self._idle_ticks = idle_ticks
         self._idle_tick = 0
-        """The tick of the world if it had not been stopped."""
+        """The tick that the world would have reached by now if it had not been stopped."""
 
     def set_factor(self, real_time_factor: float) -> None:
         """Adapts the rate of /clock to a real-time factor; 0 is as fast as possible."""
@@ -192,7 +192,7 @@ class TickPublisher:
         self._publishers.publish(samples + self._world.read_rest(), self._world.clock.stamp_ns)
 
     def publish_last_time(self) -> None:
-        """Publishes the time of the last tick before a stop, without samples; also works for a broken world."""
+        """Publishes the time of the last tick before a stop, without samples; also works after the world has failed."""
         self._idle_tick = self._world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()
@@ -205,8 +205,8 @@ class TickPublisher:
     def publish_idle(self) -> None:
         """Publishes the samples of a stopped world, without publishing a stamp twice.
 
-        In simulated time, sensors that were not read at this tick publish a sample, and new subscribers get the last
-        samples. In wall time, sensors publish at their rates with new stamps.
+        In simulated time, sensors that were not read at this tick are read and published, and new subscribers get the
+        last samples. In wall time, sensors are published at their rates with new stamps.
         """
         if self._clock is not None:
             self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)

@@ -62,7 +62,7 @@ def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
 
 
 def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
-    """Converts a sample with force and moment to a message; only frames below `rpbi/` get the TF prefix."""
+    """Converts a sample with force and moment to a message; only frames whose name starts with `rpbi/` get a prefix."""
     message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
     is_ours = sample.frame_id.startswith("rpbi/")
     message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
@@ -105,7 +105,7 @@ def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> Marker
 
 
 def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
-    """Converts a sample with pose and twist of a base to a message; the covariances are zero, since both are exact."""
+    """Converts a sample with a base's pose and twist to a message; covariances are zero, since the sample is exact."""
     message = Odometry(header=_header(stamp_ns), child_frame_id=prefixed(sample.frame))
     message.pose.pose.position = Point(*sample.pose.position)
     message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
@@ -248,8 +248,8 @@ APRIL_TAGS = Topic(
 def address(sensor: Sensor) -> str:
     """Returns the name by which requests address a sensor.
 
-    It is the sensor's topic without `rpbi/`. A sensor that only publishes on TF is addressed as `NAME/tf`, a camera by
-    the camera's name.
+    The name is the sensor's topic without `rpbi/`, `NAME/tf` for a sensor that only publishes on TF, and the camera's
+    name for a camera.
     """
     topic = sample_topic(sensor)
     if topic is not None:
@@ -258,7 +258,7 @@ def address(sensor: Sensor) -> str:
 
 
 def sample_topic(sensor: Sensor) -> Topic | None:
-    """Returns the topic of a sensor; None if its samples are not published on a topic of their own.
+    """Returns the topic of a sensor; None if the sensor's samples do not have their own topic.
 
     Raises:
         ConfigError: If another package defines the sensor, and its `ros_topic` is missing or cannot be found.

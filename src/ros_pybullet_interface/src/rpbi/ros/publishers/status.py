@@ -54,7 +54,7 @@ takes 10 µs."""
 
 
 def _warn_of_rivals() -> None:
-    """Logs a warning if another node publishes /clock too, since ROS time would jump between both clocks."""
+    """Logs a warning if another node publishes /clock too, since ROS time would jump between the two times."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
     rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
@@ -72,7 +72,7 @@ def state_message(world: World, with_hash: bool, **pace: Any) -> SimulationState
     Args:
         world: The world.
         with_hash: Whether to compute the hash of the state; otherwise that field is empty.
-        pace: Further fields of the message, which come from the simulation loop, such as `running`.
+        pace: Further fields of the message that describe the simulation loop, such as `running`.
     """
     message = SimulationState(
         tick=world.clock.tick,
@@ -127,14 +127,14 @@ class ClockPublisher:
 
 
 class StatusPublisher:
-    """Publishes whether the world runs on `rpbi/status`, and its diagnostics on /diagnostics.
+    """Publishes the world's status (running or stopped) on `rpbi/status`, and diagnostics on /diagnostics.
 
     Args:
         world: The world.
         pacer: Times the ticks of the world.
         facts: Returns further values for the diagnostics.
-        fault: Returns a fault outside of the world, for a warning in the diagnostics; empty without a fault.
-        priority: Changes the scheduling of the node's threads with the load; None if it is never changed.
+        fault: Returns a fault outside of the world, for a warning in the diagnostics; an empty text without a fault.
+        priority: Adapts the scheduling priority of the node's threads to the load; None if it is never changed.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class StatusPublisher:
         self._world, self._clock, self._pacer, self._facts, self._fault = world, world.clock, pacer, facts, fault
         self._priority = priority
         self._load = Load.now(world.physics_s, world.clock.tick)
-        """At the last message of the diagnostics."""
+        """Load at the last message of the diagnostics."""
         self._slow_periods = 0
         self._advice: set[str] = set()
         """Advice logged so far for slow worlds."""
@@ -226,7 +226,7 @@ class StatusPublisher:
 class StatePublisher:
     """Publishes the state of the simulation on `rpbi/state`.
 
-    Messages come at a rate in wall time. Messages with a hash of the state come at a rate in the world's time.
+    Messages without a hash of the state have a rate in wall time, messages with a hash a rate in the world's time.
     """
 
     def __init__(self, world: World, pacer: Pacer) -> None:
@@ -243,7 +243,7 @@ class StatePublisher:
         self.restart()
 
     def restart(self) -> None:
-        """Publishes the state of a world that was just built or reset; with its hash, if hashes are configured."""
+        """Publishes the state of a world that was just built or reset; includes the hash, if hashes are configured."""
         tick = self._world.clock.tick
         self._hash_tick = None if self._schedule is None else self._schedule.next_due(tick)
         self._begin_window()
@@ -260,7 +260,7 @@ class StatePublisher:
         return math.inf if self._hash_tick is None else self._hash_tick - self._world.clock.tick
 
     def publish_hash(self) -> None:
-        """Publishes the state of the present tick with its hash."""
+        """Publishes the state of the present tick, including the hash."""
         if self._schedule is not None:
             self._hash_tick = self._schedule.next_due(self._world.clock.tick)
         self._publish(with_hash=True)

@@ -41,7 +41,7 @@ class TransformCollector:
     def drain(self) -> PackedTransforms | None:
         """Returns a message with the collected transforms, and clears the collection.
 
-        Returns None if there are no transforms. The next `collect` overwrites the message's transforms.
+        Returns None if there are no transforms. The next call of `collect` overwrites the message's transforms.
         """
         collected, self._collected = self._collected, []
         return PackedTransforms(collected) if collected else None

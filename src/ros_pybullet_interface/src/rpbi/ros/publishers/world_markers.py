@@ -90,10 +90,10 @@ _Key = tuple[str, int]
 class WorldMarkers:
     """Publishes the visual shapes of all bodies on a latched topic, whenever a shape is added, removed or moved.
 
-    A shape whose link is on TF has a marker in the link's frame, and is not sent again when the link moves. Other
-    shapes have markers in the world frame. While the topic has subscribers, these shapes are checked, and all markers
-    are sent again when one of these shapes has moved. A check of many shapes takes several polls. Only the simulation
-    thread may create and poll this object.
+    A shape whose link is on TF has a marker in the link's frame, which is not sent again when the link moves. Other
+    shapes have markers in the world frame. While the topic has subscribers, the poses of these other shapes are
+    checked, and all markers are sent again if one of them has moved. A check of many shapes takes several calls of
+    `poll`. Only the simulation thread may create this object and call `poll`.
 
     Args:
         world: The world.
@@ -134,7 +134,7 @@ class WorldMarkers:
         self._check = None
 
     def _check_all(self) -> Iterator[None]:
-        """Builds the markers of all shapes and yields after each; at the end, publishes all if anything has changed."""
+        """Builds the markers of all shapes, and yields after each; then publishes all markers if one has changed."""
         self._markers, self._loose, self._shown = {}, [], {}
         for body in self._world.bodies.values():
             for number, shape in enumerate(body_shapes(body)):

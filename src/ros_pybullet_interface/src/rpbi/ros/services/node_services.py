@@ -1,6 +1,6 @@
-"""The services of the node: time, objects, cameras, sensors and dynamics.
+"""Services of the node for time, objects, cameras, sensors and dynamics.
 
-Only the simulation thread calls PyBullet; the handlers send requests to it.
+Only the simulation thread calls PyBullet; the handlers send requests to that thread.
 """
 
 import logging
@@ -140,7 +140,7 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
 
 
 def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Advances by many ticks as `rpbi/step_n` does, and applies each input of the request before its tick."""
+    """Advances by many ticks as `rpbi/step_n` does, and applies inputs of the request before given ticks."""
     waiting = sorted(map(planned_input, request.inputs), key=lambda each: each.tick)
     if waiting and waiting[-1].tick >= max(request.steps, 1):
         raise InterfaceError(f"{waiting[-1].slot}: expected a tick below {request.steps}, got {waiting[-1].tick}")
@@ -157,13 +157,13 @@ def _step_with_inputs(node: NodeContext, request: StepWithInputsRequest) -> tupl
 
 
 def _reset(node: NodeContext, _: Any) -> Answer:
-    """Restores the initial state of the world, to the last bit; stamps continue."""
+    """Restores the initial state of the world, bit for bit; stamps continue."""
     node.objects.reset()
     return Answer(True, "the world is as configured")
 
 
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
-    """Returns a hash of the world's state, which is the same for worlds in the same state at the same tick."""
+    """Returns a hash of the world's state; worlds in the same state at the same tick have the same hash."""
     world, clock = node.simulation.world, node.simulation.world.clock
     return node.ask(
         lambda: (True, "", clock.tick, to_ros_time(clock.stamp_ns), world.resets, world.state_hash()), even_if_busy=True
@@ -207,9 +207,9 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
-    """Reads YAML text: the keys of an object, or the key `file` and keys that override those of the file.
+    """Reads YAML text: the keys of an object, or the key `file` and keys that override the file's.
 
-    It returns the same values as `_read_object`. `key` is the request's field with the text, for error messages.
+    Returns the same values as `_read_object`. `key` is the request's field that contains the text, for error messages.
     """
     data = load_configs(text, key, MAX_BYTES)
     if FILE not in data:
@@ -223,7 +223,7 @@ def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], 
 
 
 def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Adds a camera from YAML text: the keys of `rgbd_sensor`, or `file` and keys that override those of the file."""
+    """Adds a camera from YAML text: the keys of `rgbd_sensor`, or the key `file` and keys that override the file's."""
     data, file, _ = _read_text(node, request.data, "data")
     config = RgbdSensorConfig.parse(data, file)
     node.objects.add_camera(config, file)
@@ -231,9 +231,9 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:
-    """Finds a YAML file and returns its path; other types of files are refused, so that services do not reveal them.
+    """Finds a YAML file and returns its path; refuses other types of files, so that services do not reveal them.
 
-    `key` is the request's field with the file's name, for error messages.
+    `key` is the request's field that contains the file's name, for error messages.
     """
     if not name.lower().endswith(YAML_SUFFIXES):
         raise InterfaceError(f"{key}: expected the name of a YAML file ({', '.join(YAML_SUFFIXES)}), got {shown(name)}")
@@ -264,7 +264,7 @@ def _get_dynamics(node: NodeContext, request: GetObjectDynamicsRequest) -> tuple
 
 
 def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequest) -> Answer:
-    """Changes the dynamics of an object or a link: all values that differ from the present ones."""
+    """Changes those dynamics of an object or a link whose requested values differ from the present values."""
     world, asked = node.simulation.world, request.object_dynamics
     wanted = LinkDynamics(*(getattr(asked, field) for field in LinkDynamics._fields))
 
@@ -279,7 +279,7 @@ def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequ
 
 
 def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
-    """Changes the dynamics of an object or a link, by YAML text with keys of `changeDynamics`."""
+    """Changes the dynamics of an object or a link; the request has keys of `changeDynamics` as YAML text."""
     change = ChangeDynamics.parse(load_configs(request.config, "config", MAX_BYTES), "config")
     keys = ", ".join(change.kwargs())
     if not keys:
@@ -289,7 +289,7 @@ def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answe
 
 
 def _set_real_time_factor(node: NodeContext, request: SetRealTimeFactorRequest) -> Answer:
-    """Changes the requested real-time factor; a reset keeps it."""
+    """Sets the real-time factor, which a reset does not change."""
     before = node.simulation.real_time_factor
     node.ask(lambda: node.simulation.set_real_time_factor(request.real_time_factor))
     stamps = "" if node.simulation.world.clock.simulated else "; stamps are wall time and do not show it"
@@ -305,7 +305,7 @@ def _set_gravity(node: NodeContext, request: SetGravityRequest) -> Answer:
 
 
 def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Changes physics parameters until the next reset, by YAML text with keys of `setPhysicsEngineParameter`."""
+    """Changes physics parameters until a reset; the request has keys of `setPhysicsEngineParameter` as YAML text."""
     data = load_configs(request.data, "data", MAX_BYTES)
     if "fixedTimeStep" in data:
         raise InterfaceError("data: fixedTimeStep: cannot change while the world runs; write timeStep in the main file")
@@ -318,7 +318,7 @@ def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answe
 
 
 def _set_sensor_rate(node: NodeContext, request: SetSensorRateRequest) -> Answer:
-    """Changes the rate of a sensor [Hz] until the next reset; 0 is off."""
+    """Changes the rate of a sensor [Hz] until the next reset; 0 turns the sensor off."""
     world, wanted = node.simulation.world, request.sensor.removeprefix("/").removeprefix("rpbi/")
 
     def change() -> float:

@@ -47,7 +47,7 @@ class ObjectLifecycle:
         Args:
             kind: Type of the body, a key of BODY_TYPES.
             config: Configuration of the body.
-            file: Name of its YAML file, for error messages.
+            file: Name of the body's YAML file, for error messages.
 
         Raises:
             InterfaceError: If the body cannot be created, or its topics cannot be opened; the body is removed again.
@@ -88,9 +88,9 @@ class ObjectLifecycle:
                 raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
 
     def reset(self, to: WorldState | None = None) -> None:
-        """Resets the world or restores a saved state, and waits until that is done.
+        """Resets the world or restores a saved state, and waits until the reset or restoration is complete.
 
-        Topics and services of bodies that exist before and after stay open.
+        If a body exists both before and after, its topics and services stay open.
 
         Args:
             to: The saved state to restore; None resets the world to its initial state.
@@ -122,7 +122,7 @@ class ObjectLifecycle:
                 raise error
 
     def end(self, timeout_s: float) -> None:
-        """Waits for the operation that is running, for at most `timeout_s`; later operations wait forever."""
+        """Waits at most `timeout_s` [s] until the running operation ends; later operations wait forever."""
         self._lock.acquire(timeout=timeout_s)
 
     def _prepare(self, kind: str, config: Any, file: str) -> None:
@@ -148,7 +148,7 @@ class ObjectLifecycle:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Waits until other operations are done, and makes later operations wait until the caller's one is done.
+        """Context manager that waits for other operations; later operations wait until the context is left.
 
         Raises:
             InterfaceError: If a state is being restored.
@@ -166,7 +166,7 @@ class ObjectLifecycle:
         """Resets the world, or starts to restore a saved state; runs in the simulation thread.
 
         Returns:
-            Names of the bodies that were added or removed since the world was built or reset.
+            Names of the bodies that were added or removed since the world was last built or reset.
             Topics of these bodies, which the caller must close.
             Error of the reset, or None.
             Future of the restoration if a saved state is restored, otherwise None.
@@ -187,7 +187,7 @@ class ObjectLifecycle:
         return changed, topics, None, None
 
     def _place_cameras(self) -> None:
-        """Starts to follow the TF frames of new cameras, and stops following those of removed cameras."""
+        """Starts to follow the TF frames of new cameras, and stops following the TF frames of removed cameras."""
         cameras = self._world.cameras
         for name, camera in self._placed_cameras.items():
             if cameras.get(name) is not camera:

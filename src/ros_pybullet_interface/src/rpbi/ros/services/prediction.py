@@ -71,8 +71,8 @@ class Predictor:
             Tick and stamp [ns] at which all predictions start, and a prediction for each candidate.
 
         Raises:
-            InterfaceError: If the prediction is cancelled, the world cannot be saved, or the other process does not
-                reach the same state as the world.
+            InterfaceError: If the prediction is cancelled, the world cannot be saved, or the shadow does not reach the
+                same state as the world.
         """
         cancels = self._cancels
         with self._lock:
@@ -85,7 +85,7 @@ class Predictor:
                 raise
 
     def cancel(self) -> bool:
-        """Ends the running prediction and all waiting ones; any thread may call this method.
+        """Ends the running prediction and all waiting predictions; any thread may call this method.
 
         The next prediction starts a new process, and takes as long as the first one.
 

@@ -48,7 +48,7 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
 
 
 def move_to_init_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """Does the same as `move_to_initial_joint_state`, under the name in the documentation of the authors' release."""
+    """Does the same as `move_to_initial_joint_state`; the authors' original documentation uses this name."""
     return move_to_initial_joint_state(context, request)
 
 
@@ -71,7 +71,7 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
     """Switches the motors to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
 
-    An empty text keeps the mode; the answer then has the present mode.
+    An empty text keeps the mode; the answer's message is then the present mode.
 
     Raises:
         ValueError: If the text is neither empty nor one of these modes.
@@ -85,9 +85,9 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
 
 
 def stop_motion(context: BodyContext, _: Any) -> Answer:
-    """Ends a timed motion.
+    """Ends the running timed motion.
 
-    The joints hold their present positions.
+    The joints then hold their present positions.
     """
     was_moving = context.act("stop_motion", "it was stopped")
     return Answer(was_moving, "stopped" if was_moving else "no motion is running")
@@ -122,7 +122,7 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
 def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
     """Sets joint targets as the topic `joint_states/target` does, and answers once the next tick will use them.
 
-    It is for controllers that step the world: a message on the topic could arrive after the next requested step.
+    Controllers that step the world need it, since a message on the topic could arrive after the next requested step.
 
     Raises:
         ValueError: If a target is refused; the error has the reason.

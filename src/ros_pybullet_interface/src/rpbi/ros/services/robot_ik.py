@@ -28,7 +28,7 @@ _warn = ThrottledWarning()
 
 
 def moved_by_ik(body: Body) -> tuple[str, ...]:
-    """Returns the owner of the topic `rpbi/NAME/ik`: the body's name if its key `start_ik_callback` is true."""
+    """Returns the body's name if the body subscribes to `rpbi/NAME/ik`, otherwise an empty tuple."""
     return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
@@ -37,8 +37,8 @@ def inverse_kinematics(
 ) -> tuple[bool, str, JointState]:
     """Returns joint positions that bring a link to a pose, without moving the robot.
 
-    The answer has the positions of all joints that a motor can move. If the pose is out of reach, they bring the link
-    as near as possible; that is a success unless the robot is configured as `strict`.
+    The answer has the positions of all joints that a motor can move. If the pose is out of reach, these positions bring
+    the link as near as possible. Such an answer has `success=True` unless the robot is configured as `strict`.
 
     Raises:
         InterfaceError: If the robot has no such link or was removed.
@@ -56,7 +56,7 @@ def inverse_kinematics(
 
 
 def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:
-    """Solves a problem, and sets the solution as the target of the joints that move the link.
+    """Solves an inverse-kinematics problem, and sets the solution as the target of the joints that move the link.
 
     The other joints keep their targets.
 
@@ -125,16 +125,16 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
 
 
 def _judged(context: BodyContext, solution: PybulletSolution) -> tuple[bool, str]:
-    """Returns whether a solution counts as a success for this robot, and a message for the caller."""
+    """Returns whether a solution counts as a success for this robot, and a message for the service's client."""
     if solution.success or context.body.config.strict:
         return solution.success, solution.message
     return True, f"as near as possible: {solution.message}"
 
 
 def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:
-    """Returns the constant joint velocities [rad/s or m/s] from `currentPosition` to the solution in the time `dt`.
+    """Returns constant joint velocities [rad/s or m/s] that lead from `currentPosition` to the solution in `dt`.
 
-    The list is empty if the problem has no `currentPosition` or its `dt` is 0.
+    Returns an empty list if the problem has no `currentPosition` or its `dt` is 0.
 
     Raises:
         ValueError: If `dt` is too short for finite velocities.

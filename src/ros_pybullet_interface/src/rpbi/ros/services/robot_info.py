@@ -48,8 +48,8 @@ def _joint_info(info: tuple, joint: Joint) -> JointInfo:
     """Converts the result of PyBullet's `getJointInfo` to a message; the fields of both have the same order.
 
     Args:
-        info: Result of `getJointInfo`.
-        joint: The same joint, for the message fields that PyBullet does not return.
+        info: Result of `getJointInfo` for the joint.
+        joint: The joint, for the message fields that PyBullet does not return.
     """
     index, name, joint_type, *numbers, link, axis, position, quat, parent = info
     place = Point(*axis), Point(*position), Quaternion(*quat), parent
@@ -74,7 +74,7 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
 def main() -> None:
     """Prints a URDF with mesh paths that RViz finds.
 
-    It is for launch files, which need the URDF for robot_state_publisher before the simulator has started.
+    Launch files call it, since robot_state_publisher needs the URDF before the simulator has started.
     """
     parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
     parser.add_argument("file", help="the URDF; {package}/path is resolved, and PyBullet's data is looked in")

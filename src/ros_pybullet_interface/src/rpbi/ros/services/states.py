@@ -1,4 +1,4 @@
-"""The services `rpbi/save`, `rpbi/save_keyframe` and `rpbi/restore`, for states of the world in files."""
+"""The services `rpbi/save`, `rpbi/save_keyframe` and `rpbi/restore`, which write and read states of the world."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def save(node: Any, request: SetStringRequest) -> Answer:
 
 
 def save_keyframe(node: Any, request: SetStringRequest) -> Answer:
-    """Makes a keyframe and saves it in a file, which is restored at once, without simulating again."""
+    """Makes a keyframe and saves it in a file, which `rpbi/restore` can restore without simulating again."""
     return _write(node, request.data, lambda: node.ask.wait_for(node.ask(node.keyframes.save)))
 
 
@@ -54,9 +54,10 @@ def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
 
 
 def restore(node: Any, request: SetStringRequest) -> Answer:
-    """Restores a saved state of this world by simulating again from the file's start or keyframe; stamps continue.
+    """Restores a saved state by simulating again from the world's start or the file's keyframe; stamps continue.
 
-    The node answers other requests meanwhile. `rpbi/stop` aborts the restoration and resets the world.
+    The saved state must be one of this world. Meanwhile, the node answers other requests, and `rpbi/stop` aborts the
+    restoration and resets the world.
     """
     state = WorldState.read(state_file(node.state_folder, request.data))
     node.objects.reset(state)

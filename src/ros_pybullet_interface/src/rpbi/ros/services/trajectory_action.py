@@ -44,8 +44,8 @@ class StampedActionServer(ActionServer):
     """An action server for a node that does not use ROS time.
 
     In this node, rospy's time is wall time regardless of `use_sim_time`. actionlib's own server would stamp messages
-    with that time; this class uses the world's clock for stamps. actionlib also leaves sending to threads, which may
-    lose the last messages when the server closes; this class sends without such threads, see `FastTopic`.
+    with wall time; this class stamps them with the world's clock. actionlib's server also sends messages in threads,
+    which may lose the last messages when the server closes. This class sends without such threads, see `FastTopic`.
 
     Args:
         name: Name of the action.
@@ -112,7 +112,7 @@ _open_actions: set[TrajectoryAction] = set()
 
 @cache
 def _answer_before_shutdown() -> None:
-    """Makes ROS send the answers to all goals before it shuts down; the goals end when the world is closed."""
+    """Makes the shutdown of ROS wait for the answers to all goals; the goals end when the world is closed."""
 
     def answer() -> None:
         for action in list(_open_actions):
@@ -125,8 +125,8 @@ class TrajectoryAction:
     """Serves the action `follow_joint_trajectory` of one robot.
 
     actionlib holds the same lock during callbacks and while a goal is answered. To avoid deadlocks, the simulation
-    thread does not answer goals, and callbacks do not wait for the simulation thread. Both put tasks into a queue,
-    which a thread of this object works off.
+    thread does not answer goals, and callbacks do not wait for the simulation thread. Instead, callbacks and the
+    simulation thread put tasks into a queue, which a thread of this object processes.
     """
 
     def __init__(self, context: BodyContext) -> None:
@@ -155,7 +155,7 @@ class TrajectoryAction:
     def answer_all(self) -> None:
         """Waits until all goals are answered, and ends the action's thread.
 
-        Call it when the motions of all goals have ended or are about to end.
+        Call this method when the motions of all goals have ended or are about to end.
         """
         wait([motion.result for motion in list(self._motions.values())], LONGEST_END_S)
         self._tasks.put(None)
