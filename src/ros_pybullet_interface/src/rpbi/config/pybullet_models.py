@@ -255,7 +255,7 @@ class LoadSoftBody(PybulletModel):
 
 
 class ChangeVisualShape(PybulletModel):
-    """Colours that replace those of the file."""
+    """Colours that replace the colours in the object's file."""
 
     rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
     specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")

@@ -63,7 +63,7 @@ class ResetSimulation(PybulletModel):
 
 
 class SetGravity(PybulletModel):
-    """Gravity; there is none unless given."""
+    """Gravity; zero by default."""
 
     gravX: Acceleration = Field(0.0, description="Acceleration along x.")
     gravY: Acceleration = Field(0.0, description="Acceleration along y.")

@@ -121,7 +121,7 @@ class IntrinsicsConfig(ConfigModel):
 
 
 class RgbdSensorConfig(ConfigModel):
-    """A camera of colour, depth and segmentation."""
+    """A camera that takes colour, depth and segmentation images."""
 
     name: Name = Field(description="Name of the camera, unique among all objects.")
     hz: Hz = Field(30.0, description="Images in a second.")

@@ -91,7 +91,7 @@ WORLD_FRAME = "rpbi/world"
 
 
 class StaticFrame(ConfigModel):
-    """A TF frame that no other node publishes, with its pose; the interface publishes it as a static transform."""
+    """A TF frame with a fixed pose. The interface publishes the frame, so no other node should."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
     parent: FrameId = Field(WORLD_FRAME, description="The frame that its pose is in.")
@@ -135,7 +135,7 @@ class AttachmentPose(ConfigModel):
 
 
 class AttachmentConfig(ConfigModel):
-    """An attachment: it holds a link of one body to a link of another, as a magnet or a tool changer does."""
+    """An attachment, which ties a link of one body to a link of another body like a magnet or a tool changer."""
 
     name: Name = Field(description="Its name, by which it is detached.")
     parent: Text = Field(description="The parent: an object, or one of its links as NAME/LINK.")

@@ -43,7 +43,7 @@ class ExternalWrenches:
     """Applies external wrenches to one body. A new wrench on a link replaces the link's previous wrench.
 
     Args:
-        body: The body; no reference to the object is kept.
+        body: The body. The object is used by the constructor only.
 
     Attributes:
         can_act: Whether at least one link of the body can move.
@@ -69,14 +69,14 @@ class ExternalWrenches:
         return bool(self._acting)
 
     def check(self, given: ExternalWrench | Mapping[str, Any]) -> ExternalWrench:
-        """Checks a wrench, and returns the wrench with the plain name of its link. Any thread may call this method.
+        """Checks a wrench, and returns the wrench with `link` as a plain link name. Any thread may call this method.
 
         Args:
             given: A wrench, or a mapping of the fields of `ExternalWrench`.
 
         Raises:
             UnknownNameError: If the body has no such link.
-            ValueError: If the link is static, a number is not finite or too large, or the duration is not positive.
+            ValueError: If the link cannot move, a number is not finite or too large, or the duration is not positive.
         """
         name, wrench = self._name, as_tuple(ExternalWrench, given)
         link = wrench.link.removeprefix(f"{name}/") if wrench.link != name else ""

@@ -48,10 +48,10 @@ class Playout(NamedTuple):
         start: Time at which set points leave the previous target [ticks].
         end: Time at which set points reach this target [ticks].
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
-        speed: Ratio of the interval since the previous target as sent to the same interval as played.
+        speed: Interval between sending the previous target and this one, divided by the interval between playing both.
         pace: Mean interval between the arrivals of recent targets [ticks].
-        gap: Time from the end of extrapolation to the arrival of this target [ticks]; 0 if the target came before.
-        apart: Interval since the previous target by stamps or arrivals [ticks]; 0 if unknown.
+        gap: Time from the end of extrapolation to this target's arrival [ticks]; 0 if the target came before that end.
+        apart: Interval from the previous target to this one, by stamps or arrivals [ticks]; 0 if unknown.
     """
 
     start: float
@@ -73,15 +73,16 @@ class JitterBuffer:
 
     Send times are estimated in two ways. The first estimate is the stamps, or the arrivals if stamps are not valid. It
     suits samples at irregular intervals. The second estimate is a regular period, fitted to the first estimate. It
-    suits regular samples that a busy machine sends late. The estimate with the smoother positions over time is used.
+    suits regular samples that a busy machine sends late. The buffer uses the estimate for which positions change more
+    smoothly over time.
 
-    Delays are never negative, so the arrival with the smallest delay in the window counts as undelayed. The buffer
-    delay is added. The total delay changes slowly, except if a target comes too late for the present delay.
+    Transport delays are never negative, so the recent target with the smallest delay counts as undelayed. The buffer
+    delay is added. The sum changes slowly, except if a target comes too late for the present delay.
 
     Args:
         dt_s: Length of a tick [s].
-        buffer_s: Buffer delay [s], which includes one and a half ticks of waiting. A target that arrives late by less
-            than the delay is still played on time. 0 plays targets as they come.
+        buffer_s: Buffer delay [s], of which one and a half ticks are the wait for ticks. A target that arrives late by
+            less than the delay is still played on time. 0 plays targets as they come.
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
@@ -147,7 +148,7 @@ class JitterBuffer:
         return playout._replace(apart=times[-1] - times[-2])
 
     def _is_apart(self, tick: int, stamp_ns: int) -> bool:
-        """Returns whether the interval since the last target is too long for a stream, by arrivals or valid stamps."""
+        """Returns whether arrivals or valid stamps of the last two targets are too far apart for a stream."""
         last = self._seen[-1]
         sent_ticks = self._sender.ticks_between(last.stamp_ns, stamp_ns) if self._sender.is_right else 0.0
         return max(tick - last.tick, sent_ticks) > self._longest
@@ -166,7 +167,7 @@ class JitterBuffer:
         return Playout(self._start, self._end, 2.0 * EVERY_TICK, pace=self._pace)
 
     def _least_way(self, tick: int) -> float:
-        """Returns the smallest interval with which the newest target may follow the previous one when played [ticks].
+        """Returns the minimum interval between playing the previous target and playing the newest one [ticks].
 
         While earlier targets are still to be played, the interval is 0.4 of the mean interval or longer. This limits
         the speed of a burst.
@@ -174,11 +175,11 @@ class JitterBuffer:
         return max(SHORTEST * self._pace / 2.0, SHORTEST_WAY) if self._end - tick > EVERY_TICK else SHORTEST_WAY
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
-        """Schedules the newest target as near to its planned time as the delay may change.
+        """Schedules the newest target as near to its planned time as the limits on delay changes permit.
 
         Args:
             tick: Number of the tick before which the target came.
-            planned: Time to play the target by the present estimates [ticks].
+            planned: Time at which the target should be played according to the present estimates [ticks].
             interval: Estimated interval since the previous target was sent [ticks].
             period: Estimated period of the stream [ticks].
         """

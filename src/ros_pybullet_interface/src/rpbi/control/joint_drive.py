@@ -57,10 +57,10 @@ class JointDrive:
                 self.motors.follow(command)
 
     def drop_targets(self, joints: Iterable[int] | None = None) -> None:
-        """Drops the target streams of joints, which then hold.
+        """Drops the target streams that contain given joints; the other joints of these streams hold.
 
         Args:
-            joints: Joint indices; None drops all streams and all waiting targets.
+            joints: Joint indices. None drops all streams and all waiting targets; all joints then hold.
         """
         if joints is None:
             self._streams.clear()
@@ -74,7 +74,7 @@ class JointDrive:
         return {index: (state[0], state[1]) for index, state in zip(indices, states)}
 
     def run(self, motion: Motion) -> None:
-        """Starts a motion at the next tick. A motion that runs already is halted.
+        """Starts a motion at the next tick, and halts the running motion, if there is one.
 
         Raises:
             ValueError: If the robot is under torque control, or a controller drives a joint of the motion.
@@ -89,7 +89,7 @@ class JointDrive:
         self.motion, self._has_begun = motion, False
 
     def halt(self, reason: str) -> None:
-        """Ends the running motion, if there is one; its joints hold their positions.
+        """Ends the running motion, if there is one; the motion's joints hold their positions.
 
         Args:
             reason: Reason for the message of the motion's result.

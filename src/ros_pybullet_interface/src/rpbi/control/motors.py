@@ -44,7 +44,7 @@ class LimitReports:
         Args:
             joint: The joint.
             position: Measured or desired position of the joint [rad or m].
-            what: End of the warning: the consequence, such as `it goes to the limit`.
+            what: Last words of the warning, about the consequence, such as `it goes to the limit`.
         """
         if joint.allows(position):
             self._beyond.discard(joint.index)
@@ -72,10 +72,10 @@ POSITION_MODES = (pybullet.POSITION_CONTROL, IMPEDANCE_CONTROL)
 
 
 class ResolvedCommand(NamedTuple):
-    """A target that was checked for a control mode.
+    """A target that was checked for one control mode.
 
     Attributes:
-        mode: The control mode.
+        mode: This control mode.
         values: Positions, velocities or efforts, keyed by joint index.
         velocities: For position targets: velocities at the target positions, keyed by joint index; may be empty.
         stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
@@ -87,12 +87,18 @@ class ResolvedCommand(NamedTuple):
     stamp_ns: int = 0
 
     def merged(self, newer: ResolvedCommand) -> ResolvedCommand:
-        """Returns this target updated by a newer one, without velocities; the newer target alone if modes differ."""
+        """Returns a newer target, extended by this target's values for other joints, and without velocities.
+
+        If the control modes differ, returns the newer target unchanged.
+        """
         return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
 
 
 def coalesce(older: tuple[ResolvedCommand, ...], newer: tuple[ResolvedCommand, ...]) -> tuple[ResolvedCommand, ...]:
-    """Joins two sequences of targets; merges the newer into the last older one if `MAX_WAITING_TARGETS` wait."""
+    """Joins two sequences of targets.
+
+    If `older` has `MAX_WAITING_TARGETS` targets, merges the one target in `newer` into the last of these.
+    """
     if len(older) < MAX_WAITING_TARGETS:
         return older + newer
     return (*older[:-1], older[-1].merged(*newer))
@@ -116,14 +122,14 @@ class Motors:
     """Commands the motors of one robot, within the limits of its URDF.
 
     A position target holds until the next target. Velocity and effort targets that are not renewed return to 0 after
-    `timeout_s`, so that the robot stops when its sender stops. `limited` documents what is clipped.
+    `timeout_s`, so that the robot stops when its sender stops. See `limited` for how targets are clipped.
 
     Args:
         mode: Initial control mode.
-        gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index; PyBullet's defaults otherwise.
+        gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index. Missing gains get defaults.
         limit_reports: Logs position targets beyond the joints' limits.
-        enforce_effort_limits: Whether efforts are limited to those of the URDF.
-        timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
+        enforce_effort_limits: Whether efforts are clipped to the URDF's effort limits.
+        timeout_s: Age at which velocity and effort targets expire, in the world's time [s].
 
     Attributes:
         targets: Set points of the motors, keyed by joint index. The control mode decides whether these are positions,
@@ -210,7 +216,7 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def check(self, target: JointCommand) -> ResolvedCommand:
-        """Checks a target for the present control mode, and resolves joint names to indices. Any thread may call it.
+        """Checks a target for the present control mode, and resolves joint names to indices. Any thread may do so.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -254,8 +260,8 @@ class Motors:
     def track(self, index: int, position: float, velocity: float) -> None:
         """Makes a joint move with a velocity during the next tick, in any control mode. The arguments are not clipped.
 
-        PyBullet's position motor drives at `velocity` plus a correction: its gain times the difference between
-        `position` and the measured position, both before the tick.
+        PyBullet's position motor drives at `velocity` plus a correction. The correction is the motor's gain times the
+        difference between `position` and the measured position before the tick.
 
         Args:
             index: Joint index.
@@ -271,7 +277,7 @@ class Motors:
             self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
-        """Ends tracking of joints; their targets, which depend on the control mode, drive the motors again.
+        """Ends `track` for joints, given by index; the joints' targets for the control mode drive the motors again.
 
         In position modes the joints hold the last tracked position. Under velocity control they stand still.
         """
@@ -281,7 +287,7 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def reset_setpoints(self, positions: Mapping[int, float]) -> None:
-        """Resets set points after the joints' positions were set from outside.
+        """Resets set points after other code has set the positions of joints.
 
         In position modes the joints hold the new positions. In other modes velocities or efforts become 0.
 
@@ -328,7 +334,7 @@ class Motors:
 
     @property
     def is_idle(self) -> bool:
-        """Whether the motors need no calls at each tick: targets do not expire, and efforts are not applied."""
+        """Whether `before_step` has nothing to do: no target expires, and no efforts are applied at each tick."""
         keeps = self.mode in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL)
         return keeps and not self._renewed and not self._expiry
 
@@ -359,8 +365,8 @@ class Motors:
     def limited(self, index: int, value: float) -> float:
         """Clips a target to the limits of a joint, and returns the result.
 
-        The control mode decides which limit applies. In position modes this is the position range, and a value outside
-        is logged. Under velocity control it is the URDF's velocity, under torque control the URDF's effort.
+        In position modes, positions are clipped to the joint's range, and clipping is logged. Under velocity control,
+        the URDF's velocity limit applies. Under torque control, the URDF's effort limit applies.
 
         Args:
             index: Joint index.

@@ -66,8 +66,8 @@ class PlanarVelocity(NamedTuple):
         """Returns the velocity scaled down to limits; the direction of the translation does not change.
 
         Args:
-            linear: Largest speed in the plane [m/s].
-            angular: Largest yaw rate [rad/s].
+            linear: Maximum speed in the plane [m/s].
+            angular: Maximum yaw rate [rad/s].
         """
         speed = math.hypot(self.x, self.y)
         share = min(1.0, linear / speed) if speed else 1.0
@@ -80,7 +80,7 @@ class PlanarVelocity(NamedTuple):
 
 
 class PlanarBaseConfig(ConfigModel):
-    """Limits of a base that drives over the ground, in the base frame."""
+    """Velocity, acceleration and force limits of a base that drives over the ground."""
 
     max_linear_velocity: Annotated[Positive, Unit("m/s")] = Field(1.0, description="Largest speed in any direction.")
     max_angular_velocity: Annotated[Positive, Unit("rad/s")] = Field(1.5, description="Fastest rotation.")
@@ -116,7 +116,7 @@ def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
     """Inserts joints along x, along y and about z, with massless links, above the root link of a URDF.
 
     Returns:
-        The `robot` element for PyBullet. Its new root link is the fixed end of the inserted joints.
+        The `robot` element for PyBullet. The new root link is the fixed end of the inserted joints.
 
     Raises:
         ConfigError: If the URDF is not a tree of links.
@@ -160,7 +160,7 @@ class PlanarBase:
         self._expiry = None
 
     def rest(self) -> None:
-        """Sets the set point to the measured joint positions, at rest. The command is kept."""
+        """Sets the set point to the measured joint positions with zero velocity. The commanded velocity is kept."""
         self._velocity = PlanarVelocity()
         self._set_point = [state[0] for state in self._joint_states()]
 
@@ -208,10 +208,10 @@ class PlanarBase:
         return states
 
     def _force_limits(self) -> tuple[float, float, float]:
-        """Returns the motors' largest forces along x and y [N] and largest torque about z [N m].
+        """Returns the motors' force limits along x and y [N] and torque limit about z [N m].
 
-        Defaults correspond to wheels with a friction coefficient of 1. The force is then the robot's weight, and the
-        torque is the weight times the radius of gyration.
+        The defaults correspond to wheels with a friction coefficient of 1. The default force is the robot's weight, and
+        the default torque is the weight times the radius of gyration.
         """
         joints = range(self._pb.getNumJoints(self._body_id))
         infos = [self._pb.getJointInfo(self._body_id, index) for index in joints]

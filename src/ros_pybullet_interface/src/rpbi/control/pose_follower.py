@@ -37,15 +37,15 @@ _Numbers = npt.NDArray[np.float64]
 class PosePath:
     """Interpolates a stream of poses smoothly, tick by tick.
 
-    A straight line leads to each new pose. It lasts for one period of the stream, or longer if the largest speeds
-    demand it. The path is the moving average of these lines, so that velocity changes evenly and never overshoots.
-    Quaternions are averaged as vectors with aligned signs.
+    A straight line leads to each new pose. The line lasts for one period of the stream, or longer if the speed limits
+    require more time. The path is the moving average of these lines, so that velocity changes evenly and never
+    overshoots. Quaternions are averaged as vectors with aligned signs.
 
     Args:
         start: Initial pose, at rest.
         ticks: Expected interval between poses, and length of the moving average [ticks].
-        max_step: Largest translation per tick [m].
-        max_turn: Largest rotation per tick [rad].
+        max_step: Maximum translation per tick [m].
+        max_turn: Maximum rotation per tick [rad].
 
     Attributes:
         goal: The newest pose.
@@ -70,7 +70,7 @@ class PosePath:
         return max(self._intervals)
 
     def ticks_to(self, pose: Pose) -> float:
-        """Returns the travel time [ticks] from the present point on the line to a pose at the largest speeds."""
+        """Returns the time [ticks] to travel from the line's present point to a pose at the maximum speeds."""
         way = _numbers(pose, self._line) - self._line
         turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # rotation is fastest in the middle of the line
         return max(float(np.linalg.norm(way[:3])) / self._max_step, turn / self._max_turn)
@@ -106,7 +106,7 @@ class PosePath:
 
 
 def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
-    """Returns position and quaternion of a pose as 7 numbers; the quaternion's sign is the one nearer to `near`."""
+    """Returns position and quaternion of a pose as 7 numbers, with the quaternion's sign chosen to be near `near`."""
     numbers = np.array([*pose.position, *pose.quat_xyzw])
     if near is not None and numbers[3:] @ near[3:] < 0.0:
         numbers[3:] *= -1.0
@@ -117,14 +117,15 @@ class PoseFollower:
     """Moves the fixed base of one PyBullet body along a stream of poses.
 
     Before each tick, the velocity of the base is set such that the base reaches the next pose of the path. PyBullet
-    moves a base without mass at exactly this velocity and solves contacts with it. The base therefore carries and
-    pushes other bodies, and no contact stops the base. The first pose, and a pose after a jump, is set without a path.
+    moves a base without mass at exactly this velocity, and uses the velocity for contacts. The base therefore carries
+    and pushes other bodies, and no contact stops the base. If a pose is the first or too far away for a path (a jump),
+    the base is set to the pose directly.
 
     Args:
         name: Name of the body, for messages.
         body_id: PyBullet's id of the body.
         centre: Pose of the base's centre of mass, which PyBullet moves, in the frame that follows the poses.
-        object_tf: Configuration of the stream: frame name, rate and largest speeds.
+        object_tf: Configuration of the stream: frame name, rate and maximum speeds.
     """
 
     def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
@@ -139,20 +140,20 @@ class PoseFollower:
         """Tick from which the next jump is logged."""
 
     def push(self, pose: Pose) -> None:
-        """Sets a new goal from the next tick on. The first pose is set at once, without a path."""
+        """Sets a new goal, which acts from the next tick on. The base is set to the first pose at once."""
         if self._path is None:
             self.put(pose)
         else:
             self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Sets the frame to a pose at once, at rest."""
+        """Sets the frame to a pose at once, with zero velocity."""
         self._waiting = None
         self._begin(pose @ self._centre)
 
     @property
     def is_idle(self) -> bool:
-        """Whether there is no path and no new pose."""
+        """Whether the body has neither a path to follow nor a new pose."""
         return self._path is None and self._waiting is None
 
     def before_step(self, tick: int) -> None:
@@ -209,7 +210,7 @@ class PoseFollower:
     def _velocity_before(self, velocity: Vector) -> Vector:
         """Returns the velocity [m/s] to set so that the base has `velocity` after the forces of the tick.
 
-        Forces do not change the velocity of a base without mass.
+        Forces do not change the velocity of a base without mass, so the result equals `velocity`.
         """
         return velocity
 
@@ -217,8 +218,8 @@ class PoseFollower:
 class TrackedBase(PoseFollower):
     """Moves the base of a dynamic body along a stream of poses; without poses, physics moves the body.
 
-    Before each tick, the velocity of the base is set along the path, minus the velocity change by gravity in the tick.
-    Contacts are solved with that velocity and the body's own mass. If no pose comes for `timeout_s` of the world's
+    Before each tick, the velocity of the base is set along the path, with gravity's effect in the tick subtracted.
+    Contacts are solved with the body's own mass. If no pose comes for `timeout_s` of the world's
     time, the body moves freely. The next pose then starts a path from the body's present pose.
     """
 
@@ -230,7 +231,7 @@ class TrackedBase(PoseFollower):
         self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
 
     def push(self, pose: Pose) -> None:
-        """Sets a new goal from the next tick on. The first pose is set at that tick, without a path."""
+        """Sets a new goal, which acts from the next tick on. The base is set to the first pose before that tick."""
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:

@@ -28,7 +28,7 @@ class RobotDynamics:
     while the second robot remains upright at the origin.
 
     Args:
-        world: Client of the simulated robot; its gravity is used.
+        world: PyBullet client of the simulated robot. The client's gravity is used.
         model: The robot's joints.
         load: Arguments with which the simulated robot was loaded.
         inertia_from_urdf: Whether moments of inertia are taken from the URDF rather than computed by PyBullet.
@@ -136,7 +136,7 @@ class RobotDynamics:
             self._client = None
 
     def _positions(self, q: Sequence[float]) -> Sequence[float]:
-        """Returns the positions of all joints with one axis, coupled joints included."""
+        """Returns the positions of all joints with one axis, including coupled joints, for n driven positions."""
         if self._by_driven is None:
             return q
         positions: list[float] = (self._by_driven.factors @ q + self._by_driven.offsets).tolist()

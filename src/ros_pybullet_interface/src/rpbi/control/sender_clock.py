@@ -57,7 +57,7 @@ class SenderClock:
         return (last_ns - first_ns) / self._dt_ns
 
     def times(self, seen: deque[Arrival]) -> tuple[list[float], bool]:
-        """Estimates the send times of targets, and returns also whether the times come from stamps.
+        """Returns the estimated send times of targets, and whether these times come from stamps.
 
         Times are relative to the newest target [ticks], so they are 0 or negative. Without usable stamps, they are the
         times of arrival.
@@ -72,7 +72,7 @@ class SenderClock:
         return (stamps, True) if rises and self._uses(stamps, arrivals, seen) else (arrivals, False)
 
     def _uses(self, stamps: Sequence[float], arrivals: Sequence[float], seen: deque[Arrival]) -> bool:
-        """Returns whether stamps run as fast as the world's time, or deviate because of a stall."""
+        """Returns whether stamps are used: they agree with the world's time, or a stall explains the deviation."""
         is_full = len(seen) == seen.maxlen
         is_in_step = abs(stamps[0] - arrivals[0]) <= self._max_offset - DRIFT * arrivals[0]
         if is_in_step and (is_full or self.is_right is not False):

@@ -47,7 +47,7 @@ class StreamSegment(NamedTuple):
         return self.start + self.length
 
     def cut(self, tick: float) -> StreamSegment:
-        """Returns the part of the segment before a time [ticks]; the part has length 0 if the time is too early."""
+        """Returns the part of the segment before a time [ticks]; length 0 if the time is before the segment's start."""
         length = max(tick - self.start, 0.0)
         basis = _hermite(length / self.length)
         way = {index: self.covered(index, basis) for index in self.way}
@@ -60,7 +60,7 @@ class StreamSegment(NamedTuple):
 
         Args:
             index: Joint index.
-            basis: Values that `basis` returned, plain or averaged.
+            basis: Result of the method `basis`.
         """
         if self.slopes is None:
             return self.way[index] * (basis[0] + basis[1] + basis[2])
@@ -130,9 +130,9 @@ def _hermite_integral(share: float) -> tuple[float, float, float]:
 
 
 def agree(way: Mapping[int, float], length: float, first: Mapping[int, float], last: Mapping[int, float]) -> bool:
-    """Returns whether the velocities of targets are consistent with the displacement between the targets.
+    """Returns whether the velocities of two targets are consistent with the displacement between the targets.
 
-    Many senders fill velocities with zeros.
+    Zeros, with which many senders fill velocities, are not consistent with a displacement.
 
     Args:
         way: Displacements [rad or m], keyed by joint index.
@@ -151,8 +151,8 @@ class BoundedMotion:
     """Computes set points that follow a plan with bounded acceleration.
 
     The plan's velocity jumps if targets come late. The set points then leave the plan and rejoin it with bounded
-    accelerations. Elsewhere they follow the plan exactly. The bound is computed from the targets and their mean period,
-    which delays hardly change. A larger deceleration is allowed if the motion needs it to stop within `BRAKE_S`.
+    accelerations. Otherwise set points equal the plan. The bound is computed from the targets and their mean period,
+    which delays hardly change. Decelerations may be larger if this is necessary to stop within `BRAKE_S`.
 
     Args:
         held: Initial positions [rad or m], keyed by joint index.
@@ -221,8 +221,8 @@ class BoundedMotion:
 
         Args:
             ways: Displacements from the previous target [rad or m], keyed by joint index.
-            apart: Interval since the previous target by stamps [ticks]; 0 to use the interval between arrivals.
-            corner: Time in which the plan changes its velocity at the previous target [ticks]; 0 for the period.
+            apart: Interval since the previous target, from stamps [ticks]; 0 to use the interval between arrivals.
+            corner: Duration of the plan's velocity change at the previous target [ticks]; 0 if this is the period.
         """
         period = max(self._period, EVERY_TICK)
         apart = apart or max(self._elapsed, EVERY_TICK)
@@ -240,8 +240,8 @@ class BoundedMotion:
     def _bound(self, index: int) -> float:
         """Returns the new acceleration bound of a joint [rad or m per tick squared].
 
-        While the joint deviates from the plan, the bound falls slowly at most. Otherwise the recent targets determine
-        the bound, or the bound remains unchanged if these targets are equal.
+        The recent targets determine the bound; if these targets are equal, the bound remains unchanged. While the joint
+        deviates from the plan, the bound decreases only slowly.
         """
         latest, before = max(each[index] for each in self._last), self._bounds[index]
         is_off = self._positions[index] != self._planned[index]

@@ -135,7 +135,7 @@ class TargetStream:
         """Advances the set points to a time [ticks], and returns them [rad or m], keyed by joint index.
 
         Set points are clipped to the joints' limits if targets have velocities or accelerations are bounded. Otherwise
-        they lie between targets.
+        this is not needed, since set points lie between targets.
         """
         segments = self._segments
         if segments and segments[-1].end <= tick and not segments[-1].is_beyond:
@@ -159,7 +159,7 @@ class TargetStream:
         return value if self._limits is None else self._limits(index, value)
 
     def _adapt_window(self) -> None:
-        """Changes the length of the moving average by a second-order low-pass, since each change moves set points."""
+        """Changes the moving average's length gradually (second-order low-pass), since each change moves set points."""
         share = 1.0 / max(ADAPTATION_PERIODS * self._period, 1.0)
         self._lagging_window += share * (self._wanted_window - self._lagging_window)
         self._window += share * (self._lagging_window - self._window)
@@ -203,7 +203,7 @@ class TargetStream:
         self._segments.append(StreamSegment(before.end, length, goal, within, (slopes[0], slopes[1]), True))
 
     def _next_velocity(self, index: int) -> float:
-        """Predicts the velocity to the next target from the last three velocities; 0 if these are inconsistent."""
+        """Predicts the velocity towards the next target from the last three velocities; 0 if these are inconsistent."""
         if len(self._velocities) < 3:
             return 0.0
         first, second, third = (each[index] for each in self._velocities)
@@ -261,7 +261,7 @@ class TargetStreams:
         """Drops the streams that contain given joints; the other joints of these streams hold.
 
         Args:
-            joints: Indices of joints that are driven from elsewhere now.
+            joints: Indices of joints that other code now drives.
         """
         dropped = set(joints)
         for key in [key for key in self._streams if key & dropped]:

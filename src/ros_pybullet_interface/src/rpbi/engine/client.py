@@ -1,4 +1,4 @@
-"""A connection to PyBullet, which logs PyBullet's output and watches changes of the world."""
+"""A connection to PyBullet that logs PyBullet's output and detects unrecorded changes of the world."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class _Printed:
 
     @contextmanager
     def to_log(self) -> Iterator[None]:
-        """Redirects C output of the whole process during a `with` block, and logs the printed lines at its end.
+        """Redirects C output of the whole process during a `with` block, and logs the printed lines at the block's end.
 
         Blocks of several threads may overlap or be nested. The last block to end restores C's streams.
         """

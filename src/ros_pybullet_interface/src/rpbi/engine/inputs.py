@@ -23,9 +23,9 @@ class Input:
         check: Converts a received value for `apply`. Runs in the receiving thread and must not call PyBullet. Raises
             ValueError or an InterfaceError to refuse the value.
         apply: Applies the newest value. Runs on the simulation thread before the tick.
-        merge: Combines a waiting value with a newer value; None replaces the waiting value.
+        merge: Combines a waiting value with a newer value. If None, the newer value replaces the waiting one.
         ros_topic: Import path `module:NAME` of the input's Topic, for an input from another package.
-        owner: Value of `{name}` in the topic's name; empty for the name of the body or sensor.
+        owner: Text for `{name}` in the topic's name; if empty, the name of the body or sensor.
     """
 
     check: Callable[[Any], Any]

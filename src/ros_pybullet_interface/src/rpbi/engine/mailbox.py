@@ -43,9 +43,10 @@ class Mailbox:
         Args:
             slot: Name of the slot.
             value: The value.
-            merge: Combines the value that waits in the slot with the new value. None replaces the waiting value.
-            generation: The mailbox's `generation` at which the value was checked. If `drop` was called since then, the
-                value is ignored. None always stores the value.
+            merge: Combines the value that waits in the slot with the new value. If None, the new value replaces the
+                waiting one.
+            generation: The mailbox's `generation` when the value was checked. If `drop` was called since then, the
+                value is ignored. None stores the value regardless of `drop`.
         """
         with self._lock:
             if self._busy is not None or generation not in (None, self.generation):
@@ -79,7 +80,7 @@ class Mailbox:
             self.generation += 1
 
     def hold(self, busy: Callable[[], str] | None) -> None:
-        """Marks the world as busy, or ends this. A busy world ignores new values and refuses requests.
+        """Marks the world as busy, or as no longer busy. A busy world ignores new values and refuses requests.
 
         Args:
             busy: Function that returns the error message for refused requests; None if the world is no longer busy.
@@ -106,7 +107,7 @@ class Mailbox:
         return future
 
     def run_requests(self) -> None:
-        """Makes the queued calls, and sets their futures. Calls queued meanwhile wait for the next run."""
+        """Makes the queued calls, and sets the calls' futures. Calls queued meanwhile wait for the next run."""
         for _ in range(len(self._requests)):
             call, future, even_if_busy = self._requests.popleft()
             if not future.set_running_or_notify_cancel():

@@ -44,7 +44,7 @@ class Pacer:
         self.restart()
 
     def restart(self) -> None:
-        """Sets the next deadline to now, for example after a stop of the world."""
+        """Sets the next deadline to now, for example when a stopped world continues; restarts `measure`."""
         self._deadline_s = time.monotonic()
         self._window_start_s = self._deadline_s
         self._window_ticks = 0

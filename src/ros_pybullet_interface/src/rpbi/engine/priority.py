@@ -28,9 +28,9 @@ class RealTimePriority:
         """Whether the threads have real-time scheduling."""
 
     def review(self, load: Load, period_s: float) -> None:
-        """Starts or ends real-time scheduling, as the recent processor use demands; call this about once a second.
+        """Starts or ends real-time scheduling, depending on the recent processor use. Call this about once a second.
 
-        Each call includes threads started since the last call.
+        Each call also applies to threads that were started since the last call.
 
         Args:
             load: Time used since the last call.
@@ -95,7 +95,7 @@ def _for_all_threads(process_id: int, change: Callable[[int], None]) -> None:
 
     Args:
         process_id: The process.
-        change: Function of a thread id. OSErrors are ignored.
+        change: Function that is called with a thread id. OSErrors of the function are ignored.
     """
     changed: set[int] = set()
     while new := _threads(process_id) - changed:

@@ -15,7 +15,7 @@ from rpbi.urdf.joints import Joint
 
 
 class Target(NamedTuple):
-    """Target of a link.
+    """Target position of a link, and optionally a target orientation.
 
     Attributes:
         position: Position x, y, z in the frame of the base [m].
@@ -29,7 +29,7 @@ class Target(NamedTuple):
 class BulletChain:
     """Computes the kinematics of one link, which m joints move.
 
-    Loads the chain from the root to the link as a separate PyBullet body, since further joints would cost time.
+    Loads the chain from the root to the link as a separate PyBullet body, because further joints would cost time.
 
     Args:
         pb: Client into which the chain is loaded.
@@ -69,9 +69,9 @@ class BulletChain:
         return Pose(state[4], state[5])
 
     def error(self, target: Target) -> np.ndarray:
-        """Returns the error from the link's present pose to a target.
+        """Returns the error from the link's present pose to a target, in the axes of the base.
 
-        The first 3 numbers are distances [m]. If the target has an orientation, a rotation vector [rad] follows.
+        The first 3 numbers are a translation [m]. If the target has an orientation, a rotation vector [rad] follows.
         """
         position, quat = self.pose()
         error = [goal - present for goal, present in zip(target.position, position)]
@@ -80,7 +80,7 @@ class BulletChain:
         return np.array(error)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:
-        """Sets m joint positions [rad or m], and returns the link's residual to a target."""
+        """Sets m joint positions [rad or m], and returns the link's distance and angle to a target."""
         self.set(q)
         error = self.error(target).tolist()
         return Residual(math.hypot(*error[:3]), math.hypot(*error[3:]))

@@ -93,11 +93,11 @@ class Kinematics:
             return chain.pose()
 
     def solve(self, problem: PybulletProblem) -> PybulletSolution:
-        """Searches joint positions that move a link to a target. The result depends on the problem only.
+        """Searches for joint positions that move a link to a target. The result depends only on the problem.
 
-        The search begins at the problem's start, continues from random starts until a solution is found, and is limited
-        to a fixed number of iterations. With a rest posture, the search begins at the posture. It then moves along the
-        solutions to the one nearest to the posture.
+        The search begins at `currentPosition`, continues from random starts until a solution is found, and is limited
+        to a fixed number of iterations. With a rest posture, the search begins at the posture instead. The solution
+        found is then changed to be as near to the posture as the target permits.
 
         Raises:
             UnknownNameError: If there is no such link.

@@ -1,4 +1,4 @@
-"""Numerical methods of inverse kinematics: iterations towards a target, or towards a rest posture at the target."""
+"""Numerical methods of inverse kinematics, which move a link to a target or a solution towards a rest posture."""
 
 import math
 import time
@@ -33,13 +33,13 @@ During a call, some 0.1 ms, PyBullet holds Python's global interpreter lock.
 
 
 class DampedLeastSquares:
-    """Damped least squares, by PyBullet; a `Step`.
+    """A `Step` by damped least squares, computed by PyBullet.
 
     Args:
         chain: Chain that moves the link.
         target: Target of the link.
         threshold_m: Distance from the target at which iterations stop [m].
-        damping: m weights of the joints' motion. The smallest weight is 1.
+        damping: m relative dampings, of which the smallest is 1. A joint with a larger damping moves less.
     """
 
     def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
@@ -76,7 +76,7 @@ LARGEST_STEP = np.pi / 4
 
 
 class SelectivelyDampedLeastSquares:
-    """Selectively damped least squares; a `Step` with the arguments of `DampedLeastSquares`.
+    """A `Step` by selectively damped least squares. The arguments are as for `DampedLeastSquares`.
 
     After Buss and Kim, Selectively Damped Least Squares for Inverse Kinematics, Journal of Graphics Tools 10(3), 2005.
     PyBullet's own implementation crashes the process (bullet3 issue 4404).
@@ -99,7 +99,10 @@ class SelectivelyDampedLeastSquares:
 
 
 def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Returns the step of m joints for an error; limits the step along each singular vector by the motion it causes."""
+    """Returns the step of m joints that reduces an error.
+
+    The limit of the step along a singular vector is lower if the step needs more joint motion.
+    """
     lengths = np.linalg.norm(jacobian, axis=0)  # motion of the link per unit motion of each joint
     step = np.zeros(jacobian.shape[1])
     left, singular_values, right = np.linalg.svd(jacobian, full_matrices=False)
@@ -129,20 +132,20 @@ POSTURE_DAMPING = 1e-6
 def towards_posture(
     chain: BulletChain, target: Target, limits: Limits, rest: np.ndarray, ranges: np.ndarray, q: np.ndarray, size: float
 ) -> np.ndarray:
-    """Moves from one solution along the set of solutions towards a rest posture.
+    """Moves from a solution towards a rest posture, while the link stays at the target.
 
     Uses gradient projection: each step moves towards the posture in the null space of the link's Jacobian, and corrects
     the error of the previous step (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
         chain: Chain that moves the link.
-        target: Target of the link, which is kept.
+        target: Target of the link.
         limits: Limits of the m joints.
         rest: m positions of the posture [rad or m].
         ranges: m weights up to 1, proportional to the joints' ranges. A joint's distance from the posture is divided by
             its weight.
         q: m positions of the first solution [rad or m].
-        size: Largest residual of a solution, see `Residual.size`.
+        size: Maximum residual of a solution, see `Residual.size`.
 
     Returns:
         m positions of the solution nearest to the posture; `q` if no nearer solution was found.
@@ -170,9 +173,9 @@ def _cost(q: np.ndarray, rest: np.ndarray, ranges: np.ndarray) -> float:
 def _step(
     jacobian: np.ndarray, error: np.ndarray, wish: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
-    """Returns the joint step that corrects the link's error and, beyond that, comes nearest to a desired step.
+    """Returns the joint step nearest to a desired step among the steps that correct the link's error.
 
-    Joints stop at their limits. All steps are divided by the joints' weights.
+    Joints stop at their limits. Each joint's steps are divided by the joint's weight, see `towards_posture`.
 
     Args:
         jacobian: Jacobian of the link, multiplied by the joints' weights.
@@ -208,7 +211,7 @@ def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, s
         target: Target of the link.
         limits: Limits of the m joints.
         q: m start positions [rad or m].
-        steps: Largest number of iterations.
+        steps: Maximum number of iterations.
 
     Returns:
         m positions [rad or m], and the remaining error: the norm of distance and angle, each divided by its tolerance.

@@ -26,14 +26,14 @@ class PybulletProblem:
         targetOrientation: Target quaternion x, y, z, w in the same frame, not necessarily of length 1. Empty accepts
             any orientation.
         lowerLimits: n lower limits [rad or m], which narrow the URDF's limits but never widen them.
-        upperLimits: n upper limits [rad or m], likewise.
+        upperLimits: n upper limits [rad or m], which never widen the URDF's limits either.
         jointRanges: n ranges [rad or m]. The wider a joint's range is relative to others, the farther the joint may be
             from its rest position.
         resetPoses: n positions of the rest posture [rad or m]; the solution is as near to the posture as possible.
-        jointDamping: n weights of the joints' motion, relative to each other.
+        jointDamping: n relative dampings. A joint with a larger damping moves less.
         solver: 0 for damped least squares, 1 for selectively damped least squares.
         currentPosition: n start positions [rad or m]. Joints that do not move the link keep these positions.
-        maxNumIterations: Largest number of iterations from one start.
+        maxNumIterations: Maximum number of iterations from one start.
         residualThreshold: Distance at which the search stops [m], at most 1 mm. Ten times this number is the threshold
             of the angle [rad].
 
@@ -85,7 +85,7 @@ class PybulletProblem:
             joint_names: Names of the n joints.
 
         Raises:
-            ValueError: If a list is not empty and has another length than n.
+            ValueError: If a non-empty list does not have length n.
         """
         for field in _PER_JOINT:
             length = len(getattr(self, field))

@@ -42,13 +42,13 @@ LEAST_WEIGHT = 1e-3
 
 
 class Search:
-    """Searches positions of the m joints of a chain for one problem.
+    """Searches for positions of a chain's m joints that solve one problem.
 
     Args:
         chain: Chain that moves the link.
         target: Target of the link.
         limits: Limits of the m joints.
-        problem: The problem, after checks for the robot.
+        problem: The problem, already checked for the robot.
         current: m present positions [rad or m].
     """
 
@@ -86,7 +86,7 @@ class Search:
         return q, residual
 
     def _in_branch(self, q: np.ndarray, residual: Residual) -> tuple[np.ndarray, Residual]:
-        """Searches a solution nearer to the rest posture, or without one, to the present positions.
+        """Searches for a solution nearer to the rest posture, or to the present positions if there is no posture.
 
         A distant solution may be in another branch, such as elbow up and elbow down. Further searches therefore start
         near the posture or the present positions. The random numbers are the same at each call.
@@ -138,7 +138,7 @@ class Search:
         return q, self._chain.residual(self._target, q)
 
     def _starts(self) -> Iterator[tuple[Step, list[float]]]:
-        """Yields starts, each with a method: the rest posture, the present positions, and then random positions."""
+        """Yields a method and start positions: first the rest posture, then the present positions, then random ones."""
         if not self._current:
             return
         if len(self._rest):
@@ -172,7 +172,7 @@ class Search:
             frozen, last = stuck | stopped, residual.size
 
     def _of_chain(self, values: Sequence[float]) -> np.ndarray:
-        """Selects the values of the chain's joints from a list per joint of the problem; an empty list stays empty."""
+        """Returns the m values of the chain's joints from one of the problem's lists; an empty list stays empty."""
         return np.array(values, dtype=float)[self._chain.members] if len(values) else np.empty(0)
 
 
@@ -180,7 +180,7 @@ def _damping(given: np.ndarray, count: int) -> np.ndarray:
     """Returns the damping of each joint relative to the smallest damping.
 
     Args:
-        given: Damping that the problem gives; empty or zeros for equal damping.
+        given: The problem's `jointDamping` of the m joints; empty or zeros for equal damping.
         count: Number of joints.
     """
     if not given.any():

@@ -1,4 +1,4 @@
-"""Table of the controller types. To add a type, write a class in its own file and a line here."""
+"""Table of the controller types. To add a type, write a class in its own file, and add a line here."""
 
 from custom_ros_tools.plugin_table import PluginTable
 

@@ -53,7 +53,7 @@ class SetPoints(NamedTuple):
 
 
 class ControlledRobot(NamedTuple):
-    """A robot as a controller sees it, with the joints that the controller drives.
+    """The data about a robot that a controller gets, including which joints the controller drives.
 
     Attributes:
         name: Name of the robot.

@@ -166,7 +166,7 @@ def implicit_wrench(
         mobility: Mobility matrix of the point, J M^-1 J^T, shape (6, 6). It maps wrenches to accelerations.
         stiffness: 6 stiffnesses [N/m, N m/rad], along and about the axes of the springs.
         damping: 6 dampings [N s/m, N m s/rad], along and about the same axes.
-        wrench: Force [N] and moment [N m] of the springs, and pushes, at zero velocity, shape (6,).
+        wrench: Force [N] and moment [N m] at zero velocity, shape (6,): the springs' wrench plus additional pushes.
         acceleration: Velocity of the point divided by the length of a tick, plus the acceleration of the point by
             unmodelled effects [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of the tick [s].
@@ -179,10 +179,10 @@ def implicit_wrench(
 
 
 def force_for(mobility: Array, acceleration: Array) -> Array:
-    """Returns the wrench [N, N m], shape (6,), that accelerates a point of an arm as given.
+    """Returns the wrench [N, N m], shape (6,), that gives a point of an arm an acceleration.
 
     Args:
-        mobility: Mobility matrix of the point, shape (6, 6), possibly singular: `ROUNDING` is added before inversion.
+        mobility: Mobility matrix of the point, shape (6, 6). It may be singular, since `ROUNDING` is added.
         acceleration: Acceleration of the point [m/s^2, rad/s^2], shape (6,).
     """
     return solve(mobility + ROUNDING, acceleration)

@@ -42,7 +42,7 @@ class ControllerStateSample(NamedTuple):
 
 
 class ControllerSwitch(NamedTuple):
-    """Request to start and stop controllers; stops come first.
+    """Request to stop some controllers and then start others.
 
     Attributes:
         start: Names of the controllers to start.
@@ -132,7 +132,7 @@ class ControllerManager:
         return list(self._managed)
 
     def of(self, name: str) -> Controller:
-        """Returns the controller with a name.
+        """Returns the controller with the given name.
 
         Raises:
             UnknownNameError: If the name is unknown.
@@ -168,11 +168,11 @@ class ControllerManager:
         """Stops and starts controllers. Joints that lose their controller hold their measured positions.
 
         Returns:
-            PyBullet's indices of the joints that are driven by a controller now and were not before.
+            PyBullet's indices of the joints that a controller drives now but did not drive before.
 
         Raises:
             UnknownNameError: If a name is unknown.
-            ValueError: If two controllers would drive the same joint. Nothing has changed then.
+            ValueError: If two controllers would drive the same joint. In this case no controller was switched.
         """
         self.check_switch(switch)
         active = self._after(switch)
@@ -218,7 +218,7 @@ class ControllerManager:
                 self._advance(managed, state, tick)
 
     def sample(self, robot: str, name: str) -> ControllerStateSample:
-        """Returns the state of a controller. If its `report` fails, the controller is stopped first.
+        """Returns the state of a controller. If the controller's `report` fails, stops the controller first.
 
         Args:
             robot: Name of the robot.
@@ -263,7 +263,10 @@ class ControllerManager:
         self._drive_others(before)
 
     def _drive_others(self, before: frozenset[int]) -> None:
-        """Updates `driven`. Joints no longer driven hold; PyBullet's motors of newly driven joints are disabled."""
+        """Updates `driven`, whose previous value is `before`.
+
+        Joints that are no longer driven hold. PyBullet's motors of newly driven joints are disabled.
+        """
         self.driven = frozenset(
             index for managed in self._managed.values() if managed.active for index in managed.indices
         )
@@ -291,7 +294,7 @@ def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.nda
         names: m joint names; None for all driven joints.
 
     Raises:
-        UnknownNameError: If a name is not that of a driven joint.
+        UnknownNameError: If a name does not belong to a driven joint.
     """
     known = [joint.name for joint in robot.model.joints]
     if names is None:
@@ -303,7 +306,7 @@ def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.nda
 
 
 def _cause(controller: Controller, doing: str, error: Exception) -> str:
-    """Returns the message of a controller's error. For a class from another package, the message names the class."""
+    """Returns the message of a controller's error. If the class is from another package, the message names it."""
     try:
         raise_plugin_error(controller, doing, error)
     except InterfaceError as named:

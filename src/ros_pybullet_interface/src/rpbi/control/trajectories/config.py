@@ -21,7 +21,7 @@ class JointConstraints(ConfigModel):
 
 
 class TrajectoryConstraints(ConfigModel):
-    """Default tolerances of goals; further keys are names of joints."""
+    """Tolerances of trajectory goals. Each further key is a joint's name, with the tolerances of the joint."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, JointConstraints]
@@ -34,7 +34,7 @@ class TrajectoryConstraints(ConfigModel):
     @model_validator(mode="before")
     @classmethod
     def _joints_have_mappings(cls, data: Any) -> Any:
-        """Reports an unknown key with a plain value as a misspelt key, rather than as a joint's invalid constraints."""
+        """Reports an unknown key whose value is not a mapping as a misspelt key, rather than as a joint's name."""
         for key, value in data.items() if isinstance(data, dict) else ():
             if key not in cls.model_fields and not isinstance(value, (dict, JointConstraints)):
                 raise KeyedError(key, f"unknown key '{key}'{hint(key, cls.model_fields)}; joints have mappings")
@@ -47,7 +47,7 @@ class TrajectoryConstraints(ConfigModel):
 
 
 class JointTrajectoryControllerConfig(ConfigModel):
-    """The follower of trajectories of a robot."""
+    """Configuration of a robot's trajectory follower."""
 
     joints: ListOf[Text] | None = Field(
         None, min_length=1, description="Joints that it drives; without it, all that can be driven."

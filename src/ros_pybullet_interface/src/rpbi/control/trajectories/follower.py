@@ -27,7 +27,7 @@ class CheckedRequest(NamedTuple):
     """A trajectory that passed all checks that do not need the robot's state.
 
     Attributes:
-        joint_trajectories: One trajectory for each named joint; empty to stop and hold.
+        joint_trajectories: One trajectory for each joint of the request; empty to stop and hold.
         stamp_ns: Start time, in the world's stamps [ns]; 0 to start at once.
         tolerances: Tolerances; None to check no tolerances.
     """
@@ -38,7 +38,7 @@ class CheckedRequest(NamedTuple):
 
 
 class TrajectoryFollower:
-    """Makes a robot follow trajectories. A new trajectory is spliced onto the present one at its start time.
+    """Makes a robot follow trajectories. A new trajectory replaces the present one from the new one's start time on.
 
     Attributes:
         joint_names: Names of the joints that the follower drives.
@@ -82,7 +82,7 @@ class TrajectoryFollower:
             feedback: Called with the follower's state at `action_monitor_rate` while the motion lasts.
 
         Raises:
-            TrajectoryRefusedError: If the trajectory's time has passed, a joint cannot reach the trajectory's next
+            TrajectoryRefusedError: If all points are in the past, a joint cannot reach the trajectory's next
                 point in time, the control mode is torque control, or a controller drives a joint.
         """
         now_s = clock.time_s
@@ -139,7 +139,8 @@ class TrajectoryFollower:
     def desired(self, time_s: float) -> DesiredState:
         """Returns the desired state of the follower's joints at a time of the world [s].
 
-        For joints without a trajectory, this is the motors' target under position control, else the measured position.
+        For joints without a trajectory, this is the motors' target under position control. In other modes it is the
+        measured position.
         """
         running = self._running
         trajectories = {} if running is None else running.trajectories

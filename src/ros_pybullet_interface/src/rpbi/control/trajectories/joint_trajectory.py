@@ -174,7 +174,7 @@ def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
 
 
 def _beyond(polynomials: Sequence[Polynomial], durations_s: Sequence[float], lower: float, upper: float) -> list[int]:
-    """Returns the indices of polynomials that may leave a range, and so need an exact check."""
+    """Returns the indices of polynomials that may leave a range and therefore need an exact check."""
     low, high = value_bounds(polynomials, durations_s)
     return [int(number) for number in ((low < lower) | (high > upper)).nonzero()[0]]
 

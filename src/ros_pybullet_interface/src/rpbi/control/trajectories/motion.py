@@ -23,7 +23,7 @@ class TrajectoryMotion(Motion):
         stop_s: Duration of the stop after a tolerance was exceeded [s]; 0 stops at once.
 
     Attributes:
-        code: Error code of the outcome, as of control_msgs/FollowJointTrajectoryResult.
+        code: Error code of the outcome, as in control_msgs/FollowJointTrajectoryResult.
         preempted: Whether another request ended the motion.
         desired: Desired states at the end of the last tick, keyed by joint index.
         on_advance: Called at each tick with the world's time [s] and the measured joint states; None for no call.
@@ -114,10 +114,9 @@ class TrajectoryMotion(Motion):
         return self._go_on(time_s)
 
     def _is_out_of_time(self, time_s: float) -> bool:
-        """Returns whether the time to reach the goal is over.
+        """Returns whether the time allowed for reaching the goal after the trajectory's end has passed.
 
-        This time is at least one tick. A trajectory without velocities still moves at its end, and needs the tick to
-        stop.
+        This time is at least one tick, because joints still move at the end of a trajectory without velocities.
         """
         tick_s = time_s - self._time_s
         return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
@@ -143,7 +142,7 @@ class TrajectoryMotion(Motion):
 
 
 def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duration_s: float) -> Trajectory:
-    """Returns a trajectory on which a joint stops, with constant deceleration unless a limit is in the way.
+    """Returns a trajectory on which a joint stops, with constant deceleration unless a position limit prevents it.
 
     The end position is clipped to the joint's limits.
 

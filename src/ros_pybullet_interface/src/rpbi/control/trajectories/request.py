@@ -50,8 +50,8 @@ class JointTolerance(NamedTuple):
     """Tolerances of one joint. In a request, 0 selects the configured tolerance, and a negative number sets no limit.
 
     Attributes:
-        position: Largest position error [rad or m].
-        velocity: Largest velocity error [rad/s or m/s].
+        position: Maximum position error [rad or m].
+        velocity: Maximum velocity error [rad/s or m/s].
     """
 
     position: float = 0.0
@@ -129,7 +129,7 @@ def _resolved(given: JointTolerance | None, position: float, velocity: float) ->
 
 
 def _limit(given: float, configured: float, default: float) -> float:
-    """Returns the first limit of `given`, `configured`, `default` that is not 0; infinity if `given` is negative."""
+    """Returns infinity if `given` is negative, else the first non-zero value of `given`, `configured`, `default`."""
     return math.inf if given < 0.0 else given or configured or default
 
 
