@@ -1,1 +1,1 @@
-"""Guard between targets and a robot: checks each target before it reaches the robot."""
+"""Guard that checks each joint target before the robot receives the target."""

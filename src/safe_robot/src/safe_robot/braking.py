@@ -25,7 +25,7 @@ class Brake(NamedTuple):
     """Braking of n joints in k periods; all arrays have the shape (k, n).
 
     Attributes:
-        displacement: Displacements from the start [rad or m].
+        displacement: Displacements from the positions at the start of braking [rad or m].
         velocity: Velocities [rad/s or m/s].
         acceleration: Accelerations [rad/s^2 or m/s^2].
         jerk: Jerks [rad/s^3 or m/s^3].
@@ -37,7 +37,7 @@ class Brake(NamedTuple):
     jerk: np.ndarray
 
     def with_joints_of(self, other: "Brake", joints: np.ndarray) -> "Brake":
-        """Returns a braking in which the selected joints come to rest as in another braking.
+        """Returns a braking that moves the selected joints as in another braking, and all other joints as in this one.
 
         Args:
             other: The other braking, which may have another number of periods.
@@ -77,21 +77,21 @@ class BrakingCommands(NamedTuple):
         return BrakingCommands(*(each[1:] for each in self))
 
     def brake_from(self, position: np.ndarray) -> Brake:
-        """Returns these commands as a braking that starts at n positions [rad or m]."""
+        """Converts the commands to a braking that starts at n positions [rad or m]."""
         return Brake(self.position - position, *self[1:])
 
 
 class Braking:
     """Finds braking trajectories of n joints, independently for each joint.
 
-    A joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
-    linear in the joint's velocity and acceleration at the start. The factors are precomputed for several lengths N, so
-    that a braking takes one matrix product. The shortest of these lengths that keeps the limits is used.
+    Each joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
+    a linear function of the joint's velocity and acceleration at the start. The coefficients are precomputed for
+    several numbers N. A braking uses the smallest of these N for which the joint keeps its limits.
 
     Args:
-        max_velocity: Largest speeds, shape (n,) [rad/s or m/s]; inf for a joint without a limit.
-        max_acceleration: Largest accelerations, shape (n,) [rad/s^2 or m/s^2]; inf without a limit.
-        max_jerk: Largest jerks, shape (n,) [rad/s^3 or m/s^3]; inf without a limit.
+        max_velocity: Speed limits, shape (n,) [rad/s or m/s]; inf for a joint without a limit.
+        max_acceleration: Acceleration limits, shape (n,) [rad/s^2 or m/s^2]; inf for a joint without a limit.
+        max_jerk: Jerk limits, shape (n,) [rad/s^3 or m/s^3]; inf for a joint without a limit.
         period_s: The period T [s].
 
     Raises:
@@ -128,10 +128,13 @@ class Braking:
         self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
-        """Returns the braking of n joints from their n velocities and n accelerations.
+        """Returns the shortest precomputed braking that keeps the acceleration and jerk limits; None if there is none.
 
-        Returns None if no precomputed length keeps the acceleration and jerk limits. Velocities and positions during
-        braking are not checked here.
+        Velocities and positions during braking are not checked here.
+
+        Args:
+            velocity: Velocities at the start, shape (n,) [rad/s or m/s].
+            acceleration: Accelerations at the start, shape (n,) [rad/s^2 or m/s^2].
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state[:, None])[:, 0]
@@ -144,10 +147,10 @@ class Braking:
         return Brake(*found.transpose(1, 2, 0))
 
     def ends(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the braking distances [rad or m], and the largest speeds until rest [rad/s or m/s].
+        """Returns the displacements until rest [rad or m], and the largest speeds until rest [rad/s or m/s].
 
-        The arguments are m states of n joints. All arrays have the shape (m, n). Results are NaN where
-        no braking keeps the acceleration and jerk limits.
+        The arguments are the velocities and accelerations of n joints in m states. All arrays have the shape (m, n).
+        Results are NaN where no braking keeps the acceleration and jerk limits.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         fits = self._fits(state)
@@ -158,7 +161,12 @@ class Braking:
         return can * (end[..., 0] * state[0] + end[..., 1] * state[1]), can * speed
 
     def _turning_speed(self, state: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Returns the velocity at which the acceleration first changes sign; the unit of time is the period."""
+        """Returns the velocities at which the accelerations first change sign, shape (m, n) [rad or m per period].
+
+        Args:
+            state: Velocities and accelerations, as for `_fits`.
+            which: Index of the precomputed braking of each joint in each state, shape (m, n).
+        """
         v, a = state
         lines = self._lines[:2, which]  # 2 x m x n x 2
         first, slope = lines[..., 0] * v + lines[..., 1] * a
@@ -169,11 +177,15 @@ class Braking:
         return speed
 
     def factors(self, velocity: np.ndarray, acceleration: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns two arrays of factors, each of shape (count, n), from which the braking distances of n joints follow.
+        """Returns factors f and g, each of shape (count, n), for the displacements of n joints during braking.
 
-        The distance that a joint has travelled at an instant is its initial velocity times the first factor plus its
-        initial acceleration times the second factor. Rows are instants, evenly spaced from the start of braking until
-        all joints rest.
+        The rows belong to instants that are evenly spaced from the start of braking until all joints rest. At each
+        instant, a joint's displacement is f times the initial velocity plus g times the initial acceleration.
+
+        Args:
+            velocity: Initial velocities, shape (n,) [rad/s or m/s].
+            acceleration: Initial accelerations, shape (n,) [rad/s^2 or m/s^2].
+            count: Number of instants.
         """
         state = np.array((velocity * self._period_s, acceleration * self._period_s**2))
         shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
@@ -182,11 +194,11 @@ class Braking:
         return way[0] * self._period_s, way[1] * self._period_s**2
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
-        """Returns whether each of the l precomputed braking lengths keeps the limits, shape (l, m, n).
+        """Returns whether each of the l precomputed brakings keeps the limits, booleans of shape (l, m, n).
 
         Args:
-            state: Velocities and accelerations of m states of n joints, shape (2, m, n); the unit of time is the
-                period.
+            state: Velocities (index 0) and accelerations (index 1) of n joints in m states, shape (2, m, n). The unit
+                of time is the period.
         """
         products = self._lines.reshape(-1, 2) @ state.reshape(2, -1)
         first, slope, first_jerk, last_jerk, first_acceleration = products.reshape(5, -1, *state.shape[1:])  # l x m x n
@@ -203,17 +215,18 @@ class Braking:
 
 
 def _padded(values: np.ndarray, rows: int, repeats: bool) -> np.ndarray:
-    """Returns k x n values, extended to `rows` rows with copies of the last row if `repeats`, else with zeros."""
+    """Extends k x n values to `rows` rows: with copies of the last row if `repeats` is True, otherwise with zeros."""
     return np.pad(values, ((0, rows - len(values)), (0, 0)), "edge" if repeats and len(values) else "constant")
 
 
 def _jerk_line(length: int) -> np.ndarray:
-    """Returns the factors of a braking's jerks p + r m in the periods m = 1 ... N, shape (2, 2).
+    """Returns the matrix M of shape (2, 2) that determines the jerks of a braking in N = `length` periods.
 
-    Row 0 gives p, and row 1 gives r. The columns are multiplied by velocity and acceleration.
+    The jerk in period m = 1 ... N is p + r m, with (p, r) = M @ (v, a) for the velocity v and the acceleration a at
+    the start. The unit of time is the period.
 
-    With T = 1, a joint rests after N periods if sum(j_m) = -a and sum((N - m + 1) j_m) = -v - N a. The sum of squares
-    is smallest where j is a linear combination of the coefficients of both equations, which is linear in m.
+    A joint rests after N periods if sum(j_m) = -a and sum((N - m + 1) j_m) = -v - N a. The jerks with the smallest sum
+    of squares are a linear combination of the coefficients of both equations, and therefore linear in m.
     """
     n = float(length)
     s1, s2 = n * (n + 1.0) / 2.0, n * (n + 1.0) * (2.0 * n + 1.0) / 6.0
@@ -224,11 +237,16 @@ def _jerk_line(length: int) -> np.ndarray:
 
 
 def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
-    """Returns an upper bound of the duration of braking from any state within limits and speeds up to `FASTEST` [s].
+    """Returns an upper bound of the duration of braking from any state within the limits and `FASTEST` [s].
 
-    The longest braking starts with v and a of the same sign. In continuous time, the largest jerk of the least-squares
-    braking of duration D is then (6 v + 4 a D) / D^2, at the start. The acceleration in the opposite direction is at
-    most a third of the present acceleration plus 1.5 v / D.
+    The longest braking starts with a velocity v and an acceleration a of the same sign. In continuous time, the
+    least-squares braking of duration D then has its largest jerk, (6 v + 4 a D) / D^2, at the start. The largest
+    deceleration is at most a / 3 + 1.5 v / D.
+
+    Args:
+        velocity: Speed limit [rad/s or m/s].
+        acceleration: Acceleration limit [rad/s^2 or m/s^2].
+        jerk: Jerk limit [rad/s^3 or m/s^3].
     """
     velocity = min(velocity, FASTEST)
     acceleration = min(acceleration, 2.0 * math.sqrt(velocity * jerk))

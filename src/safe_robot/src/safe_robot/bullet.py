@@ -38,7 +38,7 @@ AABB_MARGIN_M = 6e-3
 
 
 class BulletShapes:
-    """Collision shapes of a robot and of obstacles in PyBullet; implements `Shapes`.
+    """Holds the collision shapes of a robot and of obstacles in PyBullet; implements the protocol `Shapes`.
 
     Args:
         robot: The robot; its mesh files must exist.
@@ -111,7 +111,7 @@ class BulletShapes:
 
 
 def _add(pb: Client, obstacle: Obstacle) -> int:
-    """Adds an obstacle to PyBullet, and returns its body ID.
+    """Adds an obstacle to PyBullet, and returns the ID of the new body.
 
     Raises:
         ValueError: If PyBullet cannot represent the obstacle.
@@ -137,21 +137,21 @@ def _add(pb: Client, obstacle: Obstacle) -> int:
 
 
 def _solids_of_link(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the collision shapes of a link, enlarged by `_missing_m`, in the frame of its centre of mass."""
+    """Returns the collision shapes of a link, enlarged by `_missing_m`, in the link's inertial frame."""
     return [solid.grown(_missing_m(pb, body, link)) for solid in _shapes_of_link(pb, body, link)]
 
 
 def _missing_m(pb: Client, body: int, link: int) -> float:
-    """Returns the largest error by which PyBullet overestimates distances from a link, because it rounds edges [m]."""
+    """Returns the largest distance [m] by which a link's true edges exceed the rounded edges of PyBullet's shapes."""
     return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
 
 
 def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the collision shapes of a link in their true size, in the frame of its centre of mass.
+    """Returns the collision shapes of a link in their true size, in the link's inertial frame.
 
-    If PyBullet does not report the corners of all shapes, the result is the axis-aligned box around the link in its
-    present pose. The same box is returned if only some of the shapes are meshes from files, or if meshes are rotated
-    relative to each other.
+    Returns a single box instead if PyBullet does not report the corners of all shapes, if only some of the shapes are
+    meshes from files, or if meshes are rotated relative to each other. This box encloses the link, and is aligned with
+    the world's axes in the link's present pose.
     """
     shapes = pb.getCollisionShapeData(body, link)
     if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):

@@ -19,7 +19,7 @@ from .motion import CommandedMotion
 
 
 class CheckConfig(ConfigModel):
-    """Options that every check has."""
+    """Options that all checks have in common."""
 
     active: Switch = Field(True, description="Whether the check is used.")
 
@@ -29,13 +29,13 @@ class Violation(NamedTuple):
 
     Attributes:
         check: Name of the check.
-        subject: The joint, link, pair of links, or another subject.
+        subject: Description of what is unsafe, for example a joint, a link or a pair of links.
         value: Value that the target would cause, in `unit`; NaN if the violation has no numbers.
         limit: Allowed value, in `unit`; NaN if the violation has no numbers.
         unit: Unit of `value` and `limit`.
         is_while_braking: Whether the braking after the target is unsafe, not the target itself.
         quantity: Name of the quantity that `value` and `limit` measure; empty if `subject` names the quantity.
-        words: Message with advice; if not empty, it replaces the generated message after the check's name.
+        words: Message with advice. If empty, the message is generated from the other attributes.
     """
 
     check: str
@@ -57,15 +57,15 @@ class Violation(NamedTuple):
 
 
 class MarginViolation(NamedTuple):
-    """A pair of shapes that is nearer than its safety margin.
+    """Two shapes whose distance is smaller than the safety margin.
 
     Attributes:
         check: Name of the check.
         pair: Names of two links, or the name of a link and the number of an obstacle.
-        subject: Description of the pair, for messages.
-        distance_m: Distance of the pair [m].
+        subject: Description of the two shapes, for messages.
+        distance_m: Distance between the shapes [m].
         margin_m: Smallest allowed distance [m].
-        gradient: Derivatives of the distance with respect to the n joint positions [m/rad or 1].
+        gradient: Derivatives of the distance with respect to the joint positions, shape (n,) [m/rad or 1].
     """
 
     check: str
@@ -106,8 +106,8 @@ class CheckContext(NamedTuple):
 class Check(ABC):
     """Base class of checks, each of which decides whether a motion is safe.
 
-    Results do not depend on earlier calls: equal motions and contexts have equal results. For a trial motion, the
-    reported violation may differ, but not whether the motion is safe.
+    Results do not depend on earlier calls: equal motions and contexts have equal results. One exception: which
+    violation is reported for an unsafe motion with `is_trial` may depend on earlier calls.
 
     Args:
         config: Options of the check.
@@ -122,7 +122,8 @@ class Check(ABC):
         Config: Model of the check's options.
         name: Name of the check in the configuration and in messages.
         is_default: Whether the check is used even without an entry in the configuration.
-        watches: Whether the check examines the context, not the command; such checks also run while no targets arrive.
+        watches: Whether the check examines the context instead of the command. Such a check also runs while no targets
+            arrive.
         takes_obstacles: Whether the check uses `CheckContext.obstacles`.
     """
 
@@ -137,27 +138,30 @@ class Check(ABC):
 
     @abstractmethod
     def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
-        """Returns the violation that a motion causes; None if the motion is safe.
+        """Returns a violation if a motion is not safe; otherwise None.
 
         A motion with NaN is never safe. A robot that is outside a position limit may move back towards the limit.
         """
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
-        """Returns linear bounds that keep the robot safe near given configurations of its braking.
+        """Returns linear bounds on positions that keep the robot safe near the given configurations.
 
-        Called after `check`, and only with the policy `limit`. The bounds guide the search for a safe command, but each
-        command that is found still has to pass `check`.
+        Called after `check`, and only with the policy `limit`. The bounds guide the search for a safe command. Each
+        candidate command still has to pass `check`.
 
         Args:
-            rows: The configurations, k x n positions [rad or m].
-            spread: Largest deviations of the n joints from the configurations [rad or m]; bounds that these deviations
+            rows: Configurations during braking, shape (k, n) [rad or m].
+            spread: Largest deviations from the configurations, shape (n,) [rad or m]. Bounds that these deviations
                 cannot reach may be left out.
-            before: The n present positions [rad or m]; violations that exist there may not increase.
+            before: Present positions, shape (n,) [rad or m]. Violations that exist at these positions may not increase.
         """
         return ()
 
     def inside(self, q: np.ndarray) -> Sequence[MarginViolation]:
-        """Returns the margin violations at n joint positions [rad or m]; obstacles are as in the last `check` call."""
+        """Returns the margin violations at n joint positions [rad or m].
+
+        Obstacles are those of the last `check` call.
+        """
         return ()
 
     def require_link(self, link: str, key: str) -> None:
@@ -170,10 +174,10 @@ class Check(ABC):
     def first_above(
         self, values: np.ndarray, limit: np.ndarray, quantity: str, unit: tuple[str, str]
     ) -> Violation | None:
-        """Returns the violation for the first value that exceeds its limit; None if no value does.
+        """Returns the violation for the first value that exceeds its limit; None if all values keep their limits.
 
         Args:
-            values: Values that are not negative, shape (k, n).
+            values: Absolute values for n joints in k rows of a motion, shape (k, n).
             limit: Limits, shape (n,) or (k, n).
             quantity: Name of the quantity, for the violation.
             unit: The unit for revolute joints, and the unit for prismatic joints.

@@ -12,7 +12,7 @@ from .limits import LimitsConfig
 
 
 class GuardConfig(ConfigModel):
-    """A guard."""
+    """Parameters of a guard, which checks each joint target before the robot receives the target."""
 
     policy: Literal["reject", "limit"] = Field(
         "reject",
@@ -53,7 +53,7 @@ class GuardConfig(ConfigModel):
 
 
 class NodeConfig(ConfigModel):
-    """Options of the guard's node other than those of its decisions."""
+    """Options of the guard's ROS node: message types, timeout of targets, and source of obstacles."""
 
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."

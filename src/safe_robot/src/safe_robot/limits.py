@@ -17,7 +17,7 @@ PerJoint = Positive | dict[str, Positive]
 
 
 class LimitsConfig(ConfigModel):
-    """Limits of the joints."""
+    """Joint limits, which narrow the limits in the robot's URDF."""
 
     lower: dict[str, float] = Field({}, description="Lower limits by joint [rad or m], above those of the URDF.")
     upper: dict[str, float] = Field({}, description="Upper limits by joint [rad or m], below those of the URDF.")

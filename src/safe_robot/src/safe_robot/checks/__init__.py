@@ -32,10 +32,12 @@ CHECKS: PluginTable[Check] = PluginTable(
 def make_checks(
     options: Mapping[str, Mapping[str, Any]], robot: RobotModel, limits: MotionLimits, file: str
 ) -> list[Check]:
-    """Creates the checks of a guard: default checks and checks with options, except inactive checks.
+    """Creates all default checks and all checks named in `options`, except those with `active: false`.
 
     Args:
         options: Options of each check, indexed by check name.
+        robot: The guarded robot.
+        limits: Limits of the robot's joints.
         file: Source of the options, for messages.
 
     Raises:

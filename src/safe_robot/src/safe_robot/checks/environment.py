@@ -20,7 +20,7 @@ from .proximity_check import GEOMETRY, ProximityCheck, link_distances
 
 
 class EnvironmentConfig(CheckConfig):
-    """Least distances between links and bodies of the environment."""
+    """Minimum distance between the robot's links and bodies of the environment."""
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
     timeout_s: Seconds = Field(
@@ -36,10 +36,10 @@ class EnvironmentConfig(CheckConfig):
 
 
 class Environment(ProximityCheck):
-    """Links keep away from bodies of the environment, also while the robot brakes.
+    """Checks that links keep their distance from bodies of the environment, also while the robot brakes.
 
-    Bodies come from a world file, from `CheckContext.obstacles`, or from both. If a body itself comes nearer than the
-    margin, the robot may only move such that the distance does not decrease.
+    Bodies come from a world file, from `CheckContext.obstacles`, or from both. If a moving body comes nearer than the
+    margin, the robot may only move such that the distance to the body does not decrease.
     """
 
     Config = EnvironmentConfig
@@ -83,7 +83,11 @@ class Environment(ProximityCheck):
         return f"link '{pair[0]}' and '{self._obstacles[int(pair[1])].name}'"
 
     def _update_poses(self, live: tuple[Obstacle, ...]) -> None:
-        """Replaces the live obstacles, and updates the distances of those that have changed."""
+        """Replaces the obstacles of `CheckContext`, and discards stored distances to obstacles that have changed.
+
+        Raises:
+            ValueError: As `check`.
+        """
         self._live = None  # marks the poses as outdated until all are updated
         count = len(self._obstacles)
         obstacles = (*self._of_world, *live)

@@ -10,7 +10,7 @@ from safe_robot.motion import CommandedMotion
 
 
 class ForceConfig(CheckConfig):
-    """Largest forces and torques of a sensor."""
+    """Limits on the force and torque that a sensor measures."""
 
     force_n: Positive = Field(50.0, description="Largest force [N].")
     torque_nm: Positive = Field(10.0, description="Largest torque [N m].")
@@ -18,7 +18,7 @@ class ForceConfig(CheckConfig):
 
 
 class Force(Check):
-    """Force and torque of a sensor are within their limits, and the measurement is recent."""
+    """Checks that the measured force and torque are within their limits, and that the measurement is recent."""
 
     Config = ForceConfig
     name = "force"

@@ -9,7 +9,7 @@ UNIT = ("rad/s^2", "m/s^2")
 
 
 class JointAcceleration(Check):
-    """No joint has more acceleration than its limit, in the differences of commands a period apart."""
+    """Checks that no joint exceeds its acceleration limit, according to differences of successive commands."""
 
     name = "joint_acceleration"
     is_default = True

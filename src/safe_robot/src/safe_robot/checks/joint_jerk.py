@@ -9,7 +9,7 @@ UNIT = ("rad/s^3", "m/s^3")
 
 
 class JointJerk(Check):
-    """No joint has more jerk than its limit, in the differences of commands a period apart."""
+    """Checks that no joint exceeds its jerk limit, according to differences of successive commands."""
 
     name = "joint_jerk"
     is_default = True

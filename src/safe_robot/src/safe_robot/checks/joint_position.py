@@ -9,7 +9,7 @@ UNIT = ("rad", "m")
 
 
 class JointPosition(Check):
-    """Every joint stays within its limits, and can come to rest there: its speed falls towards the limit."""
+    """Checks that all joints stay within their position limits, also while the robot brakes."""
 
     name = "joint_position"
     is_default = True

@@ -9,7 +9,7 @@ UNIT = ("rad/s", "m/s")
 
 
 class JointVelocity(Check):
-    """No joint has more velocity than its limit, in the differences of commands a period apart."""
+    """Checks that no joint exceeds its speed limit, according to differences of successive commands."""
 
     name = "joint_velocity"
     is_default = True

@@ -1,4 +1,4 @@
-"""Check that the origins of links stay in boxes."""
+"""Check that the origins of links stay within boxes."""
 
 import math
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ SPARE_M = 1e-4
 
 
 class BoxConfig(ConfigModel):
-    """A box in the robot's root link; an axis without limits may be left out."""
+    """A box, given in the frame of the robot's root link. An axis without limits may be left out."""
 
     x: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest x [m].")
     y: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest y [m].")
@@ -35,18 +35,18 @@ class BoxConfig(ConfigModel):
 
 
 class LinkBoxConfig(CheckConfig):
-    """Boxes that links stay in."""
+    """Boxes that the origins of links must not leave."""
 
     boxes: dict[str, BoxConfig] = Field({}, description="A box for each link whose origin is to stay in one.")
 
 
 class Box(NamedTuple):
-    """Box that a link stays in.
+    """Box that the origin of a link must not leave.
 
     Attributes:
         low: Smallest x, y and z in the frame of the robot's root link, shape (3,) [m].
-        high: Greatest x, y and z, shape (3,) [m].
-        reach: Upper bounds of the displacement of the link's origin by each joint, shape (n,) [m per rad or m].
+        high: Largest x, y and z in the same frame, shape (3,) [m].
+        reach: Upper bound of the link origin's displacement per displacement of each joint, shape (n,) [m/rad or 1].
     """
 
     low: np.ndarray
@@ -55,7 +55,7 @@ class Box(NamedTuple):
 
 
 class LinkBox(Check):
-    """The origins of links stay in boxes."""
+    """Checks that the origins of links stay within boxes, also while the robot brakes."""
 
     Config = LinkBoxConfig
     name = "link_box"

@@ -13,13 +13,13 @@ from safe_robot.motion import CommandedMotion
 
 
 class LinkVelocityConfig(CheckConfig):
-    """Largest speeds of links."""
+    """Speed limits of links."""
 
     links: dict[str, Positive] = Field({}, description="The largest speed of the origin of each of these links [m/s].")
 
 
 class LinkVelocity(Check):
-    """The origins of links keep their speed limits, also while all joints brake."""
+    """Checks that the origins of links keep their speed limits, also while the robot brakes."""
 
     Config = LinkVelocityConfig
     name = "link_velocity"

@@ -1,4 +1,4 @@
-"""Search for pairs that come too near to each other while a robot moves."""
+"""Search for pairs of shapes that come too near to each other while a robot moves."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -22,12 +22,12 @@ FAR_M = 10.0
 
 
 class TooNear(NamedTuple):
-    """A pair that comes too near.
+    """Two shapes that come too near to each other during a motion.
 
     Attributes:
-        pair: The pair.
-        distance: Distance [m].
-        is_while_braking: Whether the pair comes too near during the braking, not at the command.
+        pair: Two links, or a link and an obstacle.
+        distance: Distance between the shapes where they are too near [m].
+        is_while_braking: Whether the shapes are too near during the braking; otherwise, at the command.
     """
 
     pair: Pair
@@ -36,10 +36,10 @@ class TooNear(NamedTuple):
 
 
 class Proximity:
-    """Finds pairs that come nearer than a margin, and nearer than at the start of the motion.
+    """Finds pairs of shapes whose distance falls below a margin and below the distance at the start of the motion.
 
-    For most pairs, a lower bound of the distance is sufficient. Such bounds follow from the joints' motion or from a
-    separating plane. Only the other pairs are measured.
+    Most pairs are ruled out by a lower bound of their distance, which follows from the joints' motion or from a
+    separating plane. Distances are measured only for the remaining pairs.
 
     Args:
         distances: Measures distances between shapes.
@@ -57,7 +57,7 @@ class Proximity:
         self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of the pairs' distances there
 
     def forget(self, indices: Sequence[int]) -> None:
-        """Discards the bounds of pairs whose second member, an obstacle, has moved or changed."""
+        """Discards the stored bounds of pairs with these indices, because the obstacle of each pair has changed."""
         self._known_m[:, list(indices)] = -np.inf
         for i in indices:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
@@ -65,8 +65,9 @@ class Proximity:
     def first(self, motion: CommandedMotion) -> TooNear | None:
         """Returns a pair that comes too near in any row of a motion; None if all pairs keep their distance.
 
-        If a pair has the distances d and e at two rows, and moves by m in between, its distance in between is at least
-        (d + e - m) / 2. Where this bound is not sufficient, every row is checked.
+        Let d and e be the distances of a pair in two rows, and m the length of its relative motion between the rows.
+        Then the distance between these rows is at least (d + e - m) / 2. Where this bound is too small, every row is
+        checked.
         """
         if not len(self._pairs):
             return None
@@ -96,8 +97,8 @@ class Proximity:
     def _first_in_rows(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
         """Returns one of s pairs that comes too near in one of k rows; None if no pair does.
 
-        Rows that are far apart are checked first. They reveal an unsafe motion soonest, and their distances give bounds
-        for most rows in between.
+        Measures distances in a few rows first. These usually reveal an unsafe motion, and give lower bounds for most of
+        the other rows.
 
         Args:
             motion: The motion.
@@ -132,9 +133,9 @@ class Proximity:
             suspects: Indices of the s pairs.
             rows: Indices of the k rows of the motion.
             chosen: Indices into `rows` of the rows to examine.
-            moved: Upper bound of each pair's path length from row 0 to each row, shape (k, s) [m].
-            spare: Lower bounds of distance minus margin, shape (k, s) [m]; updated in place. inf marks the pairs and
-                rows that have been measured.
+            moved: Upper bound of the length of each pair's relative motion from row 0 to each row, shape (k, s) [m].
+            spare: Lower bounds of distance minus margin, shape (k, s) [m]; updated in place. The value inf marks a
+                pair that has already been measured in a row.
         """
         least_m = self._margin_m + ROUNDING_M
         frames = self._distances.frames(motion.position[rows[chosen]])
@@ -161,19 +162,23 @@ class Proximity:
     def _known_near(self, q: np.ndarray) -> np.ndarray:
         """Returns lower bounds of all pairs' distances [m], shape (..., 2, pairs).
 
-        The bounds follow from the stored bounds at both ends of a previous motion, and from the joints' motion since.
+        Lower bounds are stored for two configurations: the first and the last row of an earlier motion. Each returned
+        bound is a stored bound minus the largest possible change of the distance between this configuration and `q`.
 
         Args:
-            q: Joint positions, shape (..., 2, 1, n); or (..., 1, 1, n) to use the same positions for both ends.
+            q: Joint positions for both stored configurations, shape (..., 2, 1, n); or (..., 1, 1, n) if the positions
+                are the same for both.
         """
         known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
 
     def _sparse(self, travelled: np.ndarray) -> np.ndarray:
-        """Returns indices of rows about one spacing apart, including the first and the last of k rows.
+        """Returns the indices of a few rows, including the first and the last of k rows.
+
+        The path between two of the returned rows is about twice the margin, or `LEAST_SPACING_M` if this is longer.
 
         Args:
-            travelled: Path length up to each row, shape (k,) [m].
+            travelled: Path length up to each of the k rows, shape (k,) [m].
         """
         spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
         marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
@@ -184,9 +189,9 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns pair `i` if it is nearer than the margin and nearer than at the start; otherwise None.
+        """Returns pair `i` if its distance is smaller than the margin and than at the motion's start; otherwise None.
 
-        The caller has placed the robot in the configuration of the row.
+        The caller has moved the robot to the configuration of the row, and has measured `contact` there.
         """
         if contact is None or contact.distance >= self._margin_m:
             return None
@@ -199,7 +204,7 @@ class Proximity:
         return TooNear(self._pairs[i], contact.distance, row > 0)
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """Returns linear bounds that keep pairs apart near given configurations; see `Check.bounds`."""
+        """Returns linear bounds on positions that keep the pairs apart; see `Check.bounds`."""
         if not len(self._pairs):
             return []
         within_m = self._margin_m + SPARE_M + self._reach @ spread
@@ -232,7 +237,7 @@ class Proximity:
         return bounds
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
-        """Yields the pairs that are nearer than `within_m` at n joint positions, with their contacts."""
+        """Yields each pair whose distance at n joint positions is less than `within_m` [m], and its closest points."""
         self._distances.place(q)
         for pair in self._pairs:
             contact = self._distances.contact(pair, within_m, within_m)
@@ -241,14 +246,14 @@ class Proximity:
 
 
 def _spread_bounds(bounds: np.ndarray, rows: np.ndarray, moved: np.ndarray) -> None:
-    """Raises the lower bounds of distances in k rows, in place, with the bounds in some of these rows.
+    """Improves the lower bounds of distances in k rows, in place, using the bounds in some of these rows.
 
-    Between two rows, the distance of a pair changes at most by the pair's motion.
+    Between two rows, the distance of a pair changes at most by the length of the pair's relative motion.
 
     Args:
         bounds: Lower bounds for s pairs, shape (k, s) [m]. Values of inf are not used for other rows.
         rows: Indices of the rows whose bounds are used, in ascending order.
-        moved: Upper bound of each pair's path length from row 0 to each row, shape (k, s) [m].
+        moved: Upper bound of the length of each pair's relative motion from row 0 to each row, shape (k, s) [m].
     """
     known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
     after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)

@@ -1,4 +1,4 @@
-"""Base class of checks of distances between shapes, and the choice of the library that measures distances."""
+"""Base class of checks that measure distances between shapes, and choice of the library that measures."""
 
 import math
 from abc import abstractmethod
@@ -21,7 +21,7 @@ GEOMETRY = (
 
 
 def shapes_of(robot: RobotModel) -> Shapes:
-    """Returns the shapes of a robot in PyBullet, or in hpp-fcl if PyBullet is not installed.
+    """Loads the collision shapes of a robot into PyBullet, or into hpp-fcl if PyBullet is not installed.
 
     Raises:
         ConfigError: If the robot cannot be loaded.
@@ -37,7 +37,7 @@ def shapes_of(robot: RobotModel) -> Shapes:
 
 
 def link_distances(robot: RobotModel, geometry: Geometry = "hulls") -> LinkDistances:
-    """Returns an object that measures the distances of a robot's links, with the library that `shapes_of` chooses.
+    """Returns an object that measures distances from and between a robot's links, on the shapes of `shapes_of`.
 
     Raises:
         ConfigError: If the robot cannot be loaded.
@@ -78,10 +78,10 @@ class ProximityCheck(Check):
 
     @abstractmethod
     def subject(self, pair: Pair) -> str:
-        """Returns a description of a pair."""
+        """Returns a description of a pair of shapes, for messages."""
 
     def undefined(self, motion: CommandedMotion) -> Violation | None:
-        """Returns a violation for a motion with non-finite numbers, for which PyBullet would find no contact."""
+        """Returns a violation if a motion has non-finite numbers, for which PyBullet finds no contact; else None."""
         if np.isfinite(motion.position).all():
             return None
         return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")

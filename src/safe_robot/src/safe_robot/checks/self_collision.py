@@ -29,7 +29,7 @@ NEARLY_ALWAYS = 0.95
 
 
 class SelfCollisionConfig(CheckConfig):
-    """Least distances between the links of the robot."""
+    """Minimum distance between the links of the robot."""
 
     margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
     geometry: Geometry = Field("hulls", description=GEOMETRY)
@@ -40,7 +40,7 @@ class SelfCollisionConfig(CheckConfig):
 
 
 class SelfCollision(ProximityCheck):
-    """Links that are not neighbours stay apart, also while the robot brakes."""
+    """Checks that links of the robot keep their distance from each other, also while the robot brakes."""
 
     Config = SelfCollisionConfig
     name = "self_collision"
@@ -117,9 +117,9 @@ class SelfCollision(ProximityCheck):
 def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: float) -> list[tuple[str, str]]:
     """Returns the pairs of links that may come nearer than a margin [m].
 
-    Pairs that are connected by one moving joint, or by fixed joints only, are left out. Pairs that are nearly always
-    nearer than the margin, as in a compact wrist, are left out, too. Random configurations with a fixed seed show which
-    pairs are nearly always near.
+    Pairs that are connected by one moving joint, or by fixed joints only, are left out. Pairs that are nearer than the
+    margin in nearly all of several random configurations, as in a compact wrist, are left out, too. The random
+    configurations have a fixed seed.
     """
     groups = {link: _group(robot, link) for link in distances.links}
     parents = {joint.child: _group(robot, joint.parent) for joint in robot.document.joints.values() if joint.is_moving}
@@ -139,7 +139,7 @@ def pairs_that_may_meet(robot: RobotModel, distances: LinkDistances, margin_m: f
 
 
 def _group(robot: RobotModel, link: str) -> str:
-    """Returns the link nearest to the root among those that fixed joints connect to a link."""
+    """Follows fixed joints from a link towards the root, and returns the last link that is reached."""
     for joint in reversed(robot.chain(link)):
         if joint.is_moving:
             return joint.child

@@ -8,7 +8,7 @@ from safe_robot.motion import CommandedMotion
 
 
 class StalenessConfig(CheckConfig):
-    """Largest delays of targets."""
+    """Limit on the age of targets and on the time without a target."""
 
     timeout_s: Seconds = Field(
         0.1, description="Largest age of a target, and longest time without one while the robot moves."
@@ -16,7 +16,7 @@ class StalenessConfig(CheckConfig):
 
 
 class Staleness(Check):
-    """Targets are recent, in order, and keep coming while the robot moves."""
+    """Checks that targets are recent, that stamps do not decrease, and that targets keep arriving during a motion."""
 
     Config = StalenessConfig
     name = "staleness"
@@ -46,7 +46,7 @@ class Staleness(Check):
 
 
 def too_old(age_s: float, limit_s: float, key: str) -> Violation:
-    """Returns the violation of a target whose age [s] exceeds a limit [s]; `key` is the parameter of the limit."""
+    """Returns the violation of a target whose age [s] exceeds a limit [s]; `key` names the parameter with the limit."""
     if age_s < 0.0:
         words = (
             f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"

@@ -9,7 +9,7 @@ from safe_robot.motion import CommandedMotion
 
 
 class TrackingConfig(CheckConfig):
-    """Largest differences of measured positions from commands."""
+    """Limits on the difference between measured positions and commands."""
 
     tolerance: Positive = Field(0.1, description="Largest distance between command and measured position [rad or m].")
     lag_s: NonNegative = Field(
@@ -19,7 +19,7 @@ class TrackingConfig(CheckConfig):
 
 
 class Tracking(Check):
-    """Measured positions are recent and near the last command, apart from the robot's lag."""
+    """Checks that measured positions are recent and near the last command, with allowance for the robot's lag."""
 
     Config = TrackingConfig
     name = "tracking"

@@ -19,7 +19,7 @@ OVERSHOOT = 0.01
 
 
 class ShapingConfig(ConfigModel):
-    """Options for smoothing targets that joints cannot follow."""
+    """Options for smoothing targets that the joints cannot follow within their limits."""
 
     time_s: Annotated[Seconds, Field(ge=1e-4)] = Field(
         0.03, description="Time constant of the filter; smoothed commands lag behind by about twice as much."
