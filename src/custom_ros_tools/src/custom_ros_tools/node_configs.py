@@ -1,4 +1,4 @@
-"""Private parameters and `~config` of the nodes of this package, and the appearance of markers."""
+"""Models of the private parameters and of `~config` for the nodes of this package."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
 
 
 class MarkerNodeConfig(ConfigModel):
-    """Topic and rate of the marker."""
+    """Topic and rate at which a marker is published."""
 
     topic_name: TopicName = Field(description="Topic of the visualization_msgs/Marker.")
     hz: Hz = Field(50.0, description="Rate at which it is published, in wall time.")
@@ -140,13 +140,13 @@ class StartParameters(ConfigModel):
 
 
 class RateParameters(ConfigModel):
-    """Parameters of a node that repeats a message."""
+    """Parameters of a node that publishes a message at a fixed rate."""
 
     hz: Hz = Field(100.0, description="Rate of the message, in wall time.")
 
 
 class RemappedJoint(ConfigModel):
-    """Conversion of a joint to a driver: `sign * position * unit + offset`."""
+    """Conversion of a joint position to a driver: `sign * factor of the unit * position + offset`."""
 
     joint: Text = Field(description="The joint in the simulator.")
     rename: Text | None = Field(None, description="Its name at the driver; by default the same.")
@@ -163,7 +163,7 @@ class RemappedJoint(ConfigModel):
 
 
 class StartWithin(ConfigModel):
-    """Condition for switching on: the robot is near the first command, so that it does not jump."""
+    """Condition for switching on: the robot must be near the first command, so that the robot does not jump."""
 
     topic: Text = Field(description="Joint states of the commanded robot, in the names and units of the commands.")
     tolerance: Annotated[Positive, Unit("rad or m")] = Field(
@@ -172,7 +172,7 @@ class StartWithin(ConfigModel):
 
 
 class RemapConfig(ConfigModel):
-    """Selection and order of the forwarded joints, and their names and units there."""
+    """Selection and order of the forwarded joints, and their names and units at the receiver."""
 
     joint_names: ListOf[Text] | None = Field(
         None,
@@ -205,7 +205,7 @@ def _require_unique(key: str, names: Iterable[str]) -> None:
 
 
 class FloatArrayConfig(RemapConfig):
-    """Selection and order of the numbers of a joint state."""
+    """Quantity, selection and order of the joint values that are published as an array."""
 
     field: Literal["position", "velocity", "effort"] = Field("position", description="Quantity to publish.")
 

@@ -70,9 +70,9 @@ def trusting_only(packages: Iterable[str], how: str) -> Iterator[None]:
 def check_trusted(name: str) -> None:
     """Checks that an untrusted name `module:Class` may be imported.
 
-    Without a restriction, all names may be imported. With a restriction, a name may be imported in two cases: the
-    top-level package is trusted, or the module is already imported and `find_class` has returned a class from the same
-    package.
+    Without a restriction, all names may be imported. With a restriction, a name may be imported if its top-level
+    package is trusted. A name may also be imported if its module is already imported, and `find_class` has returned a
+    class from the same package.
 
     Raises:
         UntrustedError: If the name must not be imported.

@@ -21,7 +21,7 @@ MAX_END_S = 15.0
 
 
 def is_output_closed() -> bool:
-    """Returns whether the standard output is a pipe whose reader has closed it."""
+    """Returns whether the standard output is a pipe that the reader has closed."""
     output = select.poll()
     output.register(1, 0)
     return any(event & select.POLLERR for _, event in output.poll(0))

@@ -130,7 +130,7 @@ _KEYS = {
 
 
 class StaticTransform(ConfigModel):
-    """A transform between two frames."""
+    """A fixed transform between two frames, as arguments of a command give it."""
 
     parent: FrameId
     child: FrameId

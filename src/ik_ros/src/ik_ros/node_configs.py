@@ -38,7 +38,7 @@ LISTS_OF_TASKS = ("constraints", "costs")
 
 
 class RobotIKConfig(ConfigModel):
-    """Options of the robot's own inverse kinematics; the keys are those of its message."""
+    """Options of a simulated robot's own inverse kinematics, named like the fields of its message."""
 
     robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
     link_name: Text = Field(description="The link that is moved to the target.")
@@ -55,14 +55,14 @@ class RobotIKConfig(ConfigModel):
 
 
 class TargetParameters(ConfigModel):
-    """Rate of targets, and the time for which each one counts."""
+    """Rate of publication, and the largest age of the transforms that are used."""
 
     hz: Hz = Field(50.0, description="Rate of publication, in wall time.")
     tf_timeout_s: Seconds = Field(0.5, description="Longest time without new TF; then nothing is published.")
 
 
 class SetupParameters(StartParameters, TargetParameters):
-    """Inputs of problems."""
+    """Parameters of a setup node, with the initial values of the problems that it publishes."""
 
     parent_frame_id: FrameId | None = Field(None, description="TF frame that the target is in: the solver's base.")
     child_frame_id: FrameId | None = Field(None, description="TF frame that is the target.")
@@ -88,7 +88,7 @@ class SetupParameters(StartParameters, TargetParameters):
 
 
 class ExoticaSetupParameters(StartParameters, TargetParameters):
-    """Inputs of problems for `exotica`, as in the authors' release."""
+    """Parameters of the setup node for the solver `exotica`, as in the original package."""
 
     sync_tf_to_exotica_object: ListOf[Text] = Field(
         (), description="Frames of the scene that follow TF: `TF_PARENT TF_CHILD SCENE_PARENT SCENE_FRAME` each."
@@ -97,7 +97,7 @@ class ExoticaSetupParameters(StartParameters, TargetParameters):
 
 
 class SolverNodeParameters(StartParameters):
-    """Private parameters of the node itself; all others are the solver's."""
+    """Private parameters of a solver node itself; all other private parameters are options of the solver."""
 
     base_frame_id: str = Field("", description="TF frame of the solver's base; if empty, poses are not transformed.")
     continuity: JointRateLimiterConfig | None = Field(
@@ -106,7 +106,7 @@ class SolverNodeParameters(StartParameters):
 
 
 class TfToFloatArrayConfig(TargetParameters):
-    """The transform to publish, and the format of its numbers."""
+    """Parameters of the node that publishes a transform as an array of numbers."""
 
     parent_frame_id: FrameId = Field(description="The frame that the pose is in.")
     child_frame_id: FrameId = Field(description="The frame whose pose it is.")

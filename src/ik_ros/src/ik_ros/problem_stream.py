@@ -14,7 +14,7 @@ from .solver import Solver
 
 
 class JointRateLimiterConfig(ConfigModel):
-    """Timing of a stream of targets."""
+    """Options of the joint velocity limits between successive targets."""
 
     max_velocity: Positive | dict[str, Positive] | None = Field(
         None,
@@ -34,8 +34,8 @@ class JointRateLimiter:
     """Limits the joint velocities between successive targets.
 
     If a solution is too far from the last target, the next target is on the straight line between both in joint space.
-    The joint that needs most time moves at its velocity limit, the others move in proportion. So near a singularity or
-    at a change of posture, the robot lags behind instead of jumping.
+    The joint that needs most time moves at its velocity limit, and all other joints move in proportion. So near a
+    singularity or at a change of posture, the robot lags behind instead of jumping.
 
     Args:
         config: The configuration.
@@ -81,8 +81,8 @@ class JointRateLimiter:
             period_s: Time since the last target [s].
 
         Returns:
-            The target, n positions [rad or m], and the completed fraction of the motion from the last target to the
-            solution; 1 if the target is the solution.
+            The target, n positions [rad or m], and a fraction of the motion from the last target to the solution. The
+            target completes this fraction of the motion; 1 means that the target is the solution.
         """
         goal = np.array(solution, dtype=float)
         if self._last is None:

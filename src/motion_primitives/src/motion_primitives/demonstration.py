@@ -74,8 +74,8 @@ class Demonstration:
             names: Names of the n positions. By default x, y, z for n = 3, otherwise q0, q1, ...
 
         Raises:
-            DemonstrationError: If sizes differ, a number is not finite, there are fewer than 10 samples, times do not
-                increase or have a long gap, or positions or orientations jump.
+            DemonstrationError: If sizes differ, a number is not finite, or there are fewer than 10 samples. Also if
+                times do not increase or have a long gap, or if positions or orientations jump.
         """
         stamps = checked_array(times, "times", 1)
         where = checked_array(positions, "positions", 2)

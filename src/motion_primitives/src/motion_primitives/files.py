@@ -19,7 +19,7 @@ from .space import Space
 
 
 class PrimitiveFile(ConfigModel):
-    """A learned primitive."""
+    """Content of a file with a learned primitive."""
 
     type: Text = Field(description="Its type, a name of the table or `module:Class`.")
     options: dict[Text, Any] = Field({}, description="Options of the type.")

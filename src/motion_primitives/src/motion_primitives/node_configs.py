@@ -30,7 +30,7 @@ Bounds = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class FrameSource(ConfigModel):
-    """Pose of a TF frame as signal of demonstrations."""
+    """A TF frame whose pose is the signal of demonstrations."""
 
     parent: FrameId = Field(description="The reference frame of the poses.")
     child: FrameId = Field(description="The moving frame.")
@@ -38,14 +38,14 @@ class FrameSource(ConfigModel):
 
 
 class JointSource(ConfigModel):
-    """Positions of joints as signals of demonstrations."""
+    """Joints whose positions are the signals of demonstrations."""
 
     topic: TopicName = Field("joint_states", description="Topic of the joint states, in bags too.")
     names: ListOf[Text] = Field(min_length=1, description="The joints, in the order of points.")
 
 
 class SourceConfig(ConfigModel):
-    """Signals of demonstrations: either a frame or joints."""
+    """Source of the signals in demonstrations: either a TF frame or joints."""
 
     tf: FrameSource | None = optional("A TF frame.")
     joints: JointSource | None = optional("Joints of a robot.")
@@ -78,7 +78,7 @@ class JointOutput(ConfigModel):
 
 
 class SignalOutput(ConfigModel):
-    """Topic on which bare numbers are published."""
+    """Topic on which the point or the velocity is published as an array of numbers."""
 
     topic: TopicName = Field("primitive/signal", description="Topic of the numbers.")
     content: Literal["position", "velocity"] = Field(
@@ -87,7 +87,7 @@ class SignalOutput(ConfigModel):
 
 
 class OutputConfig(ConfigModel):
-    """Outputs of executed motions; several at once are possible."""
+    """Outputs of executed motions; several outputs can be used at the same time."""
 
     tf: FrameOutput | None = optional("A TF frame, if the source is one.")
     joints: JointOutput | None = optional("Joint targets, if the source are joints.")
@@ -95,7 +95,7 @@ class OutputConfig(ConfigModel):
 
 
 class ObstacleConfig(ConfigModel):
-    """Ball that motions avoid."""
+    """A ball that motions avoid."""
 
     frame_id: FrameId = Field(description="TF frame of its centre.")
     radius: PositiveMetres = Field(0.05, description="Its radius.")
@@ -108,7 +108,7 @@ class ObstacleConfig(ConfigModel):
 
 
 class CouplingConfig(ConfigModel):
-    """Couplings of an executed motion."""
+    """How an executed motion yields to forces and avoids obstacles."""
 
     force_stiffness: Annotated[Positive, Unit("N/m")] | None = optional(
         "Stiffness with which positions yield to forces on `primitive/wrench`, in the axes of the source's parent."
@@ -128,7 +128,7 @@ class CouplingConfig(ConfigModel):
 
 
 class PrimitivesNodeConfig(ConfigModel):
-    """Configuration of learned, planned and executed motions."""
+    """Configuration of the node that learns, plans and executes motions."""
 
     primitive: dict[Text, Any] = Field(
         {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, with its options."

@@ -118,8 +118,8 @@ class Space(NamedTuple):
         return np.asarray(np.gradient(path, times, axis=0))
 
     def distance(self, a: Array, b: Array) -> tuple[float, float]:
-        """Compares two points: returns the largest difference of a position [m or rad], and the angle between the
-        orientations, which is 0 for a space without orientation [rad]."""
+        """Returns the largest position difference of two points [m or rad], and the angle between their orientations
+        [rad]. The angle is 0 for a space without orientation."""
         difference, n = self.minus(a, b), len(self.names)
         return float(np.abs(difference[:n]).max(initial=0.0)), math.hypot(*difference[n:].tolist())
 

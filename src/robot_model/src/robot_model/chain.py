@@ -68,7 +68,7 @@ class Chain:
 
     @property
     def urdf(self) -> str:
-        """A URDF of the chain alone, with empty links."""
+        """Text of a URDF that contains only the chain, with empty links."""
         return chain_urdf(self.joints)
 
 

@@ -106,7 +106,7 @@ class RobotModel:
 
     @cached_property
     def frames(self) -> LinkFrames:
-        """Frames of all links."""
+        """Forward kinematics and Jacobians of all links."""
         return LinkFrames(self.all_joints.values(), self.map_to)
 
     def map_to(self, names: Sequence[str]) -> AffineMap:

@@ -48,7 +48,7 @@ class Parameter(NamedTuple):
 
     @property
     def flag(self) -> str:
-        """Name of the option."""
+        """Name of the option on the command line, such as `--quick`."""
         return self.argument.flag or f"--{self.name.replace('_', '-')}"
 
     @property

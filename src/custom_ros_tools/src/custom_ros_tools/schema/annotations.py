@@ -27,7 +27,7 @@ class _Keyword:
 
 
 class Unit(_Keyword):
-    """States the unit of a number, as in `Annotated[float, Unit("Hz")]`; error messages show it in brackets."""
+    """Unit of a number, as in `Annotated[float, Unit("Hz")]`; error messages show the unit in brackets."""
 
     keyword = "unit"
 

@@ -1,6 +1,6 @@
 """JSON Schemas of configuration models, for editors that check YAML, for error messages and for reference pages.
 
-The dialect is draft-07, the newest dialect that yaml-language-server supports. Three keywords are added: `unit` is the
+The dialect is draft-07, the newest dialect that yaml-language-server supports. Three keywords are added. `unit` is the
 unit of a number, `kind` is the name of a family of constants, and `expects` describes the expected value in words. A
 model inside another model is a reference to `$defs`; a description next to the reference describes the key. In an
 `anyOf`, the first alternative is the usual form, and the other alternatives are accepted as well.
@@ -157,7 +157,7 @@ def mapping_in(schema: Schema, root: Schema) -> Schema | None:
 
 
 def types_in(schema: Schema) -> list[str]:
-    """Returns the JSON types that a schema allows, as far as it names them."""
+    """Returns the JSON types in the keyword `type` of a schema; empty without this keyword."""
     kinds = schema.get("type", [])
     return [kinds] if isinstance(kinds, str) else list(kinds)
 

@@ -64,9 +64,10 @@ class Goal:
     Attributes:
         frame: Pose of the target in the base.
         inverse: Pose of the base in the target.
-        tolerance: Largest allowed errors of the link: 3 distances along the axes of the target [m], and 3 components of
-            the rotation vector from target to link, in the axes of the target [rad]; inf for free rotations.
-        is_point: Whether all tolerances are at most those up to which a target without tolerances counts as reached.
+        tolerance: Largest allowed errors of the link in the axes of the target: 3 distances [m], and 3 components of
+            the rotation vector from target to link [rad]. A component is inf if the rotation is free.
+        is_point: Whether all tolerances are at most the default tolerances, `POSITION_TOLERANCE_M` and
+            `ORIENTATION_TOLERANCE_RAD`.
 
     Raises:
         ValueError: If the problem has no target.

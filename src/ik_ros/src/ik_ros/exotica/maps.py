@@ -116,7 +116,7 @@ class LinkMap(TaskMap):
 
     @property
     def stride(self) -> int:
-        """Number of all numbers of one frame in the map's goal."""
+        """How many numbers one frame has in the map's goal: position coordinates and rotation."""
         return self.positions + (NOTATIONS[self.notation][0] if self.notation else 0)
 
     def size(self, scene: ExoticaScene) -> int:
@@ -160,19 +160,19 @@ class LinkMap(TaskMap):
 
 
 class EffPositionMap(LinkMap):
-    """Position of a link."""
+    """Task map of the position of a link."""
 
     axes = XYZ
 
 
 class EffPositionXYMap(LinkMap):
-    """Position of a link along x and y."""
+    """Task map of the position of a link along x and y."""
 
     axes = ("x", "y")
 
 
 class EffOrientationMap(LinkMap):
-    """Orientation of a link."""
+    """Task map of the orientation of a link."""
 
     axes: ClassVar[tuple[str, ...]] = TURNS
     Type: Notation = "RPY"
@@ -183,7 +183,7 @@ class EffOrientationMap(LinkMap):
 
 
 class EffFrameMap(EffOrientationMap):
-    """Pose of a link."""
+    """Task map of the pose of a link."""
 
     axes: ClassVar[tuple[str, ...]] = (*XYZ, *TURNS)
 
@@ -194,7 +194,7 @@ def _refuse_goal(values: Sequence[float], situation: Situation) -> None:
 
 
 class LookAtMap(TaskMap):
-    """Direction of a frame's z axis: `Base` is the frame on a moving link, `Link` is the frame to point at."""
+    """Task map of the direction of a frame's z axis: the frame `Base` on a moving link points at the frame `Link`."""
 
     is_about_links = True
     EndEffector: Frames
@@ -222,7 +222,7 @@ class LookAtMap(TaskMap):
 
 
 class CenterOfMassMap(TaskMap):
-    """Centre of mass of the robot."""
+    """Task map of the position of the robot's centre of mass."""
 
     is_about_links = True
     EnableZ: Flag = True
@@ -236,7 +236,7 @@ class CenterOfMassMap(TaskMap):
 
 
 class JointPoseMap(TaskMap):
-    """Positions of joints."""
+    """Task map of joint positions."""
 
     JointMap: Numbers = ()
     JointRef: Numbers = ()
@@ -298,25 +298,25 @@ class _BackwardDifference(JointPoseMap):
 
 
 class JointVelocityBackwardDifferenceMap(_BackwardDifference):
-    """First backward difference: joint positions minus the previous solution."""
+    """Task map of the first backward difference: joint positions minus the previous solution."""
 
     factors = (1.0,)
 
 
 class JointAccelerationBackwardDifferenceMap(_BackwardDifference):
-    """Second backward difference of the joint positions and the last two solutions."""
+    """Task map of the second backward difference, from the joint positions and the last two solutions."""
 
     factors = (2.0, -1.0)
 
 
 class JointJerkBackwardDifferenceMap(_BackwardDifference):
-    """Third backward difference of the joint positions and the last three solutions."""
+    """Task map of the third backward difference, from the joint positions and the last three solutions."""
 
     factors = (3.0, -3.0, 1.0)
 
 
 class JointLimitMap(TaskMap):
-    """Distance of joints beyond their limits; `SafePercentage` is the fraction by which the ranges are narrowed."""
+    """Task map of the distance of joints beyond their limits, after the ranges are narrowed by `SafePercentage`."""
 
     SafePercentage: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.0
 

@@ -57,7 +57,7 @@ class _Cost(NamedTuple):
 
 
 class ExoticaSolver(Solver):
-    """Solves an EXOTica problem: its XML is read, and its task maps become tasks of the solver `tasks`.
+    """Solves a problem in EXOTica's XML, whose task maps are converted to tasks of the solver `tasks`.
 
     Attributes:
         config: The options.
@@ -215,8 +215,8 @@ class ExoticaSolver(Solver):
     def _main_task(self) -> str | None:
         """Returns the name of the task that gets the target of a problem, or None.
 
-        This is the task of the only EffFrame map. Without an EffFrame map, it is the task of the only map about a link.
-        If the map consists of several tasks, there is no such task.
+        The task belongs to the only EffFrame map or, without an EffFrame map, to the only map about a link. The result
+        is None if the map is not unique, or is expressed by several tasks.
         """
         links = [name for name in self._costs if isinstance(self.maps[name], LinkMap)]
         whole = [name for name in links if isinstance(self.maps[name], EffFrameMap)] or links

@@ -47,7 +47,7 @@ class PybulletConfig(ChainConfig):
 
 
 class PybulletSolver(ChainSolver):
-    """The simulator's own solver, see docs/ik.md; for targets with or without an orientation.
+    """Uses PyBullet's own inverse kinematics, see docs/ik.md; targets may have a free orientation.
 
     The random starts are the same for all seeds.
 

@@ -70,8 +70,8 @@ class TasksSolver(Solver):
         """Searches for joint positions that satisfy the formulation.
 
         Raises:
-            ValueError: If a goal is missing or invalid, if the problem has a target but the formulation has no main
-                task, or if a previous solution lacks a joint that a task needs.
+            ValueError: If a goal is missing or invalid, or a previous solution lacks a joint that a task needs. Also if
+                the problem has a target, but the formulation does not have a main task.
             UnknownNameError: If the problem names an unknown joint or task.
         """
         with self._lock:

@@ -44,7 +44,7 @@ class TracIkConfig(ChainConfig):
 
 
 class TracIkSolver(ChainSolver):
-    """The TRAC-IK library in the package `pytracik`, which omits Cartesian tolerances.
+    """Uses the TRAC-IK library from the package `pytracik`, which does not support Cartesian tolerances.
 
     Problems with tolerances are solved by the solver `kdl` instead. The result is not deterministic, since it depends
     on the timing of two threads.

@@ -90,7 +90,7 @@ class TrajectoryConfig(KdlConfig):
 
 
 class TrajectorySolver(KdlSolver):
-    """Finds the smoothest motion from rest to rest that passes waypoints in time.
+    """Finds the smoothest motion, from rest to rest, that passes through waypoints at given times.
 
     First, KDL finds joint positions at the waypoints. Then a nonlinear program computes a spline for each joint.
     """
@@ -256,7 +256,8 @@ class TrajectorySolver(KdlSolver):
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
         """Checks speeds and accelerations on a fine grid.
 
-        Returns a message for the largest violation of a speed limit, and for that of an acceleration limit.
+        Returns a message for the largest violation of a speed limit, and one for the largest violation of an
+        acceleration limit.
         """
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):

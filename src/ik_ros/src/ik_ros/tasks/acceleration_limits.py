@@ -27,8 +27,10 @@ class AccelerationLimitsConfig(TaskConfig):
 
 
 class AccelerationLimits(JointTask):
-    """Keeps joints near the extrapolation of the last two solutions; with one solution they start at rest, with none
-    they are free."""
+    """Keeps joint accelerations within limits, relative to the last two solutions.
+
+    With only one previous solution, the joints start at rest. Without a previous solution, the task has no effect.
+    """
 
     Config = AccelerationLimitsConfig
 

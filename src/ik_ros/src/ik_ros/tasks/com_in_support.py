@@ -25,7 +25,7 @@ class ComInSupportConfig(TaskConfig):
 
 
 class ComInSupport(Task):
-    """Keeps the centre of mass over the support polygon, seen along the z axis of the base, which is upright.
+    """Keeps the centre of mass over the support polygon, in the x-y plane of the base, whose z axis must be vertical.
 
     The polygon is the convex hull of the present contact points. The Jacobian ignores the motion of the contact points,
     since other constraints should hold the standing feet.

@@ -28,7 +28,7 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps pairs of shapes apart; at least one of each pair moves."""
+    """Keeps the two shapes of each pair apart: shapes on two links, or a shape on a link and an obstacle."""
 
     Config = DistanceConfig
 

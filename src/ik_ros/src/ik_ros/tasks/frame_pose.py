@@ -4,4 +4,4 @@ from .frame_task import FrameTask
 
 
 class FramePose(FrameTask):
-    """Moves a link to a pose: position [m] and quaternion x, y, z, w."""
+    """Moves a link to a pose, given as position x, y, z [m] and quaternion x, y, z, w."""

@@ -8,7 +8,7 @@ from .frame_task import FrameTask
 
 
 class FramePosition(FrameTask):
-    """Moves the origin of a link to a position x, y, z [m]; its orientation is free."""
+    """Moves the origin of a link to a position x, y, z [m]; the orientation of the link is free."""
 
     available = ("x", "y", "z")
     goal_words = "a position (x, y, z)"

@@ -23,7 +23,7 @@ class JointLimitsConfig(TaskConfig):
 
 
 class JointLimits(JointTask):
-    """Keeps joints within limits; those of the URDF are kept anyway."""
+    """Keeps joints within given limits; the URDF's limits are always kept, even without this task."""
 
     Config = JointLimitsConfig
 

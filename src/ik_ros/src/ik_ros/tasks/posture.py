@@ -23,7 +23,7 @@ class PostureConfig(TaskConfig):
 
 
 class Posture(JointTask):
-    """Moves joints to given positions; goals of problems have one for each, in the same order."""
+    """Moves joints to given positions; a problem's goal can replace these positions, in the same order."""
 
     Config = PostureConfig
 

@@ -30,7 +30,10 @@ class VelocityLimitsConfig(TaskConfig):
 
 
 class VelocityLimits(JointTask):
-    """Keeps joints as near to the previous solution as their speed allows; without one, they are free."""
+    """Keeps joint velocities within limits, relative to the previous solution.
+
+    Without a previous solution, the task has no effect.
+    """
 
     Config = VelocityLimitsConfig
 

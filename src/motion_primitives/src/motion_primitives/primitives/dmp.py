@@ -45,7 +45,7 @@ class DMPConfig(PrimitiveConfig):
 
 
 class LearnedDMP(ConfigModel):
-    """A learned discrete dynamic movement primitive."""
+    """Learned data of a discrete dynamic movement primitive."""
 
     start: ListOf[float] = Field(description="Mean first point.")
     goal: ListOf[float] = Field(description="Mean last point.")
@@ -118,7 +118,7 @@ class FixedGoalExecution(Execution):
 
 
 class DMP(Primitive):
-    """A discrete dynamic movement primitive: it keeps the demonstrated shape with any start and goal.
+    """A discrete dynamic movement primitive, which keeps the demonstrated shape for every start and goal.
 
     The option `attractor` selects the equation. With `moving`, the motion is a `PathExecution`. With `fixed`, it is a
     `FixedGoalExecution`, as in Ijspeert 2013 and Ude 2014. Positions and orientations have the same phase.

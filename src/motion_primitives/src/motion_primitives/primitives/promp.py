@@ -60,7 +60,7 @@ class ProMPConfig(PrimitiveConfig):
 
 
 class LearnedProMP(ConfigModel):
-    """A learned probabilistic movement primitive."""
+    """Learned data of a probabilistic movement primitive."""
 
     origin: ListOf[float] = Field(description="Point whose orientation is the mean; positions are 0.")
     duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
@@ -162,7 +162,7 @@ class MeanPath:
 
 
 class ProMP(Primitive):
-    """A probabilistic movement primitive: demonstrations and their variation, given start, goal and via-points.
+    """A probabilistic movement primitive, which adapts the demonstrations' mean motion to start, goal and via-points.
 
     Follows Paraschos 2013. Orientations are represented as rotation vectors from the demonstrations' mean orientation.
     """
@@ -267,8 +267,8 @@ class ProMP(Primitive):
             progress: Time at which the check begins, as a fraction of the duration.
 
         Raises:
-            PlanError: If the mean motion misses a known point, leaves the range of positions that the option `reach`
-                permits, or turns from the mean orientation by more than a whole turn.
+            PlanError: If the mean motion misses a known point, or leaves the range of positions that the option `reach`
+                permits. Also if the motion turns from the mean orientation by more than a whole turn.
         """
         n = len(self.space.names)
         looks = LOOKS[LOOKS >= progress]

@@ -36,7 +36,7 @@ class RhythmicDMPConfig(PrimitiveConfig):
 
 
 class LearnedRhythmicDMP(ConfigModel):
-    """A learned rhythmic dynamic movement primitive."""
+    """Learned data of a rhythmic dynamic movement primitive."""
 
     center: ListOf[float] = Field(description="Centre of the motion.")
     start: ListOf[float] = Field(description="Difference from the centre at which the cycle starts.")
@@ -110,7 +110,7 @@ def checked_period(period_s: float) -> float:
 
 
 class RhythmicDMP(Primitive):
-    """A rhythmic dynamic movement primitive: a periodic motion with any centre, period and amplitude.
+    """A rhythmic dynamic movement primitive, which repeats a periodic motion with any centre, period and amplitude.
 
     The motion is a limit cycle, see Ijspeert 2013, equations 2.7 to 2.9.
 

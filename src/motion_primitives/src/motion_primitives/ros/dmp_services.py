@@ -92,7 +92,7 @@ def main() -> None:
 
 
 class DMPProcessor:
-    """Calls the services of `dmp_server`, and waits until they are available."""
+    """Client of the node `dmp_server`. The constructor waits until the services are available."""
 
     def __init__(self) -> None:
         self._learn = get_srv_handler("learn_dmp_from_demo", LearnDMPFromDemo)

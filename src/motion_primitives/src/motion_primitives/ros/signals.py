@@ -64,7 +64,7 @@ class TfSource:
         return message.header.stamp, point
 
     def poll(self) -> None:
-        """Records a sample, see `Source`."""
+        """Records a sample if the transform is new, see `Source`."""
         found = self._point()
         if found is not None and found[0] > self._stamp:
             self._stamp = found[0]

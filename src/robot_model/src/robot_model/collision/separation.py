@@ -14,9 +14,9 @@ class Separation:
     """Computes lower bounds on the distances of p pairs without measuring the distances.
 
     A pair is two links, or a link and an obstacle. The distance between two convex shapes is at least their gap along
-    any direction. Along the line between their closest points, the gap equals the distance. So each combination of a
-    shape of the first member and a shape of the second member has one stored direction, in the frame of the second
-    shape. Before a direction is stored, the bound is -inf.
+    any direction. Along the line between their closest points, the gap equals the distance. So one direction is stored
+    for each combination of two shapes, one from each member, in the frame of the second shape. Before a direction is
+    stored, the bound is -inf.
 
     Args:
         pairs: For each pair, the shapes of the first member and the shapes of the second member.

@@ -86,7 +86,7 @@ class UrdfJoint(NamedTuple):
 
     @property
     def rest(self) -> float:
-        """The position within its limits that is nearest to 0 [rad or m]."""
+        """The position within the joint's limits that is nearest to 0 [rad or m]."""
         return min(max(0.0, self.lower), self.upper)
 
 

@@ -42,8 +42,8 @@ def found_by_ros(mesh: str, source: Path) -> str | Path:
         source: Path of the URDF.
 
     Returns:
-        The address as text if ROS can resolve it. A path if `mesh` is a relative path, or if its ROS package is unknown
-        or does not have the file; then the file is searched in the URDF's folder and all folders above.
+        The address as text if ROS can resolve it; otherwise a path. Relative paths start at the folder of the URDF. If
+        the ROS package is unknown or lacks the file, the URDF's folder and all folders above are searched.
 
     Raises:
         ConfigError: If the package is unknown, and the file is not in the URDF's folder or a folder above.

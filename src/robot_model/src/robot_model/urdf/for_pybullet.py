@@ -92,9 +92,9 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
     """Returns the masses to assign to frames: links without inertia and shape, which PyBullet would give 1 kg each.
 
-    Most frames get mass 0. A root that is not fixed to the world gets `LEAST_KG` if a link with mass is fixed to the
-    root, since PyBullet needs some mass on free bodies. Two kinds of frames keep 1 kg, and are left out: a frame on a
-    moving joint that carries no other mass, and a free root without mass fixed to it.
+    Most frames get mass 0. A free root gets `LEAST_KG` if a link with mass is fixed to it, since PyBullet needs some
+    mass on free bodies. Two kinds of frames keep 1 kg, and are left out of the result. These are a frame on a moving
+    joint that carries no other mass, and a free root without mass fixed to it.
 
     Args:
         document: The URDF.

@@ -65,7 +65,7 @@ class Subscriptions:
         return bool(subscription.has_connection(uri))
 
     def _connect(self, topic: str, uri: str) -> None:
-        """Connects to a publisher. If it refuses, it is not tried again until the master reports it again."""
+        """Connects to a publisher. After a refusal, waits until the master reports the publisher again."""
         pair, code = (topic, uri), 0
         report = self._reported.get(pair)
         try:
