@@ -166,9 +166,9 @@ class HandAction:
         self.goal = list(self._start.position)
 
     def apply(self, values: Values) -> None:
-        """Moves the target within the workspace, and sends the joint targets for it to the robot.
+        """Moves the link's target within the workspace, and sends joint targets to the robot.
 
-        The joint targets are computed with a damped inverse of the Jacobian.
+        The joint targets are computed from the link's target with a damped inverse of the Jacobian.
         """
         for axis, value in zip(self._axes, values.tolist()):
             self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])

@@ -90,7 +90,7 @@ class WorldTask(ABC):
     def reset(self, random: np.random.Generator) -> None:
         """Prepares an episode in the world, which was just reset.
 
-        A subclass calls this method last, after it has placed bodies.
+        A subclass that overrides this method calls the base class's method last, after it has placed bodies.
 
         Args:
             random: Source of all random numbers.

@@ -68,8 +68,8 @@ class Recording:
 class RecordedPart(NamedTuple):
     """A part of a recording that can be replayed independently of earlier parts.
 
-    A part begins when the world was built or reset, or at a keyframe. It ends at the next keyframe, or at the last
-    checkpoint before the next reset.
+    A part begins when the world was built or reset, or at a keyframe. The part ends at the next keyframe, or at the
+    last checkpoint before the next reset.
 
     Attributes:
         resets: Number of resets of the world before the part.
@@ -77,7 +77,7 @@ class RecordedPart(NamedTuple):
         keyframe: Command that made the keyframe at which the part begins; None if the part begins with a built or reset
             world.
         checkpoints: Checkpoints of the part, sorted by time.
-        end: Index of the command that made the keyframe at which the part ends; None if it ends with a checkpoint.
+        end: Index of the command that made the keyframe at which the part ends; None if the part ends at a checkpoint.
     """
 
     resets: int

@@ -109,7 +109,7 @@ class Joint:
 
     @property
     def is_driven(self) -> bool:
-        """Whether a motor can move the joint, which must be revolute or prismatic."""
+        """Whether the joint is revolute or prismatic: only such joints can have motors."""
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
 
 

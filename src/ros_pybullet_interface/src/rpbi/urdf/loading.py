@@ -47,8 +47,8 @@ PLACEHOLDER_FACTOR = 10.0
 def urdf_problems(path: str) -> list[str]:
     """Checks a URDF file for faults that would make PyBullet refuse the file or crash.
 
-    The checks are, in this order: structure, number of joints, files that the URDF names. The first check that finds
-    faults is the last. Meshes that were never loaded on this machine are loaded in another process as a trial.
+    Checks the structure, then the number of joints, then the files that the URDF names. Stops after the first check
+    that finds faults. Meshes that were never loaded on this machine are loaded in another process as a trial.
 
     Returns:
         A sentence for each fault; empty if no fault was found.
@@ -212,11 +212,11 @@ def load_urdf(
 def flags_for(joints: int, flags: int) -> int:
     """Returns flags for `loadURDF`; adds `URDF_MERGE_FIXED_LINKS` if a robot has more than MAX_JOINTS joints.
 
-    PyBullet can load further joints, but would not report the poses of the links below.
+    PyBullet can load more joints, but does not report the poses of the further joints' links.
 
     Args:
         joints: Number of joints in the URDF.
-        flags: Flags to which the flag is added.
+        flags: Other flags for `loadURDF`.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 

@@ -77,7 +77,7 @@ class Action(NamedTuple):
     """A kind of action on bodies.
 
     Attributes:
-        do: Applies the action; its arguments are the body, the world's clock and the value.
+        do: Function that applies the action, with three arguments: the body, the world's clock and the value.
         value: Converts a given value to the type that `do` requires, for instance a mapping to a named tuple. Raises
             ValueError if the value cannot be converted.
     """

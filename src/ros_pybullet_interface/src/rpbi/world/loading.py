@@ -185,11 +185,9 @@ class _Reader:
                 yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
 
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Reads the files in a list of the main file.
+        """Reads the files in the list `section` of the main file.
 
-        Yields, for each file, its content, its name for messages, and the `context` for `load_object`.
-
-
+        Yields the content of each file, the file's name for messages, and the argument `context` for `load_object`.
         Collects a problem for each file that cannot be read, and for each object name that is not unique.
         """
         search_paths = self._search_paths()

@@ -56,11 +56,12 @@ def type_of(section: str, data: Any) -> str:
     """Returns the type of an object.
 
     This is the value of the key `type` in the object's file. Without this key, the type follows from `section` and from
-    the file's other keys. If OWN_TYPES lists the file, the key is required, and without it the returned type is empty.
+    the file's other keys. In the section OWN_TYPES, the key is required; without the key, the returned type is empty.
 
     Args:
         section: Key of the main file's list that contains the object, such as `robots`.
-        data: Content of the object's file. If the content is not a mapping, `load_object` fails with the returned type.
+        data: Content of the object's file. For content that is not a mapping, returns some type of the section; then
+            `load_object` fails.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:

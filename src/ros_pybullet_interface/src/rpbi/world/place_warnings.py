@@ -261,8 +261,8 @@ def some(names: Sequence[str]) -> str:
 def is_still(body: Body, link: int) -> bool:
     """Returns whether a link never moves.
 
-    No link of a body without physics moves. Otherwise the base must be fixed or have mass 0, and only fixed joints may
-    lie between the base and the link.
+    Links of a body without physics never move. In a body with physics, a link never moves if the base is fixed or has
+    mass 0, and all joints between the base and the link are fixed.
     """
     if body.is_soft:
         return False

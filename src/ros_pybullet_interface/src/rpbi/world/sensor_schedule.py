@@ -130,7 +130,7 @@ class SensorSchedule:
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
     def act(self, method: str) -> None:
-        """Calls the named method, `before_step` or `after_step`, of every sensor that has either of these methods."""
+        """Calls `before_step` or `after_step`, as named by `method`, of all sensors that override one of the two."""
         for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)

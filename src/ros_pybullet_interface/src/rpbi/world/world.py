@@ -512,7 +512,7 @@ class World:
         return self._sensors.read_rest()
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
-        """Reads the sensors of a stopped world that would be due if the world were running, and returns their samples.
+        """Reads the sensors that would be due if the stopped world were running, and returns their samples.
 
         Args:
             tick: Tick that a running world would have reached by now.

@@ -179,8 +179,8 @@ class _Copy:
 class Shadow:
     """A process that repeats a world's commands, and is forked to make copies of the world and predictions.
 
-    The shadow has no ROS node, no window and a single thread, so it can be forked safely. It starts while this process
-    continues; the first request waits until the shadow has reached the world's state.
+    The shadow has no ROS node, no window and a single thread, so it can be forked safely. The shadow starts while this
+    process continues; the first request waits until the shadow has reached the world's state.
 
     Args:
         connection: Connection to the shadow.
@@ -261,7 +261,7 @@ class Shadow:
         return isinstance(self._process, _Copy)
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
-        """Brings the shadow to the world's present state, before it forks or predicts.
+        """Brings the shadow to the world's present state, before the shadow forks or predicts.
 
         Args:
             commands: Commands of the world that the shadow does not have yet.

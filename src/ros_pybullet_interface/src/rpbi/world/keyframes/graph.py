@@ -316,7 +316,7 @@ def _one_error() -> Iterator[None]:
 
 
 def _attribute(owner: Any, name: str) -> Any:
-    """Returns an attribute that is stored in the object itself, not in its class; otherwise returns NOTHING."""
+    """Returns the value of an attribute that the object itself stores; NOTHING if the object does not store it."""
     if name in getattr(owner, "__dict__", ()):
         return vars(owner)[name]
     slots = (name in vars(kind).get("__slots__", ()) for kind in type(owner).__mro__)

@@ -22,7 +22,7 @@ KEYFRAME = "keyframe"
 
 
 class WorldCommand(NamedTuple):
-    """A change that entered a world from outside.
+    """A change of a world that was requested from outside.
 
     Attributes:
         tick: Tick of the world at which the command was applied: after the physics of this tick, before the next step.

@@ -121,7 +121,7 @@ class Recipe(NamedTuple):
                 raise InterfaceError(f"'{name}': expected PyBullet's id {body_id}, got {bodies[name].body_id}")
 
     def _reserve_ids(self, pb: Client) -> None:
-        """Makes PyBullet give the next bodies the ids in the recipe.
+        """Makes PyBullet assign the ids in the recipe to the next bodies.
 
         Creates temporary bodies and removes them in a suitable order, since PyBullet reuses the last freed id first.
         """

@@ -137,7 +137,7 @@ class WorldState(NamedTuple):
         return False
 
     def require_short(self, max_ticks: int) -> None:
-        """Checks that not too many ticks have to be simulated to reach the state: a forged file could demand days.
+        """Checks the number of ticks to simulate until the state is reached: a forged file could demand days.
 
         Raises:
             InterfaceError: If the number of ticks exceeds `max_ticks`.
