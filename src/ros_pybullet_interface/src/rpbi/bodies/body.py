@@ -33,9 +33,9 @@ UNNAMED_LINK = "link0"
 class Body:
     """A body in one PyBullet client.
 
-    A new type is a subclass with a `Config` and an `__init__` that creates the body and passes PyBullet's id of the
-    body to this class; all other methods have defaults. If `__init__` raises, the caller removes everything that
-    PyBullet has created.
+    To add a type of body, write a subclass with a `Config` and an `__init__` that creates the body in PyBullet and
+    passes PyBullet's id of the body to `Body.__init__`. All other methods have defaults. If `__init__` raises, the
+    caller removes everything that PyBullet has created.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -58,7 +58,7 @@ class Body:
 
     @classmethod
     def prepare(cls, config: Any, has_window: bool) -> None:
-        """Prepares and caches data that are slow to compute, without calling PyBullet; any thread may call it.
+        """Prepares and caches data that are slow to compute, without calling PyBullet; any thread may call this method.
 
         Raises:
             ConfigError: If data cannot be prepared from the configuration.
@@ -89,7 +89,7 @@ class Body:
         self._has_jumped = False
         """Whether the warning that the body moves without a velocity was logged."""
         self.dynamics_changes = 0
-        """Number of times that the dynamics were changed; caches of the dynamics compare it to see if they are old."""
+        """Number of changes of the dynamics, by which caches of the dynamics notice that they are out of date."""
 
     @cached_property
     def external_wrenches(self) -> ExternalWrenches:
@@ -109,7 +109,7 @@ class Body:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Names of the links, with an empty name for the root; a soft body has none."""
+        """Names of the links, with an empty name for the root; an empty tuple for a soft body."""
         return () if self.is_soft else ("", *map(self.link_name, self.link_indices))
 
     def link_name(self, index: int) -> str:
@@ -120,7 +120,8 @@ class Body:
         """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index.
 
         For a body in maximal coordinates, PyBullet returns the inertial frame, restitution, stiffness and damping of
-        another body. Here, the configured values replace them, and the inertial frame is the body's frame.
+        another body. This method replaces the inertial frame by the body's frame, and the other values by configured
+        values.
         """
         info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
         if info[10] != MAXIMAL_COORDINATES:
@@ -147,9 +148,9 @@ class Body:
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
     ) -> None:
-        """Makes a fixed base follow its TF frame, or sets the start velocity of a base that is not fixed.
+        """If the base is fixed, makes it follow the TF frame; otherwise sets the start velocity of the base.
 
-        Logs a warning if the given keys have no effect.
+        Logs a warning if one of the given keys has no effect.
         """
         if is_fixed:
             self._follow(object_tf)
@@ -164,8 +165,8 @@ class Body:
     def _follow(self, object_tf: ObjectTf | None) -> None:
         """Makes a fixed base follow the poses of a TF frame, if a frame is given.
 
-        A body in maximal coordinates has no `pose_follower`; it is set to each pose, since PyBullet ignores the
-        velocity of its base. It therefore does not carry other bodies.
+        PyBullet ignores the velocity of a body in maximal coordinates. Such a body therefore has no `pose_follower`,
+        but is set to each pose, and does not carry other bodies.
         """
         self.object_tf = object_tf
         if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
@@ -173,10 +174,7 @@ class Body:
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
     def _track(self, object_tf: ObjectTf | None) -> None:
-        """Makes a base follow a TF frame while the frame is up to date; otherwise physics moves the base.
-
-        Does nothing without a frame.
-        """
+        """Makes the base follow a TF frame, if one is given; while the frame is out of date, physics moves the base."""
         self.object_tf = object_tf
         if object_tf is not None:
             centre = self.inertial_pose_in_base
@@ -191,56 +189,56 @@ class Body:
         return False
 
     def halt(self, reason: str) -> None:
-        """Aborts actions that last for several ticks, since the world may not run again; does nothing by default."""
+        """Aborts all actions in progress, since the world may not run again; does nothing by default."""
 
     def restart(self) -> bool:
-        """Restores the body's initial state, after PyBullet has restored its motion.
+        """Restores the body's initial state, after PyBullet has restored the body's initial poses and velocities.
 
         Returns:
-            Whether the state was restored. If not, which is the default, the caller creates the body anew.
+            Whether the state was restored; False by default. After False, the caller creates the body anew.
         """
         return False
 
     def resume(self) -> None:
         """Sends the body's settings to PyBullet again, after the body has moved to another client.
 
-        Motion and dynamics are not among these settings. The method does nothing by default.
+        The settings do not include the state of motion and the dynamics. By default, this method does nothing.
         """
 
     def pause(self, reason: str) -> None:
-        """Aborts actions that cannot wait while the world is stopped; by default, calls `halt`."""
+        """Aborts actions that cannot wait until a stopped world runs again; by default, calls `halt`."""
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Attaches the body to other bodies when it is added to their world; does nothing by default.
+        """Attaches this body, which was just added to the world, to other bodies; does nothing by default.
 
         Args:
-            bodies: The bodies that exist in the world, indexed by name.
+            bodies: All bodies in the world, indexed by name.
 
         Raises:
             ConfigError: If the body cannot be attached.
         """
 
     def detach(self, name: str | None = None) -> None:
-        """Detaches this body from another body that is about to be removed; does nothing by default.
+        """Detaches this body from another body, for instance before the removal of the other; does nothing by default.
 
         Args:
-            name: Name of the other body; None for all bodies.
+            name: Name of the other body; None to remove all attachments.
         """
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether a YAML object has this type; called if several types share a section."""
+        """Returns whether an object's YAML keys describe this type; called if several types share a section."""
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Returns the sensors of the body's own type; those listed under `sensors` in YAML are not among them."""
+        """Returns the sensors that belong to the body's type, without the sensors listed under `sensors` in YAML."""
         return ()
 
     def inputs(self) -> Mapping[str, Input]:
         """Returns the inputs of the body, indexed by name.
 
-        They are `pose` if the body follows a TF frame, and `external_wrench` if it has movable links.
+        The inputs are `pose` if the body follows a TF frame, and `external_wrench` if the body has movable links.
         """
         inputs: dict[str, Input] = {}
         if self.object_tf is not None:
@@ -281,7 +279,7 @@ class Body:
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
 
     def _jump(self, pose: Pose) -> None:
-        """Sets the base to a pose of its TF frame, without a velocity; warns once if the body is in contact."""
+        """Sets the base to a pose of the TF frame, without a velocity; warns once if the body is in contact."""
         if self.has_physics and not self._has_jumped and self.pb.getContactPoints(self.body_id):
             self._has_jumped = True
             log.warning(
@@ -323,7 +321,7 @@ class Body:
         """Returns the complete state of motion, for bitwise comparison.
 
         Returns:
-            Position and orientation of the base, its velocities, and positions and velocities of all joints.
+            Position, orientation and velocities of the base, then positions and velocities of all joints.
         """
         position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
         linear, angular = self.pb.getBaseVelocity(self.body_id)
@@ -331,7 +329,7 @@ class Body:
         return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
     def close(self) -> None:
-        """Closes resources of the body that are not in the world; does nothing by default."""
+        """Closes the body's resources outside of the world, such as other PyBullet clients; by default does nothing."""
 
     def remove(self) -> None:
         """Removes the body from the world."""

@@ -14,7 +14,7 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class CollisionObjectConfig(BodyConfig):
-    """A collision object: it has contacts, and moves only by TF."""
+    """A collision object, which has contacts, and follows a TF frame or stays in place."""
 
     createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")

@@ -43,7 +43,7 @@ class DynamicObjectConfig(BodyConfig):
 
 
 class DynamicObject(ShapeObject):
-    """An object that falls, slides and is pushed."""
+    """An object that physics moves, except while the object follows an up-to-date TF frame."""
 
     Config = DynamicObjectConfig
     section = "dynamic_objects"

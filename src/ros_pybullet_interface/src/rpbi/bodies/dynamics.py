@@ -24,8 +24,8 @@ class LinkDynamics(NamedTuple):
         local_inertia_pos: Centre of mass in the link's frame [m].
         local_inertia_orn: Principal axes in the link's frame, x, y, z, w.
         restitution: Coefficient of restitution.
-        rolling_friction: Friction against rolling.
-        spinning_friction: Friction about the contact normal.
+        rolling_friction: Coefficient of rolling friction.
+        spinning_friction: Coefficient of friction about the contact normal.
         contact_damping: Damping of contacts [N s/m], -1 if it is not set.
         contact_stiffness: Stiffness of contacts [N/m], -1 if it is not set.
         body_type: PyBullet's body type: 1 rigid body (in maximal coordinates), 2 multi-body, 3 soft body.
@@ -51,14 +51,15 @@ _UNCHANGEABLE = ("local_inertia_pos", "local_inertia_orn", "body_type")
 
 
 def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
-    """Returns the values that differ between present and wanted dynamics, indexed by PyBullet's argument names.
+    """Returns the wanted values that differ from the present ones, indexed by the argument names of `changeDynamics`.
 
     Args:
-        wanted: The wanted dynamics; an empty sequence leaves the field unchanged.
+        present: The present dynamics.
+        wanted: The wanted dynamics; a field whose value is an empty sequence stays unchanged.
 
     Raises:
-        ValueError: If a value has the wrong length, is not finite, is negative, or cannot be changed; the message names
-            all such fields.
+        ValueError: If a wanted value has the wrong length, is not finite, is negative, or cannot be changed; the
+            message names all such fields.
     """
     changed: dict[str, Any] = {}
     problems: list[str] = []
@@ -121,7 +122,7 @@ def link_index(body: Body, link: str) -> int:
 
 
 def read_dynamics(body: Body, link: str) -> LinkDynamics:
-    """Returns the present dynamics of the link with a given name, empty for the root link.
+    """Returns the present dynamics of the link with a given name; an empty name is the root link.
 
     Raises:
         UnknownNameError: If the body has no such link.
@@ -133,8 +134,8 @@ def read_dynamics(body: Body, link: str) -> LinkDynamics:
 def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
     """Changes the dynamics of a link; if this raises an error, the dynamics are unchanged.
 
-    Moments of inertia change in proportion to the mass, unless they are given too. PyBullet alone would replace the
-    moments of inertia from the URDF with moments computed from the collision shape.
+    If the change has a mass but no moments of inertia, these change in proportion to the mass. PyBullet alone would
+    replace the moments from the URDF by moments computed from the collision shape.
 
     Args:
         link: Name of the link; empty for the root link.

@@ -31,7 +31,7 @@ _PARTS: dict[str, type[PybulletModel]] = {
 
 
 def check_files(config: BodyConfig) -> None:
-    """Checks the meshes and the URDF of a body; the first check of a file takes longer than later ones.
+    """Checks the meshes and the URDF of a body; results are cached, so the first check of a file takes longest.
 
     Raises:
         ConfigError: If a file cannot be loaded; the error lists all problems.
@@ -43,12 +43,14 @@ def check_files(config: BodyConfig) -> None:
 
 
 def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dict[str, PybulletModel]:
-    """Returns the parts of an object that may name files, indexed by their keys; parts that are not valid are left out.
+    """Returns the sections of an object's YAML that may name files, such as `loadURDF`, indexed by key.
+
+    Leaves out sections that are not valid.
 
     Args:
         data: Content of the object's YAML file.
         file: Name of the YAML file.
-        context: The same as for `load_object`.
+        context: Context of the keys, as for `load_object`.
     """
     parts = {}
     for key, model in _PARTS.items():
@@ -59,10 +61,10 @@ def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dic
 
 
 def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yields a key and a message for each fault in the files that the parts of an object name.
+    """Yields a key and a message for each fault in the files that an object's configuration names.
 
     Args:
-        parts: The parts of the object, indexed by their keys.
+        parts: Values of the object's configuration, such as a LoadURDF, indexed by key.
     """
     meshes: dict[Mesh, str] = {}
     for key, part in parts.items():
@@ -91,7 +93,7 @@ def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDecomposition) -> str:
-    """Divides a shape into convex parts; returns an error message if that fails, else an empty text."""
+    """Divides a shape into convex parts; returns an error message, or an empty text after success."""
     if shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
         return "expected a createCollisionShape of GEOM_MESH with a fileName"
     if (shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH:
@@ -104,7 +106,7 @@ def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDec
 
 
 def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:
-    """Returns how PyBullet uses the file of a shape, None if PyBullet does not read the file."""
+    """Returns how PyBullet uses the file of a shape; None if PyBullet does not read the file."""
     if shape.shapeType == pybullet.GEOM_MESH:
         return Use.VISUAL if isinstance(shape, CreateVisualShape) else Use.COLLISION
     is_field = shape.shapeType == pybullet.GEOM_HEIGHTFIELD and isinstance(shape, CreateCollisionShape)

@@ -51,7 +51,7 @@ class ShapeObject(Body):
     """An object whose shape comes from `createVisualShape` and `createCollisionShape`.
 
     Args:
-        collision: Collision shape, None for an object without contacts.
+        collision: Collision shape; None for an object without contacts.
         decomposition: How to divide the collision mesh into convex parts; None for a single convex hull.
         multi_body: Further arguments of `createMultiBody`; without `baseMass`, the body is static.
 
@@ -78,8 +78,8 @@ class ShapeObject(Body):
         self.visual = visual
 
     def restart(self) -> bool:
-        """Returns True, since PyBullet restores the body's whole state; False for a body that tracks a TF frame.
+        """Returns True, since PyBullet has restored the body's whole state.
 
-        After False, the caller creates the body anew.
+        Returns False for a body that physics moves while its TF frame is out of date; the caller creates it anew.
         """
         return not isinstance(self.pose_follower, TrackedBase)

@@ -90,8 +90,8 @@ class SoftObject(Body):
         """Creates the configured anchors.
 
         Raises:
-            ConfigError: If an anchor names a body, link or node that does not exist, or a soft body. No anchors exist
-                then.
+            ConfigError: If an anchor names a soft body, or a body, link or node that does not exist. All anchors are
+                then removed again.
         """
         problems = []
         for index, anchor in enumerate(self.config.createSoftBodyAnchor):
@@ -104,7 +104,7 @@ class SoftObject(Body):
             raise ConfigError(problems)
 
     def detach(self, name: str | None = None) -> None:
-        """Removes the anchors to the body `name`, or all anchors if it is None."""
+        """Removes the anchors to the body with a given name, or all anchors if `name` is None."""
         for body, anchor_id in self._anchors:
             if name is None or body == name:
                 self.pb.removeConstraint(anchor_id)

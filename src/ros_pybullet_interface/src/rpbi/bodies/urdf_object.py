@@ -99,9 +99,9 @@ class UrdfObject(Body):
         couple(self.pb, self.body_id, model.couplings)
 
     def _release(self, index: int) -> None:
-        """Limits the effort of the motor that PyBullet adds to a joint to the joint friction in the URDF.
+        """Replaces a joint's motor by Coulomb friction, with the friction force or torque from the URDF.
 
-        PyBullet applies the joint damping of a URDF, but not the joint friction. A motor that holds velocity 0 with at
+        PyBullet adds a motor to each joint, and ignores joint friction in a URDF. A motor that holds velocity 0 with at
         most the friction force or torque acts as Coulomb friction.
         """
         info = self.pb.getJointInfo(self.body_id, index)

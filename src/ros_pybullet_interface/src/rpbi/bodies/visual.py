@@ -11,7 +11,7 @@ from .shape_object import ShapeObject
 
 
 class VisualObjectConfig(BodyConfig):
-    """A visual object: visible, without contacts."""
+    """A visual object, which is visible but has no contacts."""
 
     createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape | None = Field(

@@ -22,7 +22,7 @@ PLANE_THICKNESS_M = 0.001
 
 
 class ShapeKind(enum.Enum):
-    """Kind of a visual shape, which decides the meaning of the fields of `BodyShape`."""
+    """Kind of a visual shape, on which the meaning of some fields of `BodyShape` depends."""
 
     BOX = enum.auto()
     SPHERE = enum.auto()
@@ -60,8 +60,8 @@ class BodyShape(NamedTuple):
 def body_shapes(body: Body) -> list[BodyShape]:
     """Returns the visual shapes of a body; for a soft body, an empty list, since its surface changes.
 
-    A capsule is returned as a cylinder and two spheres. PyBullet gives the poses of visual shapes in the URDF frame of
-    their link, not in its inertial frame. Only the simulation thread may call this function.
+    A capsule is returned as a cylinder and two spheres. PyBullet gives the pose of a visual shape in the URDF frame of
+    the link, not in the inertial frame. Only the simulation thread may call this function.
     """
     if body.is_soft:
         return []  # its surface has a sensor of its own
@@ -120,7 +120,8 @@ def _cube(edge_m: float) -> Vector:
 def turned_to(normal: Vector) -> Quaternion:
     """Returns the quaternion of the shortest rotation that turns the z axis to a given direction.
 
-    Before normalisation, its vector part is the cross product of both directions, and its w is `1 + cos(angle)`.
+    Before normalisation, the quaternion's vector part is the cross product of both directions, and w is
+    `1 + cos(angle)`.
     """
     length = math.hypot(*normal)
     x, y, z = (component / length for component in normal)
@@ -131,10 +132,9 @@ def turned_to(normal: Vector) -> Quaternion:
 
 
 def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
-    """Returns the name of a link's TF frame, such as `rpbi/NAME/LINK`; None if this node publishes no link frames.
+    """Returns the name of a link's TF frame, such as `rpbi/NAME/LINK`; None if the link is not on TF.
 
-    If this node publishes only the root link of a robot, the frames of the other links are expected to come from
-    robot_state_publisher.
+    If this node publishes only the root link of a robot, robot_state_publisher is expected to publish the other links.
     """
     for sensor in sensors:
         if isinstance(sensor, LinkPoseSensor):
@@ -146,9 +146,10 @@ def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
 
 
 def followed_frame(body: Body) -> str | None:
-    """Returns the TF frame that a `ShapeObject` follows.
+    """Returns the TF frame that a `ShapeObject` always follows.
 
-    Returns None for other bodies, without a frame, or if physics moves the body when the frame is out of date.
+    Returns None if there is no such frame, if physics moves the body while the frame is out of date, or for other types
+    of bodies.
     """
     if body.object_tf is None or not isinstance(body, ShapeObject) or isinstance(body.pose_follower, TrackedBase):
         return None

@@ -9,7 +9,7 @@ from .sensor import SensedBody, Sensor
 
 
 class BaseStateSensor(Sensor):
-    """Pose and twist of the URDF frame of a body's root link.
+    """Measures pose and twist of the URDF frame of a body's root link.
 
     Args:
         frame: Name of the root link's TF frame in samples, without prefix; by default `rpbi/NAME/ROOT_LINK`.
@@ -25,7 +25,7 @@ class BaseStateSensor(Sensor):
         self._frame = frame or f"rpbi/{body.name}/{body.root_link}"
 
     def read(self, tick: int) -> BaseStateSample:
-        """Reads the pose in the world, and the twist of the frame's origin in the axes of the frame."""
+        """Reads the URDF frame's pose in the world, and the frame's twist in its own axes."""
         pose = self._body.base_pose()
         twist = self._body.base_twist()
         if not math.isfinite(sum(pose.position) + sum(twist.linear) + sum(twist.angular)):

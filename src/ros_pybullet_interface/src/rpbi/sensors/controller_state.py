@@ -6,7 +6,7 @@ from .sensor import Sensor
 
 
 class ControllerStateSensor(Sensor):
-    """Reports whether a controller of a robot is active, and the values that it publishes."""
+    """Reports whether a robot's controller is active, and the values that the controller publishes."""
 
     sample_type = ControllerStateSample
     ros_topic = "rpbi.ros.publishers.sample_topics:CONTROLLER_STATE"

@@ -1,4 +1,4 @@
-"""Filters of measured values: a low-pass filter, noise and the mean for zeroing."""
+"""Operations on measured values: a low-pass filter, noise and the mean for zeroing."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class LowPass:
         """The newest value, None before the first."""
 
     def step(self, value: npt.NDArray[np.float64]) -> None:
-        """Filters the input value of the next tick; `output` then has the result."""
+        """Filters the input value of the next tick, and stores the result in `output`."""
         self.output = value if self.output is None else self.output + self._gain * (value - self.output)
 
 
@@ -64,7 +64,7 @@ class SeededNoise:
 
 
 class Zeroing:
-    """Computes the mean of a number of samples, which becomes a sensor's new zero.
+    """Computes the mean of a given number of samples; the mean becomes a sensor's new zero.
 
     Args:
         count: Number of samples.

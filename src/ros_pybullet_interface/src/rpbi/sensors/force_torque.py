@@ -20,7 +20,9 @@ from .sensor import SensedBody, SensedWorld, Sensor
 
 
 class ForceTorqueSensor(Sensor):
-    """Force and moment that a joint transmits, about its origin, in the axes of its child link's URDF frame.
+    """Measures the force and the moment about the joint's origin that a joint transmits.
+
+    Force and moment are in the axes of the URDF frame of the joint's child link.
 
     PyBullet's own measurement lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and would still be
     wrong if they were added, see docs/force_torque.md. This sensor computes the wrench from an impulse balance
@@ -29,7 +31,7 @@ class ForceTorqueSensor(Sensor):
     of joints, control modes and limits.
 
     Args:
-        default_hz: Rate of the sensor if its configuration has no rate [Hz].
+        default_hz: Rate of the sensor if the configuration has no rate [Hz].
     """
 
     Config = ForceTorqueConfig
@@ -84,13 +86,13 @@ class ForceTorqueSensor(Sensor):
         return self._sample
 
     def _loads(self) -> Iterator[LinkWrench]:
-        """Yields the wrenches of attachments and external wrenches on links below the joint during the last tick."""
+        """Yields the wrenches by attachments, and the external wrenches, on links below the joint in the last tick."""
         for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
             if load.link in self._subtree.links:
                 yield load
 
     def zero(self, count: int) -> Zeroing:
-        """Starts zeroing the sensor to the mean of its next `count` samples; does not restart a zeroing that runs."""
+        """Starts zeroing the sensor to the mean of the next `count` samples, unless a zeroing is already running."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing

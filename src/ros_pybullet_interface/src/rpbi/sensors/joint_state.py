@@ -9,7 +9,7 @@ from .sensor import SensedRobot, Sensor
 
 
 class JointStateSensor(Sensor):
-    """Positions, velocities and motor efforts of all joints of a robot."""
+    """Measures positions, velocities and motor efforts of all joints of a robot."""
 
     sample_type = JointStateSample
     keeps_state = False
@@ -21,7 +21,7 @@ class JointStateSensor(Sensor):
         self._names = tuple(joint.name for joint in robot.joints)
 
     def read(self, tick: int) -> JointStateSample:
-        """Reads all joints, fixed ones included, in index order."""
+        """Reads all joints, including fixed joints, in the order of PyBullet's joint indices."""
         states = self._robot.pb.getJointStates(self._robot.body_id, self._robot.link_indices)
         position, velocity, _, effort = zip(*states) if states else ((), (), (), ())
         if not math.isfinite(sum(position) + sum(velocity)):

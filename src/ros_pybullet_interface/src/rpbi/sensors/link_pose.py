@@ -22,10 +22,10 @@ def index_of_link(body: SensedBody, link: str | None) -> int | None:
 
 
 class LinkPoseSensor(Sensor):
-    """Poses of the URDF frames of a body's links in the world.
+    """Measures the poses of the URDF frames of a body's links in the world.
 
     Args:
-        links: Whether to report all links, with TF frames `rpbi/NAME/LINK`; otherwise only the root link.
+        links: Whether to report all links, with TF frames `rpbi/NAME/LINK`; if not, only the root link is reported.
         root_frame: TF frame of the root link; by default `rpbi/NAME/LINK`, as for the other links.
 
     Attributes:

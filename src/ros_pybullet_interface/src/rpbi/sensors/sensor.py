@@ -54,10 +54,10 @@ class SensedRobot(SensedBody, Protocol):
 
     @property
     def joints(self) -> Sequence[Joint]:
-        """All joints, fixed ones included, in PyBullet's order."""
+        """All joints, including fixed joints, in the order of PyBullet's joint indices."""
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motor efforts [N m or N] of all joints; replaces efforts that PyBullet reports wrongly.
+        """Returns the motor efforts [N m or N] of all joints; corrects efforts that PyBullet reports wrongly.
 
         Args:
             reported: Efforts that PyBullet reports for all joints.
@@ -88,12 +88,12 @@ class SensedWorld(Protocol):
 
 
 class Sensor(ABC):
-    """Reads a quantity of the world when the world calls `read`, without its own timer or thread.
+    """Reads a quantity of the world when the world calls `read`; a sensor does not have its own timer or thread.
 
     Attributes:
-        name: Name in topics: the name of the body or of the sensor.
-        hz: Rate in the world's time [Hz], 0 is off; the world may change it.
-        wanted: Whether the samples have receivers; otherwise, the sensor is not read.
+        name: Name in topics: the name of the body or camera, or a text such as `BODY/SENSOR` or `BODY/JOINT`.
+        hz: Rate in the world's time [Hz]; 0 is off. The world may change this rate.
+        wanted: Whether the samples have receivers; without receivers, the sensor is not read.
     """
 
     wanted: bool = True
@@ -119,7 +119,7 @@ class Sensor(ABC):
         self.hz = hz
 
     def enter(self, world: SensedWorld) -> None:  # noqa: B027 (most sensors need nothing but their body)
-        """Called with the sensor's world before the first `read`; does nothing by default."""
+        """Receives the sensor's world before the first call of `read`; does nothing by default."""
 
     @abstractmethod
     def read(self, tick: int) -> Any:
@@ -136,12 +136,12 @@ class Sensor(ABC):
         """Called after the physics of each tick, before sensors are read; does nothing by default."""
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns the inputs of the sensor, indexed by name; by default there are none."""
+        """Returns the inputs of the sensor, indexed by name; by default an empty mapping."""
         return {}
 
 
 class BodySensor(Sensor):
-    """A sensor that the YAML key `sensors` of any body can list.
+    """Base class of sensors that can be listed under the key `sensors` in any body's YAML.
 
     To add a type of sensor, write a subclass with `Config`, `sample_type` and `read`; see docs/extending.md.
     """

@@ -9,7 +9,7 @@ from .sensor import SensedBody, Sensor
 
 
 class SurfaceSensor(Sensor):
-    """Corners of the triangles of a soft body's surface."""
+    """Measures the corners of the triangles of a soft body's surface."""
 
     sample_type = SurfaceSample
     ros_topic = "rpbi.ros.publishers.sample_topics:SURFACE"

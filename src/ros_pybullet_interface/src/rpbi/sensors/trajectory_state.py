@@ -8,7 +8,7 @@ from .sensor import Sensor
 
 
 class TrajectoryStateSensor(Sensor):
-    """Desired and measured states of the joints of a robot that follows trajectories."""
+    """Reports desired and measured states of the joints that a robot's trajectory follower drives."""
 
     sample_type = TrajectoryStateSample
     ros_topic = "rpbi.ros.publishers.sample_topics:TRAJECTORY_STATE"
@@ -19,5 +19,5 @@ class TrajectoryStateSensor(Sensor):
         self._follower = follower
 
     def read(self, tick: int) -> TrajectoryStateSample:
-        """Reads the desired and measured states of the joints that the follower drives."""
+        """Reads the desired and measured states of the follower's joints."""
         return self._follower.state(tick * self._dt_s)

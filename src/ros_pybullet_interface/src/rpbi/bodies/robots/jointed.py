@@ -98,7 +98,7 @@ class JointedBody(Body):
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """Kinematics of the robot, created at the first use in a separate PyBullet client; any thread may use them."""
+        """Kinematics of the robot, created at the first use, in a separate PyBullet client; any thread may use them."""
         load = self.config.loadURDF
         return Kinematics(load.fileName, load.globalScaling or 1.0, load.flags or 0)
 
@@ -118,7 +118,7 @@ class JointedBody(Body):
         return {index: state[0] for index, state in zip(indices, states)}
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motor efforts [N m or N] of all joints; here, the efforts that PyBullet reports."""
+        """Returns the motor efforts [N m or N] of all joints; by default the efforts that PyBullet reports."""
         return reported
 
     def set_joint_state(self, target: JointCommand) -> None:
@@ -149,18 +149,18 @@ class JointedBody(Body):
     def _put_joints(self, positions: Mapping[int, float], velocities: Mapping[int, float] | None = None) -> None:
         """Sets positions and velocities of joints in one call of PyBullet.
 
-        One call saves time, since each takes milliseconds if there is a window but no graphics card.
+        A single call saves time, since each call takes milliseconds if there is a window but no graphics card.
 
         Args:
             positions: Positions [rad or m], indexed by PyBullet's joint index.
-            velocities: Velocities [rad/s or m/s] of the same joints; missing ones are set to 0.
+            velocities: Velocities [rad/s or m/s], indexed likewise; missing velocities are set to 0.
         """
         rates = velocities or {}
         values, speeds = [[each] for each in positions.values()], [[rates.get(index, 0.0)] for index in positions]
         self.pb.resetJointStatesMultiDof(self.body_id, [*positions], values, speeds)
 
     def _joint_model(self, joints: list[Joint]) -> JointModel:
-        """Returns the joint model, with the mimic joints of the URDF and of the key `coupled_joints`.
+        """Returns a model of the joints, including the mimic joints of the URDF and of the key `coupled_joints`.
 
         Raises:
             ConfigError: If a joint cannot follow another joint.
@@ -183,7 +183,7 @@ class JointedBody(Body):
             raise ConfigError([Problem(self.name, key, str(error))]) from None
 
     def _problems(self) -> list[Problem]:
-        """Returns all parts of the configuration that do not fit this robot."""
+        """Returns a problem for each part of the configuration that does not fit this robot."""
         configured = self.config.initial_joint_position
         if problems := self._unknown_joints({f"initial_joint_position.{name}": name for name in configured}):
             return problems
@@ -213,7 +213,7 @@ class JointedBody(Body):
         """Returns a problem for each joint name that the robot lacks.
 
         Args:
-            names: Joint names, indexed by the configuration key that names them.
+            names: Joint names, each indexed by the configuration key that contains the name.
         """
         problems = []
         for key, name in names.items():

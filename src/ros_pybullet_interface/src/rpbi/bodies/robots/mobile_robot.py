@@ -14,10 +14,10 @@ from .robot_config import RobotConfig
 
 
 class MobileRobot(Robot):
-    """A robot whose base drives by velocity in the x-y plane of its start pose.
+    """A robot whose base follows velocity commands in the x-y plane of the base's start pose.
 
-    Additional joints between the world and the root link move the base. They do not appear in the robot's joint states
-    and targets.
+    Additional joints between the world and the root link move the base. These joints do not appear in the robot's joint
+    states and targets.
     """
 
     base_joints = len(PLANAR_JOINTS)
@@ -37,15 +37,15 @@ class MobileRobot(Robot):
         return data.get("planar_base") is not None
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns the inputs of every robot, and `cmd_vel`, a twist in the base frame [m/s, rad/s]."""
+        """Returns the inputs of a `Robot`, and `cmd_vel`, a twist in the base frame [m/s, rad/s]."""
         return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
 
     def restart(self) -> bool:
-        """Returns False, so that a reset creates the robot anew, since its base follows velocities."""
+        """Returns False, so that a reset creates the robot anew."""
         return False
 
     def before_step(self, tick: int) -> None:
-        """Advances motion and controllers as for every robot, and drives the base."""
+        """Advances motion and controllers as `Robot` does, and drives the base."""
         super().before_step(tick)
         self.planar_base.before_step(tick)
 

@@ -38,9 +38,9 @@ log = logging.getLogger(__name__)
 
 
 class Robot(JointedBody):
-    """A robot with motors, within the effort and velocity limits of its URDF.
+    """A robot with motors, which respect the effort and velocity limits of the URDF.
 
-    The robot holds its start position until the first target. While a timed motion drives joints, targets of these
+    The robot holds its start position until the first target. While a timed motion drives joints, targets for these
     joints are refused.
     """
 
@@ -105,8 +105,8 @@ class Robot(JointedBody):
     def sensors(self) -> tuple[Sensor, ...]:
         """Returns the configured sensors.
 
-        They measure joint states, controller states, forces and torques in joints, the trajectory follower's state,
-        contacts, link poses and the state of the base.
+        The sensors measure joint states, controller states, forces and torques in joints, the trajectory follower's
+        state, contacts, link poses and the state of the base.
         """
         hz = self.config.joint_state_publisher_hz
         joint_states = (JointStateSensor(self, hz),) if hz else ()
@@ -122,8 +122,8 @@ class Robot(JointedBody):
     def inputs(self) -> Mapping[str, Input]:
         """Returns the inputs of the robot, indexed by name.
 
-        They are those of every body, `target` and the inputs of the controllers. A value of `target` is a JointCommand,
-        or a mapping from joint names to numbers in the quantity of the control mode.
+        Besides the inputs of a `Body`, there are `target` and the inputs of the controllers. A value of `target` is a
+        JointCommand, or a mapping from joint names to positions, velocities or efforts, depending on the control mode.
         """
         target = Input(self._check_target, self.drive.follow, merge=coalesce)
         return {**super().inputs(), "target": target, **self._controller_inputs()}
@@ -150,7 +150,7 @@ class Robot(JointedBody):
 
     @property
     def is_idle(self) -> bool:
-        """Whether the robot's motors hold their positions or velocities, so that ticks need no computation."""
+        """Whether all motors hold their positions or velocities, so that `before_step` has nothing to do."""
         is_plain = type(self).before_step is Robot.before_step and not self.controllers.driven
         return is_plain and self.drive.is_idle and self.motors.is_idle
 
@@ -176,7 +176,7 @@ class Robot(JointedBody):
         self.drive.drop_targets(taken)
 
     def halt(self, reason: str) -> None:
-        """Ends the running motion, if any; its joints hold their present positions."""
+        """Ends the running motion, if any; the moving joints then hold their present positions."""
         self.drive.halt(reason)
 
     def pause(self, reason: str) -> None:
@@ -230,7 +230,7 @@ class Robot(JointedBody):
         """Returns the motor efforts [N m or N] of all joints.
 
         Args:
-            reported: Efforts that PyBullet reports for all joints. They lack efforts that this class applied itself.
+            reported: Efforts that PyBullet reports for all joints, without efforts that this class has applied itself.
         """
         applied = self.motors.applied_efforts
         if not applied:
@@ -271,8 +271,8 @@ class Robot(JointedBody):
     def _spring(self, state: RobotState) -> None:
         """Applies the joint efforts of IMPEDANCE_CONTROL.
 
-        They are the sum of spring and damper efforts and of efforts that compensate gravity, Coriolis and centrifugal
-        forces.
+        The efforts are the sum of spring and damper efforts and of efforts that compensate gravity, Coriolis and
+        centrifugal forces.
         """
         motors, model = self.motors, self.robot_model
         wanted = [
@@ -312,7 +312,7 @@ class Robot(JointedBody):
         return self.controllers.of(name).check(key, value)
 
     def _warn_mimic(self, names: Sequence[str]) -> None:
-        """Logs once that targets of mimic joints have no effect, if targets name such a joint."""
+        """If targets name a mimic joint, logs once that such targets have no effect."""
         for index, coupling in self.model.couplings.items():
             joint, leader = self.model.joints[index].name, self.model.joints[coupling.leader].name
             if joint in names:
@@ -320,7 +320,7 @@ class Robot(JointedBody):
                 self._warned_mimic = True
 
     def _gains(self) -> dict[int, dict[str, float]]:
-        """Returns PyBullet's gain arguments, indexed by joint; the configuration must have been checked before."""
+        """Returns gains as keyword arguments of PyBullet, indexed by joint index; expects a checked configuration."""
         gains: dict[int, dict[str, float]] = {}
         for key, given in self._configured_gains().items():
             argument = key.removesuffix("s")
@@ -358,7 +358,7 @@ class Robot(JointedBody):
         return [*problems, *self._force_torque_problems(), *self._model_problems()]
 
     def _model_problems(self) -> list[Problem]:
-        """Returns a problem for each key that needs inverse dynamics, if the robot has joints of several axes.
+        """If the robot has joints with several axes, returns a problem for each key that needs inverse dynamics.
 
         PyBullet's inverse dynamics does not support such joints.
         """

@@ -43,7 +43,7 @@ def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
 
 
 class OwnControllerConfig(ControllerConfig):
-    """An entry with a class of another package, which may have more keys."""
+    """An entry of `controllers` whose class another package defines, possibly with further keys."""
 
     model_config = ConfigDict(json_schema_extra={"additionalProperties": True})
 
@@ -73,7 +73,7 @@ class CoupledJoint(ConfigModel):
 
     @property
     def mimic(self) -> Mimic:
-        """The same coupling as `<mimic>` of a URDF."""
+        """The coupling in the form of a URDF's `<mimic>` element."""
         return Mimic(self.joint, self.multiplier, self.offset)
 
 

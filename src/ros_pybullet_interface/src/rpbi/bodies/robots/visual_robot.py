@@ -13,7 +13,7 @@ from .robot_config import RobotConfig
 
 
 class VisualRobot(JointedBody):
-    """A robot without physics: it moves to its targets at once, and has no contacts."""
+    """A robot without physics, which moves to its targets at once and has no contacts."""
 
     has_physics = False
     fixes_base = True
@@ -42,7 +42,7 @@ class VisualRobot(JointedBody):
     def inputs(self) -> Mapping[str, Input]:
         """Returns the inputs of the robot, indexed by name.
 
-        They are `target` and, if the base follows a TF frame, `pose`. A value of `target` is a JointCommand or a
+        The inputs are `target` and, if the base follows a TF frame, `pose`. A value of `target` is a JointCommand or a
         mapping from joint names to positions [rad or m].
         """
         return {**super().inputs(), "target": Input(self._check_target, self._show, merge=dict.__or__)}

@@ -10,7 +10,7 @@ from .mean import MeanContactsSensor
 
 
 class ContactArrowsSensor(Sensor):
-    """An arrow for each force on a body in the last tick.
+    """Returns an arrow for each contact force on a body in the last tick.
 
     Args:
         metres_per_newton: Length of the arrow for a force of 1 N [m/N].
@@ -30,7 +30,7 @@ class ContactArrowsSensor(Sensor):
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:
-        """Returns an arrow for each contact point, scaled with the force; zero forces get no arrow."""
+        """Returns an arrow, proportional to the force, for each contact point whose force is not zero."""
         assert self._reader is not None  # ensured by the world
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))

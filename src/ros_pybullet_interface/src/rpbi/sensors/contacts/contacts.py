@@ -17,7 +17,7 @@ Touch = tuple[Any, ...]
 
 
 class ContactReader:
-    """Reads the contacts of the last tick of all bodies in one call of PyBullet, and sorts them by body."""
+    """Reads all contacts of the last tick in one call of PyBullet, and groups them by body."""
 
     def __init__(self, pb: Client, bodies: Mapping[str, SensedBody]) -> None:
         self._pb, self._bodies = pb, bodies
@@ -29,7 +29,7 @@ class ContactReader:
         self._are_finite = True
 
     def invalidate(self) -> None:
-        """Discards the contacts, after the world has advanced or bodies were added or removed."""
+        """Discards the stored contacts, after the world has advanced or bodies were added or removed."""
         self._touches = None
 
     def sample(self, body: SensedBody, tick: int) -> ContactsSample:
@@ -78,13 +78,15 @@ def _finite(touches: Iterable[Touch]) -> bool:
 def _points(
     body: SensedBody, touches: list[list[Touch]], by_id: Mapping[int, SensedBody], factor: float
 ) -> tuple[ContactPoint, ...]:
-    """Converts contacts to points with the forces on one body; PyBullet reports forces of the second body on the first.
+    """Converts contacts to contact points with the forces that act on one body.
+
+    PyBullet reports the forces that the second body of a contact exerts on the first body.
 
     Args:
         body: The body that the forces act on.
         touches: Contact points of the body, grouped by pairs of links.
         by_id: All bodies, indexed by PyBullet's id.
-        factor: Factor for the forces that PyBullet reports.
+        factor: Factor by which the forces that PyBullet reports are multiplied.
     """
     points = []
     for together in touches:
@@ -109,7 +111,7 @@ def _points(
 
 
 class ContactsSensor(Sensor):
-    """All contact points of a body in the last tick."""
+    """Measures all contact points of a body in the last tick."""
 
     sample_type = ContactsSample
     keeps_state = False
@@ -125,7 +127,7 @@ class ContactsSensor(Sensor):
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactsSample:
-        """Reads the contact points of the last tick; before the first tick, there are none.
+        """Reads the contact points of the last tick; before the first tick, the sample is empty.
 
         Raises:
             PhysicsError: If a number in the contacts is no longer finite.

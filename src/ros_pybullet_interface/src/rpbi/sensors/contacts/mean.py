@@ -12,7 +12,7 @@ from .contacts import ContactsSensor
 
 
 class MeanContactsSensor(ContactsSensor):
-    """Contacts of a body, averaged over all ticks since the last sample, with one point for each pair of links."""
+    """Averages the contacts of a body over all ticks since the last sample, to one point for each pair of links."""
 
     keeps_state = True
 
@@ -52,11 +52,11 @@ def _mean_points(samples: list[ContactsSample]) -> tuple[ContactPoint, ...]:
 
 
 def _mean(points: list[ContactPoint], ticks: int) -> ContactPoint:
-    """Returns a contact point with the mean force of points between two links, at their centre of pressure.
+    """Returns one contact point at the centre of pressure of contact points between two links, with the mean force.
 
     Args:
-        points: The contact points of all ticks.
-        ticks: Number of ticks.
+        points: The contact points of the two links in all ticks.
+        ticks: Number of ticks, including ticks without contact.
     """
     pressed = sum(point.normal_force for point in points)
     weights = [point.normal_force / pressed if pressed else 1.0 / len(points) for point in points]

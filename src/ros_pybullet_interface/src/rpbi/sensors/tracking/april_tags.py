@@ -1,4 +1,4 @@
-"""AprilTag detections, as a detector reports them from a camera's images."""
+"""AprilTag detections, computed from the world instead of a camera's images."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class TagConfig(ConfigModel):
 
 
 class AprilTagsConfig(TrackingSensorConfig):
-    """Tags of a detector, and its camera."""
+    """A detector of AprilTags: its camera and its tags."""
 
     camera: Name = Field(description="RGB-D camera of the world; its images need not be drawn.")
     topic: TopicName = Field("tag_detections", description="Topic of its detections; each detector has another one.")
@@ -80,10 +80,10 @@ class AprilTagsConfig(TrackingSensorConfig):
 
 
 class AprilTagsSensor(BodySensor):
-    """Poses of the tags that a camera sees, in its optical frame.
+    """Measures the poses of the tags that a camera sees, in the camera's optical frame.
 
-    A tag is seen if it faces the camera, is large enough in the image, and no collision shape covers it. Tags can be
-    hidden at random, too, see `occlusion`.
+    A tag is seen if it faces the camera, its whole square is in the image and large enough, and no collision shape
+    covers it. In addition, `occlusion` can hide tags at random.
     """
 
     Config = AprilTagsConfig
@@ -96,7 +96,7 @@ class AprilTagsSensor(BodySensor):
         self._missing: set[str] = set()
 
     def enter(self, world: SensedWorld) -> None:
-        """Stores the world with the tags' bodies and the camera, and starts noise, occlusion and latency."""
+        """Stores the world, and prepares noise, occlusion and latency."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._world, self._dt_ns = world, dt_ns
         seeds = {tag.id: config.seed_of(f"{self.name}/{tag.id}") + tag.id for tag in config.tags}
@@ -105,9 +105,9 @@ class AprilTagsSensor(BodySensor):
         self._delay: Delay[tuple[SeenTag, ...]] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> AprilTagsSample | None:
-        """Detects tags, and returns the detections of `latency_s` ago.
+        """Detects tags, and returns the detections that were made `latency_s` ago.
 
-        Returns None while the camera or its pose is missing, or detections are not old enough.
+        Returns None while the camera or its pose is missing, or if detections are not old enough.
         """
         camera = self._world.cameras.get(self.config.camera)
         if camera is None:
@@ -133,7 +133,7 @@ class AprilTagsSensor(BodySensor):
                 yield SeenTag(tag.id, tag.size, self._noise[tag.id].on(in_camera, tick))
 
     def _pose_of(self, tag: TagConfig) -> tuple[Pose, int] | None:
-        """Returns a tag's pose in the world and PyBullet's id of its body; None if its body or link does not exist."""
+        """Returns a tag's pose in the world and PyBullet's id of its body; None if the body or link does not exist."""
         body = self.body if tag.body is None else self._world.bodies.get(tag.body)
         if body is None:
             self._warn_once(str(tag.body), f"no body '{tag.body}' for tag {tag.id}; it is not seen")

@@ -19,14 +19,14 @@ Measured = TypeVar("Measured")
 
 
 class OcclusionConfig(ConfigModel):
-    """Random occlusion."""
+    """Occlusion at random times."""
 
     share: Fraction = Field(description="Share of the time for which it is hidden.")
     length_s: Seconds = Field(0.5, description="Time is divided into parts of this length, each hidden or not.")
 
 
 class TrackingSensorConfig(SensorConfig):
-    """Keys of all sensors that report poses as a tracking system does."""
+    """Keys of all sensors that imitate a tracking system."""
 
     latency_s: Annotated[NonNegative, Unit("s")] = Field(
         0.0,
@@ -48,10 +48,10 @@ class TrackingSensorConfig(SensorConfig):
 
 
 class Occlusion:
-    """Random occlusion, which depends only on the seed and the tick.
+    """Hides a tracked object at random times, which depend only on the seed.
 
     Args:
-        config: Share of time and length of occlusions; None for no occlusion.
+        config: Share of time and length of occlusions; None to never hide the object.
         seed: Seed, 0 or greater.
         dt_s: Length of a tick [s].
     """
@@ -105,7 +105,7 @@ class Delay(Generic[Measured]):
             self._waiting.append((tick, measured))
 
     def newest(self, tick: int) -> tuple[int, Measured] | None:
-        """Returns the newest measurement that is old enough at a given tick, as a pair of its tick and the measurement.
+        """Returns the newest measurement that is old enough at a given tick, as a pair of tick and measurement.
 
         Returns None if all measurements are too new.
         """

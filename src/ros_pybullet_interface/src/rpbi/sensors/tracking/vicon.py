@@ -16,16 +16,16 @@ from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
 
 class ViconConfig(TrackingSensorConfig):
-    """A segment of a subject, the body: a rigid part that carries markers."""
+    """A Vicon segment (a rigid part with markers) of the body, which is the Vicon subject."""
 
     link: Text | None = optional("Link that is the segment; without it, the root link.")
 
 
 class ViconSensor(BodySensor):
-    """Pose of a link in the world, as a motion capture system measures it, without samples during occlusions.
+    """Measures the pose of a link in the world as a motion capture system does, without samples during occlusions.
 
     Attributes:
-        tf_frames: The TF frame that is reported.
+        tf_frames: The name of the TF frame whose pose is reported, as a tuple of one element.
 
     Raises:
         ConfigError: If the body has no such link.
@@ -46,16 +46,16 @@ class ViconSensor(BodySensor):
         self._noise = PoseNoise(config, config.seed_of(self.name))
 
     def enter(self, world: SensedWorld) -> None:
-        """Starts occlusion and latency, which depend on the length of the world's ticks."""
+        """Prepares occlusion and latency, which depend on the length of the world's ticks."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._dt_ns = dt_ns
         self._occlusion = Occlusion(config.occlusion, config.seed_of(self.name), dt_ns * 1e-9)
         self._delay: Delay[Pose | None] = Delay(math.ceil(config.latency_s * 1e9 / dt_ns - 1e-6))
 
     def read(self, tick: int) -> ViconSample | None:
-        """Measures the pose, and returns the measurement of `latency_s` ago.
+        """Measures the pose, and returns the measurement that was made `latency_s` ago.
 
-        Returns None if the link was occluded then, or measurements are not old enough.
+        Returns None if the link was occluded at that time, or if measurements are not old enough.
         """
         self._delay.push(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
         newest = self._delay.newest(tick)
