@@ -1,4 +1,4 @@
-"""Former package of episodes, kept for existing imports. The names in `__all__` are loaded from `rpbi_data` on use."""
+"""Former name of parts of the package `rpbi_data`, kept for existing imports."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
-"""Recordings, and tables, replays, episodes and data sets that are made from recordings.
+"""Records bags, and makes tables, replays, episodes and data sets from bags.
 
-The names in `__all__` can be imported from this package. The module of a name, and ROS, are loaded on first use.
+The names in `__all__` can be imported from this package. Submodules and ROS are only loaded when a name is used.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Modules with the names of the package `dmp` in the authors' original release; see `motion_primitives`."""
+"""Classes of the package `motion_primitives`, importable as in the authors' original package `dmp`."""

@@ -1,4 +1,4 @@
-"""Records demonstrations; the classes have the names of the authors' original release."""
+"""Classes that record demonstrations, importable as in the authors' original package `dmp`."""
 
 from motion_primitives.ros.data_collector import DMPDataCollector as DMPDataCollector
 from motion_primitives.ros.data_collector import TFPositionDMPDataCollector as TFPositionDMPDataCollector

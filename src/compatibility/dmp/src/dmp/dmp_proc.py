@@ -1,3 +1,3 @@
-"""Learns and plans motions through the services, and with the class name, of the authors' original release."""
+"""Client of the node that learns and plans motions, importable as in the authors' original package `dmp`."""
 
 from motion_primitives.ros.dmp_services import DMPProcessor as DMPProcessor

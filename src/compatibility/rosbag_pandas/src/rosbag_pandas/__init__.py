@@ -1,3 +1,3 @@
-"""Reads bags as pandas tables, with `bag_to_dataframe` from `rpbi_data`; see also `rpbi_data.bag_to_dataframes`."""
+"""Function that reads a bag as a pandas table. It is imported from `rpbi_data`."""
 
 from rpbi_data import bag_to_dataframe as bag_to_dataframe

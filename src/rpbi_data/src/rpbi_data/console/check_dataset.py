@@ -15,7 +15,7 @@ from rpbi_data.datasets.provenance import is_exported
 from rpbi_data.episodes.folder import EpisodeFolder
 
 MAX_FAULTS = 1000
-"""Largest number of reported faults, after which the check ends."""
+"""Number of reported faults after which the check ends."""
 
 
 def check_dataset(
@@ -25,17 +25,17 @@ def check_dataset(
     formats: Annotated[Sequence[str], Argument("MODULE:CLASS ...")] = (),
     any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
-    """Checks a data set of LeRobot, robomimic or rosbag2, and names its faults.
+    """Checks a data set of LeRobot, robomimic or rosbag2, and prints a line for each fault.
 
-    It prints a line a fault and ends with 1 if there is one; see docs/datasets.md. Data sets of other tools are checked
-    too, except against the values of an export. It needs no ROS master, and `./rpbi setup data` for all formats except
-    robomimic.
+    The exit code is 1 if there are faults; see docs/datasets.md. The data set may be written by another tool; only its
+    values cannot be compared with exported values then. No ROS master is needed. All formats except robomimic need
+    `./rpbi setup data` first.
 
     Args:
         folder: the data set
-        source: the folder of the episodes, to compare their recordings
-        formats: formats of your own
-        any_size: without limits of processor time and memory, which grow with its files
+        source: the folder of the exported episodes; checks that their recordings have not changed since the export
+        formats: your own data set formats, which are tried in addition to the built-in formats
+        any_size: lifts the limits of processor time and memory, which otherwise grow with the size of the data set
     """
     tree = look_at(folder) if folder.is_dir() else None
     if tree is not None and tree.faults:

@@ -18,14 +18,14 @@ def episodes(
     relabel: Annotated[Sequence[str], Argument("N LABEL", excludes="action")] = (),
     repair: Annotated[bool, Argument("", excludes="action")] = False,
 ) -> str:
-    """Lists the episodes of a folder; shows, discards, relabels or repairs them.
+    """Lists the episodes of a folder; with an option, shows, discards, relabels or repairs episodes.
 
     Args:
-        folder: of the episodes
-        show: all that is stored of an episode, with its topics
-        discard: moves an episode into DIR/discarded
-        relabel: gives an episode another label
-        repair: completes episodes whose recorder was killed; those that are being recorded are left alone
+        folder: the folder of the episodes
+        show: prints the stored data of episode N, including its topics
+        discard: moves episode N into DIR/discarded
+        relabel: changes the label of episode N
+        repair: completes episodes whose recorder was killed; skips episodes that are still being recorded
     """
     given = EpisodeFolder(folder)
     if show is not None:

@@ -38,12 +38,12 @@ def export(
     disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
-    """Exports the episodes of a folder as a data set of another project.
+    """Exports the episodes of a folder as a data set for another project, such as LeRobot.
 
         ./rpbi export ~/demos --to lerobot --out ~/push --task "push the box to the goal" --label success
 
-    Episodes that cannot be exported are named, the others are exported, and the exit code is 1; see docs/datasets.md.
-    It needs no ROS master, and `./rpbi setup data` for all formats except robomimic.
+    Episodes that cannot be exported are skipped with a message, and the exit code is then 1; see docs/datasets.md.
+    No ROS master is needed. All formats except robomimic need `./rpbi setup data` first.
 
     Usage:
         ./rpbi export DIR [--to FORMAT] [--out DIR] [--fps N] [--task TEXT] [--label LABEL ...]
@@ -53,24 +53,26 @@ def export(
                       [--option KEY=VALUE ...] [--disk-reserve-mb MB] [--any-size]
 
     Args:
-        folder: of the episodes
-        to: {choices}, or module:Class of a format of your own; lerobot without it
-        out: the data set, a folder that does not exist; DIR_FORMAT without it
-        fps: rows a second; 30 without it
-        task: the task in words; the name of DIR without it
-        label: only episodes with one of these labels
-        state: topics of observation.state; the positions of all joints without it
-        action: next, the newest command before the next row, as in LeRobot, is the default; previous: before the row;
-            pose: that of the end effector at the next row, not commands; deltas: changes, not values;
-            TOPIC ...: commands other than the targets of all joints
-        images: topics of images; all cameras without it, none without a topic
-        features: observations beside the state, such as velocity 'pose.*' contact_force.box; all without it
-        end_effector: also observes the pose of this link, which has to be on TF
-        gripper: joints that are an observation of their own, and come last in action
-        max_time_error: episodes with an observation further from its row are left out
+        folder: the folder of the episodes
+        to: format: {choices}, or module:Class of your own; default: lerobot
+        out: a new folder for the data set; default: DIR_FORMAT
+        fps: rows per second; default: 30
+        task: description of the task in words; default: the name of DIR
+        label: exports only episodes with one of these labels
+        state: topics of observation.state; default: the positions of all joints
+        action: next: the action of a row is the newest command before the next row, as in LeRobot; this is the default;
+            previous: the newest command at the row itself;
+            pose: the end effector's pose at the next row instead of a command;
+            deltas: changes from the values measured at the row;
+            TOPIC ...: topics of commands; default: the targets of all joints
+        images: topics of images; default: all cameras; without TOPIC, no images
+        features: observations in addition to the state, such as velocity 'pose.*' contact_force.box; default: all
+        end_effector: adds the pose of this link, which must be on TF, to the observations
+        gripper: joints of the gripper, which become a separate observation and the last numbers of the action
+        max_time_error: skips episodes in which a row is more than S seconds from the nearest message of an observation
         option: options of the format, such as preset=slow
-        disk_reserve_mb: free space of the disk that is never used; 200 without it
-        any_size: also bags that unfold to more than 1 GiB and 255 times their size
+        disk_reserve_mb: free disk space below which no further episode is exported [MB]; default: 200
+        any_size: also exports bags whose unpacked size exceeds both 1 GiB and 255 times their file size
     """
     if fps < 1:
         raise UsageError(f"--fps: expected at least 1, got {fps}")
@@ -105,7 +107,7 @@ def export(
 
 
 def _options(words: Sequence[str]) -> dict[str, Any]:
-    """Parses arguments `KEY=VALUE`, in which values are YAML; returns the values, indexed by key."""
+    """Parses words of the form `KEY=VALUE`, in which VALUE is YAML, and returns the values, indexed by key."""
     found = {}
     for word in words:
         key, equals, value = word.partition("=")

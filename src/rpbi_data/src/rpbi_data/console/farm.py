@@ -29,29 +29,29 @@ def farm(
     address: Annotated[str | None, Argument("HOST:PORT")] = None,
     disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
 ) -> int:
-    """Makes episodes of a world in which a policy acts, many at once.
+    """Makes episodes in which a policy acts in a simulated world; several episodes are made at the same time.
 
         ./rpbi farm WORLD.yaml --policy push:Push --episodes 200 --out pushes
 
-    It needs no ROS master. Episodes that are there already are not made again, so that the same command continues after
-    an interruption. Episodes that cannot be made are named, and the exit code is 1; see docs/farm.md.
+    No ROS master is needed. Existing episodes are not made again, so the same command continues after an interruption.
+    Episodes that cannot be made are skipped with a message, and the exit code is then 1; see docs/farm.md.
 
     Usage:
         ./rpbi farm WORLD.yaml --policy MODULE:CLASS --episodes N [--out DIR] [--seed N] [--seconds S | --ticks N]
                     [--images] [--jobs N] [--address HOST:PORT] [--disk-reserve-mb MB]
 
     Args:
-        WORLD.yaml: the world
-        policy: class of the policy, in a package or in a file of the current folder
-        episodes: number of episodes in the folder at the end
-        out: folder of the episodes; farm without it
-        seed: seed of the farm; that of episode n is (N, n); 0 without it
-        seconds: length of an episode that its policy does not end, in the world's time; 10 without it
-        ticks: the same in ticks
-        images: records the colour images of all cameras, too, as JPEG
-        jobs: episodes at once, each in a process of its own; the number of processors without it
-        address: head of a Ray cluster that makes them instead, or auto; needs `./rpbi setup farm`
-        disk_reserve_mb: free space of the disk that is never used; 200 without it
+        WORLD.yaml: main file of the world
+        policy: class of the policy, in an installed package or in a file in the current folder
+        episodes: makes the episodes 0 to N - 1
+        out: folder of the episodes; default: farm
+        seed: seed of the farm; the seed of episode n is (N, n); default: 0
+        seconds: simulated time after which an episode ends if its policy has not ended it [s]; default: 10
+        ticks: number of ticks after which an episode ends, instead of a time
+        images: also records the colour images of all cameras, as JPEG
+        jobs: number of processes, each of which makes one episode at a time; default: the number of processors
+        address: head node of a Ray cluster that makes the episodes, or auto; needs `./rpbi setup farm`
+        disk_reserve_mb: free disk space below which no further episode is made [MB]; default: 200
     """
     for flag, value in (("--episodes", episodes), ("--ticks", ticks or 1), ("--jobs", 1 if jobs is None else jobs)):
         if value < 1:

@@ -23,15 +23,16 @@ def label_images(
 
         ./rpbi label_images --images 100 --out clutter
 
-    It needs no ROS master. For each image, the objects of the world fall from random poses. A camera at a random place
-    then draws them at rest. The data set is in the BOP format, with a COCO file; see docs/datasets.md.
+    No ROS master is needed. For each image, the objects of the world fall from random poses. When the objects are at
+    rest, a camera takes the image from a random place. The data set is in the BOP format, with a COCO file; see
+    docs/datasets.md.
 
     Args:
-        WORLD.yaml: a world with a camera and objects; that of the example `clutter` without it
-        images: number of images; 100 without it
-        out: a new or empty folder; labelled_images without it
-        seed: image n depends on the world, the seed and n alone; 0 without it
-        camera: the camera; the first one without it
+        WORLD.yaml: main file of a world with a camera and objects; default: the world of the example `clutter`
+        images: number of images; default: 100
+        out: a new or empty folder for the data set; default: labelled_images
+        seed: seed of the random numbers; image n depends only on the world, the seed and n; default: 0
+        camera: name of the camera; default: the first camera of the world
     """
     if images < 1 or seed < 0:
         raise UsageError(f"--images and --seed: expected at least 1 and 0, got {images} and {seed}")

@@ -23,16 +23,16 @@ def plot(
     window: Annotated[bool, Argument("")] = False,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> str:
-    """Draws the data of a bag: joint states, wrenches, paths of frames, contacts, rates and latencies.
+    """Draws the data of a bag: joint states, wrenches, positions of frames, contacts, rates and latencies.
 
-    It prints the files that it writes. The time axes start at the first message.
+    Prints the names of the written files. Time 0 of the plots is the time of the first message.
 
     Args:
-        bag: the recording
-        topics: only these
-        out: folder of the PNG files; BAG_plots beside BAG.bag without it
-        window: shows them in windows instead, until these are closed
-        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+        bag: the bag
+        topics: draws only these topics
+        out: folder of the PNG files; default: BAG_plots next to BAG.bag
+        window: shows the plots in windows instead of writing files, until the windows are closed
+        any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
     """
     tables = bag_to_dataframes(bag, topics or None, any_size=any_size)
     if window:

@@ -28,18 +28,18 @@ def replay(
     any_size: Annotated[bool, Argument("")] = False,
     jobs: Annotated[int, Argument("N", parse=int)] = 1,
 ) -> int:
-    """Runs a recorded session again and compares its states; without a bag, the demo's.
+    """Simulates a recorded session again, and compares the states with the recorded states.
 
-    It ends with 1 if a state differs; needs no ROS master.
+    The exit code is 1 if a state differs or a part cannot be simulated. No ROS master is needed.
 
     Args:
-        bag: out/demo/recording.bag without it
-        ns: of the simulator that was recorded
-        quiet: no progress bar
-        trust: Python packages that the bag may have imported, for types of your own
-        max_ticks: bags of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
-        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
-        jobs: processes at once, for a recording with keyframes; 1 without it
+        bag: the recording; default: out/demo/recording.bag, which `./rpbi demo` records
+        ns: namespace of the recorded simulator; default: /
+        quiet: shows no progress bar
+        trust: Python packages from which classes that the bag names may be imported, such as object types
+        max_ticks: refuses recordings of more than N ticks; default: 20,000,000, which is 5.5 hours at 1 kHz
+        any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
+        jobs: number of processes, which simulate the parts between keyframes at the same time; default: 1
     """
     if jobs < 1:
         raise UsageError(f"--jobs: expected at least 1, got {jobs}")

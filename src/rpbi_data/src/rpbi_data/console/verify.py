@@ -11,7 +11,7 @@ from rpbi_data.episodes.session_messages import MAX_TICKS
 from rpbi_data.episodes.verified_messages import MAX_CPU_S, ReplayLimits, verify_all
 
 MAX_LINE = 10_000
-"""Largest number of characters in the line of an episode."""
+"""Largest number of characters that are printed for an episode."""
 
 
 def verify(
@@ -23,18 +23,19 @@ def verify(
     max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> int:
-    """Simulates recorded episodes again and compares their states, with the files that are stored with them.
+    """Simulates episodes again with their stored files, and compares states and messages with the recordings.
 
-    It prints a line an episode: the same, or the first tick that differs, and files that were changed. Files that have
-        changed on the disk are noted. It ends with 1 unless all are the same; needs no ROS master.
+    Prints a line for each episode: that it is the same, or the first tick that differs, and stored files that were
+    changed. Notes list original files that were changed after the recording. The exit code is 0 if all episodes are the
+    same. No ROS master is needed.
 
     Args:
-        folder: of the episodes
-        jobs: episodes at once, each in a process of its own; 1 without it
-        trust: Python packages that the episodes may import, for types of your own
-        max_ticks: episodes of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
-        max_cpu: episodes that need more seconds of processor time are ended; 3,600 without it
-        any_size: also bags that unfold to more than 1 GiB and 255 times their size
+        folder: the folder of the episodes
+        jobs: number of processes, each of which simulates one episode at a time; default: 1
+        trust: Python packages from which classes that episodes name may be imported, such as object types
+        max_ticks: refuses episodes of more than N ticks; default: 20,000,000, which is 5.5 hours at 1 kHz
+        max_cpu: stops simulating an episode after this processor time [s]; default: 3,600
+        any_size: also reads bags whose unpacked size exceeds both 1 GiB and 255 times their file size
     """
     for flag, value in (("--jobs", jobs), ("--max-cpu", max_cpu)):
         if value < 1:

@@ -29,18 +29,18 @@ def view(
     max_cpu: Annotated[int, Argument("S", parse=int)] = MAX_CPU_S,
     any_size: Annotated[bool, Argument("")] = False,
 ) -> str:
-    """Writes an episode as one HTML file: its world in 3-D with a time line, forces as arrows and as plots.
+    """Writes an HTML file that shows an episode: the world in 3-D with a time line, and forces as arrows and plots.
 
-    A browser opens the file without a network. Needs ./rpbi setup html; needs no ROS master.
+    A browser shows the file without access to the internet. `./rpbi setup html` is needed first, a ROS master is not.
 
     Args:
-        DIR|BAG: a folder of episodes, or a bag with rpbi/world_description
-        N: the episode; not with a bag
-        out: episode_N.html, or BAG.html for BAG.bag, without it
-        ns: of the simulator that was recorded, for a bag
-        trust: Python packages that the recording may import, for types of your own
-        max_cpu: a recording that needs more seconds of processor time is refused; 600 without it
-        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+        DIR|BAG: a folder of episodes, or a bag with the topic rpbi/world_description
+        N: number of the episode in the folder; not allowed with a bag
+        out: the HTML file; default: episode_N.html, or BAG.html for BAG.bag, in the current folder
+        ns: namespace of the recorded simulator, for a bag; default: /
+        trust: Python packages from which classes that the recording names may be imported, such as object types
+        max_cpu: stops after this processor time [s]; default: 600
+        any_size: also reads a bag whose unpacked size exceeds both 1 GiB and 255 times its file size
     """
     with late_imports():
         from rpbi_data.view.bag_messages import scene_of_bag, scene_of_episode  # needs an extra

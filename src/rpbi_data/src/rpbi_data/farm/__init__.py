@@ -1,4 +1,4 @@
-"""Farm: makes many episodes at once, in each of which a policy acts in a simulated world."""
+"""The farm, which makes many episodes at the same time. In each episode, a policy acts in a simulated world."""
 
 from .policy import Policy
 

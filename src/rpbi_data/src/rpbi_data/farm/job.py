@@ -1,4 +1,4 @@
-"""The job of a farm, which determines the farm's episodes, and the outcome of an episode."""
+"""The job of a farm, which determines the content of its episodes, and the outcome of an episode."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class FarmJob:
         policy: `module:Class` of the policy.
         seed: Seed of the farm; the seed of episode n is `(seed, n)`.
         ticks: Number of ticks after which an episode ends if its policy has not ended it.
-        world_sha256: SHA-256 of the description of the world, see `World.describe`.
+        world_sha256: SHA-256 of the text that `World.describe` returns.
         policy_sha256: SHA-256 of the file that defines the policy; empty if the policy has no file.
         images: Whether the colour images of cameras are recorded.
         python_path: Additional folders in which the module of the policy is searched for.
-        facts: Further attributes of each `Episode`; they are not part of the identity of the job.
+        facts: Further attributes of each `Episode`, such as versions; ignored when jobs are compared.
     """
 
     world: str
@@ -53,10 +53,10 @@ class FarmJob:
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def claim(self, folder: Path) -> None:
-        """Writes this job into a folder, or checks that the job that the folder already has is the same.
+        """Writes this job into a folder. If the folder already contains a job, checks that it equals this job.
 
         Raises:
-            EpisodeError: If the folder has another job, an unreadable job, or other files but no job.
+            EpisodeError: If the folder contains a different or unreadable job, or contains files but no job.
             OSError: If the job cannot be written.
         """
         path, own = folder / FARM, self._identity()
@@ -76,9 +76,9 @@ class FarmJob:
         return {key: getattr(self, key) for key in keys}
 
     def _changes(self, there: Mapping[str, Any]) -> list[str]:
-        """Returns messages about differences from the job that is already in the folder.
+        """Returns messages about the differences between this job and the stored job `there`.
 
-        Changed file contents are reported only if nothing else differs.
+        Changed contents of files are only reported if nothing else differs.
         """
         own, defaults = self._identity(), {each.name: each.default for each in fields(self)}
         changed = [key for key in own if there.get(key, defaults[key]) != own[key]]

@@ -1,4 +1,4 @@
-"""Policies, which act in the world of an episode and end it."""
+"""Base class of policies. A policy acts in the world of an episode, and decides when the episode ends."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ own_folders.append(str(Path(__file__).parent))
 
 
 class Policy:
-    """Acts in the world of one episode, only through `World.put` and `World.act`. Each episode has a new policy object.
+    """Base class of policies, which act in the world of one episode. Each episode has a new policy object.
 
-    The constructor of a subclass may change the initial state, for instance with `world.act("box", "teleport", pose)`.
-    All random values must come from `rng`. An exception ends the episode, which is then not written.
+    A policy changes the world only through `World.put` and `World.act`. The constructor of a subclass may change the
+    initial state, for instance with `world.act("box", "teleport", pose)`. All random values must come from `rng`. An exception ends the episode, which is then not written.
 
     Args:
         world: The world at tick 0, as its files describe it.
@@ -28,10 +28,10 @@ class Policy:
         self.world, self.rng = world, rng
 
     def act(self) -> str | None:
-        """Acts on the world; it is called before each tick.
+        """Acts on the world. This method is called before each tick.
 
         Returns:
-            None to continue; a label, such as `success`, to end the episode before that tick.
+            None to continue, or a label, such as `success`, to end the episode before the tick.
         """
         raise NotImplementedError
 

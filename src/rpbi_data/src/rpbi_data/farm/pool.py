@@ -1,4 +1,4 @@
-"""Processes that make episodes, and their replacement after crashes."""
+"""Processes that make episodes. Crashed processes are replaced."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from rpbi_data.episodes.folder import EpisodeFolder
 from .job import LOG, EpisodeOutcome, FarmJob
 
 MAX_LOSSES = 3
-"""Number of times that an episode may be lost before it is left out."""
+"""Number of losses after which an episode is skipped. An episode is lost if the process that makes it ends."""
 END_S = 5.0
-"""Time that a process has to end after its connection is closed, before it is killed [s]."""
+"""Time to wait for a process to end after its connection is closed, before the process is killed [s]."""
 
 
 class Child:
-    """A child process that makes episodes. It is killed when the present process ends.
+    """A child process that makes episodes. The child process is killed when this process ends.
 
     Args:
-        module: Module that the child process runs; its first argument is the file handle from which it reads the job.
+        module: Module that the child process runs. Its first command-line argument is the file handle from which the
+            child process reads the job.
         job: Job that determines the episodes.
         folder: Folder of the episodes.
         slots: Maximum number of episodes requested from the child process at the same time.
@@ -46,7 +47,7 @@ class Child:
     ) -> None:
         self._slots = slots
         self.numbers: set[int] = set()
-        """Numbers of the episodes that are requested from the process and not finished."""
+        """Numbers of the episodes that were requested from the process and are not finished yet."""
         self.connection, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
         path = path_below(folder.path, LOG)
@@ -86,10 +87,10 @@ class Child:
         """Closes the connection, and kills the process if it does not end by itself.
 
         Args:
-            grace_s: Time that the process has to end by itself [s].
+            grace_s: Time to wait for the process to end by itself [s].
 
         Returns:
-            The name of the signal that ended the process, or a text with the exit code.
+            The name of the signal that ended the process, such as `SIGKILL`, or a text such as `exit code 1`.
         """
         self.connection.close()
         with suppress(subprocess.TimeoutExpired):
@@ -124,13 +125,13 @@ class Pool:
         self._losses: Counter[int] = Counter()
 
     def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields their outcomes in the order of completion.
+        """Makes episodes, and yields the outcome of each episode when it is finished.
 
-        When this generator ends, even early or with an exception, all processes have ended and the temporary folders
-        of the episodes are removed.
+        When this generator ends, even early or with an exception, it ends all processes and removes the temporary
+        folders of the episodes.
 
         Raises:
-            EpisodeError: If no further episode can be made; complete episodes are kept.
+            EpisodeError: If no further episode can be made. Complete episodes are kept.
         """
         self._waiting.extend(numbers)
         for number in numbers:
@@ -147,7 +148,7 @@ class Pool:
                 self._drop_part(number)
 
     def _employ(self) -> None:
-        """Assigns waiting episodes to free processes, and starts further processes if none is free."""
+        """Assigns waiting episodes to free processes; starts another process if all processes are busy."""
         while self._waiting:
             free = next((child for child in self._children if child.is_free), None)
             if free is None:
@@ -175,7 +176,7 @@ class Pool:
             yield outcome
 
     def _again(self, lost: EpisodeOutcome) -> Iterator[EpisodeOutcome]:
-        """Schedules a lost episode again, or yields its outcome if it is complete or has been lost too often."""
+        """Schedules a lost episode again, or yields its outcome if it is complete or was lost `MAX_LOSSES` times."""
         number = lost.number
         self._drop_part(number)
         if self._folder.folder_of(number).exists():  # the process ended just after completing the episode

@@ -25,25 +25,25 @@ class EpisodeWriter(Protocol):
     """Interface of objects that write the messages of an episode's world."""
 
     def start(self) -> None:
-        """Writes the world before its first tick."""
+        """Writes the state of the world before its first tick."""
 
     def before_step(self) -> None:
-        """Writes the commands of a tick."""
+        """Writes the commands that take effect at the next tick."""
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes the samples of a tick."""
+        """Writes the samples from the tick that has just been simulated."""
 
     def end(self) -> None:
-        """Writes the last state."""
+        """Writes the final state of the world."""
 
 
 class EpisodeRun:
     """Runs one policy in a new world.
 
     Args:
-        job: Job of the farm, for the seed and the maximum number of ticks.
+        job: Job of the farm, which contains the seed and the maximum number of ticks.
         policy: Class of the policy.
-        number: Number of the episode, which is part of the seed.
+        number: Number of the episode, which is part of the random seed.
         world: The world at tick 0.
     """
 
@@ -52,11 +52,11 @@ class EpisodeRun:
         self._seed = (job.seed, number)
 
     def run(self, writer: EpisodeWriter) -> str:
-        """Runs the episode to its end, and returns its label.
+        """Runs the episode to its end, and returns the label from the policy, or `TIMEOUT`.
 
         Raises:
-            PluginError: If the policy raises an exception, steps or resets the world, or returns a wrong label. The
-                message names the class, method, tick and seed.
+            PluginError: If the policy raises an exception, steps or resets the world, or returns an invalid label.
+                The message contains the class, method, tick and seed.
             InterfaceError: If the world cannot be simulated or written.
         """
         with self._policy_errors("__init__"):

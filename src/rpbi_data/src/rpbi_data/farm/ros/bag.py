@@ -1,4 +1,4 @@
-"""Writes the bag of an episode directly from the episode's world, without a ROS master."""
+"""Writes the bag of an episode directly from the simulated world, without a ROS master."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from rpbi_data.episodes.sample_messages import SampleMessages
 
 
 class EpisodeBag:
-    """Writes the bag of an episode, with the topics that the recorder records by default.
+    """Writes the bag of an episode, with the topics that the episode recorder records by default.
 
-    Used as a context manager, which closes the bag. Rates in wall time are applied to simulated time here.
+    Used as a context manager, which closes the bag. All configured rates apply to simulated time.
 
     Args:
         path: Path of the new bag file.
         world: The world at tick 0.
-        images: Whether the colour images of the world's cameras are written, too, as JPEG.
+        images: Whether the colour images of the world's cameras are written as JPEG, too.
 
     Raises:
-        OSError: If the bag cannot be written; all methods raise this error, too.
+        OSError: If the bag cannot be written. All methods may raise this error.
     """
 
     def __init__(self, path: Path, world: World, images: bool = False) -> None:
@@ -64,7 +64,7 @@ class EpisodeBag:
                 raise
 
     def start(self) -> None:
-        """Writes the world before its first tick: description, static frames, commands, state, samples and images."""
+        """Writes the messages about the world at tick 0, such as its description, static frames and state."""
         self._write(DESCRIPTION.name, String(self._world.describe()))
         if self._world.config.poses:
             self._write(TF_STATIC.name, static_frames_message(self._world.config.poses))
@@ -75,7 +75,9 @@ class EpisodeBag:
         self._write_images()
 
     def before_step(self) -> None:
-        """Writes the new commands; targets are also written to the topics on which the node would receive them.
+        """Writes the commands since the last call.
+
+        Targets are also written to the topics on which the simulator's node would receive them.
 
         Raises:
             InterfaceError: If a command cannot be recorded.
@@ -94,7 +96,7 @@ class EpisodeBag:
                         self._write(topic, target)
 
     def after_step(self, samples: list[Any]) -> None:
-        """Writes the samples of a tick, and clock, images and state if they are due at this tick."""
+        """Writes the samples of the present tick, and the clock, images and state if they are due at this tick."""
         tick = self._world.clock.tick
         if self._clock.is_due(tick):
             self._write_clock()
@@ -108,7 +110,7 @@ class EpisodeBag:
         """Writes the remaining messages of the last tick, including the hash of the world's state.
 
         Raises:
-            InterfaceError: If a camera has no image, since its pose was never set.
+            InterfaceError: If the pose of a camera was never set, so that it has no image.
         """
         if self._images is not None:
             self._images.require_all()
@@ -146,7 +148,7 @@ class _Images:
         self._drawn = CameraImages(world)
 
     def due(self) -> Iterator[tuple[str, Any]]:
-        """Yields topics and messages of the cameras that have a pose and are due at the present tick."""
+        """Yields topics and messages of the cameras that are due at the present tick; skips cameras without a pose."""
         tick, stamp = self._world.clock.tick, to_ros_time(self._world.clock.stamp_ns)
         for name, schedule in self._schedules.items():
             camera = self._world.cameras[name]

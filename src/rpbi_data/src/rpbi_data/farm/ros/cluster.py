@@ -1,4 +1,6 @@
-"""Entry point of the process between a farm and a Ray cluster: `python -m rpbi_data.farm.ros.cluster FD ADDRESS`.
+"""Process that connects a farm to a Ray cluster, started as `python -m rpbi_data.farm.ros.cluster FD ADDRESS`.
+
+FD is the file handle of the connection to the farm.
 
 This process is separate from the farm because Ray ends the client process when the head node of the cluster ends.
 """
@@ -33,7 +35,7 @@ class Cluster:
     Args:
         address: Address of the head node as `HOST:PORT`, as `ray start` prints it, or `auto`.
         job: Job that determines the episodes.
-        folder: Folder of the episodes on this machine.
+        folder: Folder on this machine into which complete episodes are written.
 
     Raises:
         ClusterError: If the cluster cannot be used.
@@ -59,7 +61,7 @@ class Cluster:
         self._numbers[self._task.remote(self._job, number)] = number
 
     def outcomes(self) -> Iterator[EpisodeOutcome]:
-        """Waits at most `POLL_S` until an episode is complete, and yields the outcome of this episode.
+        """Waits at most `POLL_S` for an episode to finish. If an episode has finished, yields its outcome.
 
         Raises:
             ClusterError: If the head node does not answer.
@@ -107,7 +109,7 @@ class ClusterError(InterfaceError):
 
 
 def main() -> None:
-    """Forwards requests to the cluster and outcomes to the farm, until the farm closes the connection."""
+    """Forwards the farm's requests to the cluster, and outcomes to the farm, until the farm closes the connection."""
     connection = Connection(int(sys.argv[1]))
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started it

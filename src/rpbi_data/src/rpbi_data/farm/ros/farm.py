@@ -1,4 +1,4 @@
-"""A farm: makes the episodes of a job in a folder, with processes on this machine or on a cluster."""
+"""A farm, which makes episodes with processes on this machine or on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from rpbi_data.farm.pool import Child, Pool
 from .maker import new_world
 
 WORKER, CLUSTER = "rpbi_data.farm.ros.maker", "rpbi_data.farm.ros.cluster"
-"""Modules of the processes that make episodes, here and on a Ray cluster."""
+"""Modules of the child processes that make episodes: on this machine, and through a Ray cluster."""
 
 
 class Farm:
-    """Makes episodes of a world and a policy.
+    """Makes episodes in which a policy acts in a world.
 
     Args:
         world: Main YAML file of the world.
-        policy: `module:Class` of the policy; the current folder is searched, too.
+        policy: `module:Class` of the policy. The module may be in the current folder.
         seed: Seed of the farm.
         seconds: Simulated time after which an episode ends if its policy has not ended it [s].
-        ticks: Number of ticks that replaces `seconds`; 0 to use `seconds`.
+        ticks: Number of ticks after which an episode ends, instead of `seconds`; 0 to use `seconds`.
         images: Whether the colour images of cameras are recorded.
 
     Raises:
-        ConfigError: If the configuration of the world is wrong, `images` is set but the world has no camera, or there
-            is no such policy.
+        ConfigError: If the configuration of the world is wrong, the policy does not exist, or `images` is set but the
+            world has no camera.
         PhysicsError: If PyBullet cannot load the world.
     """
 
@@ -64,16 +64,16 @@ class Farm:
         self.job = FarmJob(path, policy, seed, length, world_sha256, policy_sha256, images, (here,))
 
     def missing(self, folder: EpisodeFolder, count: int) -> list[int]:
-        """Returns the numbers below `count` that no episode in a folder has, including discarded episodes."""
+        """Returns the numbers below `count` of episodes that neither exist in the folder nor were discarded."""
         return sorted(set(range(count)) - folder.taken())
 
     @contextmanager
     def claimed(self, folder: EpisodeFolder) -> Iterator[None]:
-        """Locks a folder for this farm until the end of the context.
+        """Writes the job into a folder, and locks the folder for this farm within the context.
 
         Raises:
-            EpisodeError: If the folder has files other than those of this job, another farm has locked the folder, or
-                the folder cannot be written.
+            EpisodeError: If the folder contains another job or files but no job, is locked by another farm, or cannot be
+                written.
         """
         try:
             self.job.claim(folder.path)
@@ -94,7 +94,7 @@ class Farm:
         address: str | None = None,
         disk_reserve_mb: float = 200.0,
     ) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields their outcomes in the order of completion.
+        """Makes episodes, and yields the outcome of each episode when it is finished.
 
         Args:
             folder: Folder of the episodes, which `claimed` has locked.
@@ -104,7 +104,7 @@ class Farm:
             disk_reserve_mb: Free disk space below which no further episode is made [MB].
 
         Raises:
-            EpisodeError: If no further episode can be made; complete episodes are kept.
+            EpisodeError: If no further episode can be made. Complete episodes are kept.
             MissingDependency: If `address` is given and Ray is not installed.
         """
         if address is not None and importlib.util.find_spec("ray") is None:
@@ -120,7 +120,7 @@ class Farm:
             _require_space(folder, disk_reserve_mb)
 
     def _facts(self, folder: EpisodeFolder) -> dict[str, object]:
-        """Stores the files of the world, and returns the attributes that all episodes share."""
+        """Copies the files of the world into the folder, and returns the attributes that all episodes share."""
         try:
             files, faults = store_files(self._description, folder.files)
         except OSError as error:

@@ -1,4 +1,4 @@
-"""Makes episodes of a job, in this process, on a node of a Ray cluster, or in a child process.
+"""Makes the episodes of a job, in a child process of the farm or on a node of a Ray cluster.
 
 The child process is started with `python -m rpbi_data.farm.ros.maker FD`. It makes the episodes that are requested over
 the connection with the file handle FD.
@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 
 
 def new_world(loaded: LoadedWorld) -> World:
-    """Builds a world in simulated time without a window, and makes its TF prefix and frames apply to messages."""
+    """Builds a world without a window, and applies its TF prefix and frame names to this process's messages."""
     world = World(loaded, connection_mode=pybullet.DIRECT)
     use_prefix(loaded.config.tf_prefix)
     use_own_frames(world.frames())
@@ -50,8 +50,8 @@ class EpisodeMaker:
         job: Job that determines the episodes.
 
     Raises:
-        InterfaceError: If the world or the policy cannot be loaded on this machine, or the file of the policy differs
-            from the file where the farm was started.
+        InterfaceError: If the world or the policy cannot be loaded on this machine, or the policy's file differs from
+            that file on the machine of the farm.
     """
 
     def __init__(self, job: FarmJob) -> None:
@@ -63,7 +63,7 @@ class EpisodeMaker:
             raise _AnotherError(f"the file of the policy {job.policy}")
 
     def make(self, folder: EpisodeFolder, number: int) -> EpisodeOutcome:
-        """Makes an episode in a folder, and returns its outcome; a failed episode leaves no files."""
+        """Makes an episode in a folder, and returns its outcome. No files remain from a failed episode."""
         try:
             return EpisodeOutcome(number, self._make(folder, number))
         except OSError as error:
@@ -97,14 +97,14 @@ class EpisodeMaker:
         return episode.label
 
     def _check(self, world: World) -> None:
-        """Checks that a world has the description on which the job depends; only the first world is checked."""
+        """Checks that the world's description is the description in the job. Only the first world is checked."""
         if not self._is_checked and digest(world.describe()) != self._job.world_sha256:
             raise _AnotherError(f"the world of {self._job.world}")
         self._is_checked = True
 
 
 class _AnotherError(InterfaceError):
-    """Raised if the world or the policy differs from the job's; its argument names the differing item."""
+    """Raised if the world or the policy differs from the job's. The argument names the world or the policy."""
 
     def __str__(self) -> str:
         where = "another one here than where the farm was started"
@@ -118,7 +118,7 @@ Files = dict[str, bytes]
 def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
     """Makes an episode in a temporary folder of this node, and returns its outcome and its files.
 
-    A failed episode has no files. A fault that prevents all further episodes names the node.
+    A failed episode has no files. If a fault prevents all further episodes, the message contains the node's name.
     """
     node = socket.gethostname()
     try:
@@ -134,7 +134,9 @@ def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
 
 
 def store(folder: EpisodeFolder, number: int, files: Files) -> None:
-    """Writes an episode made on another node into a folder; the episode gets its final name when it is complete.
+    """Writes the files of an episode that was made on another node into a folder.
+
+    The episode's folder gets its final name when all files are written.
 
     Raises:
         OSError: If the episode cannot be written.
@@ -149,7 +151,7 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
 
 @lru_cache(maxsize=1)
 def _maker(job: FarmJob) -> EpisodeMaker:
-    """Returns the maker of a job, and caches it, since a process on a node mostly gets the same job again."""
+    """Returns the cached maker of a job. A process on a node usually gets the same job again."""
     return EpisodeMaker(job)
 
 
