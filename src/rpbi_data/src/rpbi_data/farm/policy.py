@@ -17,7 +17,8 @@ class Policy:
     """Base class of policies, which act in the world of one episode. Each episode has a new policy object.
 
     A policy changes the world only through `World.put` and `World.act`. The constructor of a subclass may change the
-    initial state, for instance with `world.act("box", "teleport", pose)`. All random values must come from `rng`. An exception ends the episode, which is then not written.
+    initial state, for instance with `world.act("box", "teleport", pose)`. All random values must come from `rng`.
+    If the policy raises an exception, the episode is not written.
 
     Args:
         world: The world at tick 0, as its files describe it.

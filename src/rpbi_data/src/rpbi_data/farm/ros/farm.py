@@ -72,8 +72,8 @@ class Farm:
         """Writes the job into a folder, and locks the folder for this farm within the context.
 
         Raises:
-            EpisodeError: If the folder contains another job or files but no job, is locked by another farm, or cannot be
-                written.
+            EpisodeError: If the folder contains another job, or files but no job; or if the folder is locked by another
+                farm, or cannot be written.
         """
         try:
             self.job.claim(folder.path)
