@@ -1,4 +1,4 @@
-"""Checks files that a configuration names before PyBullet reads them, since faulty files can crash the process."""
+"""Checks the files of a configuration before PyBullet reads them, since faulty files can crash the process."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress

@@ -42,9 +42,8 @@ SILENT_AFTER_S = 5.0
 class RenderClient:
     """Runs the renderer process and sends scenes to the process; only the methods `wait` and `stop` block.
 
-    The process starts with the first camera. After a scene was sent, later scenes of the same camera wait until the
-    renderer has accepted the sent one, and only the newest of them is kept. Only the simulation thread may call the
-    methods.
+    The process starts with the first camera. Until the renderer has accepted a sent scene, only the newest later scene
+    of the same camera is kept, to be sent next. Only the simulation thread may call the methods.
 
     Args:
         cameras: The initial cameras.

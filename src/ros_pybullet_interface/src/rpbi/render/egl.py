@@ -62,7 +62,7 @@ class Egl:
         return depth[::-1]
 
     def deepen(self, width_px: int, height_px: int) -> None:
-        """Creates a context with a 24-bit depth buffer and makes it current; call this before shapes are loaded.
+        """Creates a context with a 24-bit depth buffer and makes it current; call this method before shapes are loaded.
 
         Args:
             width_px: Maximum number of columns of an image.

@@ -30,7 +30,7 @@ class Answer(NamedTuple):
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns an `Owners` function which gives each body of a type the topic or service once, under the body's name."""
+    """Returns an `Owners` function for a topic or service that every body of a type has, under the body's name."""
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -42,7 +42,7 @@ class Topic(NamedTuple):
         message_type: ROS type of the messages.
         handler: For a sensor's topic, the function that converts a sample and its stamp [ns] to a message. For an
             input's topic, the function that converts a message to the input's value. For a topic in `BODY_TOPICS`, the
-            function that acts on a body, given the body's context and a message. None if other code publishes it.
+            function that acts on a body, given the body's context and a message. None if other code handles the topic.
         meaning: Content of the topic or effect of a message, in a sentence, with the YAML key that sets the rate.
         key: Key of the main YAML file that opens the topic or sets its rate, where 0 is off. Empty if the topic is
             always open.
@@ -67,8 +67,9 @@ class Service(NamedTuple):
         name: Name of the service, with `{name}` in place of the name of the body, sensor or controller.
         service_type: ROS type of the service.
         handler: Takes a context and a request, and returns an Answer, the response, or the response's fields. To refuse
-            the request, it raises an InterfaceError or ValueError. The client then gets `success=False` and the error's
-            message; if the response has no field `success`, the call fails. None if other code opens the service.
+            the request, the handler raises an InterfaceError or ValueError. The client gets `success=False` and the
+            error's message; if the response has no field `success`, the call fails. None if other code opens the
+            service.
         owners: Returns the names under which a body has the service, see `Owners`.
     """
 

@@ -1,4 +1,4 @@
-"""The class `RosNode`, kept for scripts that were written for the authors' original release."""
+"""The class `RosNode`, which scripts for the original ros_pybullet_interface use."""
 
 from typing import Any
 

@@ -192,8 +192,8 @@ class Simulation:
             steps: Number of ticks.
 
         Returns:
-            A future with the number and stamp [ns] of the last tick. It is done when all samples of the last tick have
-            been sent to the subscribers.
+            A future with the number and stamp [ns] of the last tick. The future is done when all samples of that tick
+            have been sent to the subscribers.
 
         Raises:
             InterfaceError: If the world runs, or the ticks of another request are running.

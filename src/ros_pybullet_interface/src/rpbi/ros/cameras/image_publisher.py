@@ -41,7 +41,7 @@ class ImagePublisher:
         self._cameras: dict[str, _CameraTopics] = {}
 
     def add(self, camera: Camera) -> None:
-        """Advertises the topics of a camera; if it is synchronous, waits until existing subscribers have connected."""
+        """Advertises a camera's topics; for a synchronous camera, waits until existing subscribers have connected."""
         topics = self._cameras[camera.name] = _CameraTopics(camera)
         if camera.synchronous:
             topics.wait_for_subscribers()
@@ -77,7 +77,8 @@ def camera_node(simulator: str) -> str:
 def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
     """Returns the command-line arguments of the renderer process.
 
-    They are the simulator's remappings, its namespace, and the simulator's node name with `_camera` appended.
+    The arguments are the simulator's remappings, the simulator's namespace, and the node name that `camera_node`
+    returns.
 
     Args:
         node_name: The simulator's resolved node name.

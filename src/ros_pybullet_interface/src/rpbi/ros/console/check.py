@@ -19,7 +19,7 @@ from rpbi.world.world_warnings import world_warnings
 
 
 def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
-    """Reports all problems of a world, or if there are none, lists its topics and services; needs no ROS master.
+    """Reports all problems of a world, or lists the topics and services of a valid world; needs no ROS master.
 
     The exit code is 1 if there are problems. `{package}/PATH` is resolved.
     """

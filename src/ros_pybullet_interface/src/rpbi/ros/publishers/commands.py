@@ -58,7 +58,7 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends a message with new commands to all subscribers, and with earlier commands to each new subscriber."""
+        """Sends one message of new commands to all subscribers, and one of earlier commands to each new subscriber."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())

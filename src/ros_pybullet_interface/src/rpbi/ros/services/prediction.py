@@ -87,7 +87,7 @@ class Predictor:
     def cancel(self) -> bool:
         """Ends the running prediction and all waiting predictions; any thread may call this method.
 
-        The next prediction starts a new process, and takes as long as the first one.
+        The next prediction starts a new process, and takes as long as the first prediction.
 
         Returns:
             False if no prediction is running.

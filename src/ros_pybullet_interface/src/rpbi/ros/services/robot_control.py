@@ -48,7 +48,7 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
 
 
 def move_to_init_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """Does the same as `move_to_initial_joint_state`; the authors' original documentation uses this name."""
+    """Does the same as `move_to_initial_joint_state`; the original ros_pybullet_interface documents this name."""
     return move_to_initial_joint_state(context, request)
 
 
@@ -122,7 +122,7 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
 def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
     """Sets joint targets as the topic `joint_states/target` does, and answers once the next tick will use them.
 
-    Controllers that step the world need it, since a message on the topic could arrive after the next requested step.
+    Controllers that step the world need this service: a message on the topic could arrive after the next step.
 
     Raises:
         ValueError: If a target is refused; the error has the reason.

@@ -74,7 +74,7 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
 def main() -> None:
     """Prints a URDF with mesh paths that RViz finds.
 
-    Launch files call it, since robot_state_publisher needs the URDF before the simulator has started.
+    Launch files call this program, since robot_state_publisher needs the URDF before the simulator has started.
     """
     parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
     parser.add_argument("file", help="the URDF; {package}/path is resolved, and PyBullet's data is looked in")

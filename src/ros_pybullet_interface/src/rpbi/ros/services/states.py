@@ -56,8 +56,8 @@ def _write(node: Any, name: str, save: Callable[[], WorldState]) -> Answer:
 def restore(node: Any, request: SetStringRequest) -> Answer:
     """Restores a saved state by simulating again from the world's start or the file's keyframe; stamps continue.
 
-    The saved state must be one of this world. Meanwhile, the node answers other requests, and `rpbi/stop` aborts the
-    restoration and resets the world.
+    The saved state must come from this world. During the restoration, the node answers other requests; `rpbi/stop`
+    aborts the restoration and resets the world.
     """
     state = WorldState.read(state_file(node.state_folder, request.data))
     node.objects.reset(state)
