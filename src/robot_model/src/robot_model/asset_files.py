@@ -38,7 +38,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
         search_paths: Further folders.
 
     Raises:
-        ValueError: If there is no such file, or the package is unknown.
+        ValueError: If the file does not exist, or the package is unknown.
     """
     _refuse_long(name)
     path = resolve_package(name)

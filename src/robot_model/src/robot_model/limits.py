@@ -111,7 +111,8 @@ class Limits:
         Args:
             first: The first configuration.
             restarts: Number of random configurations that follow.
-            seed: Makes the random generator, which is slow, so `seed` is called only when the second one is requested.
+            seed: Function that makes the random generator. It is called only when a second configuration is requested,
+                since making a generator is slow.
         """
         yield first
         generator = seed()

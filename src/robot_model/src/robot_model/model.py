@@ -174,7 +174,7 @@ class RobotModel:
             if joint.name in common:
                 break
             if joint.is_moving:
-                moved = factors[joint.name].nonzero()  # the others are not needed, even if they have no limits
+                moved = factors[joint.name].nonzero()  # other factors are 0, and 0 * inf would be NaN
                 reach[moved] += factors[joint.name][moved] * (beyond if joint.is_revolute else 1.0)
             beyond += math.hypot(*joint.xyz)
             if joint.is_moving and not joint.is_revolute:
@@ -193,7 +193,7 @@ class RobotModel:
         return dict(zip(moving, np.abs(factors))), dict(zip(moving, np.abs(offsets).tolist()))
 
     def _travel(self, name: str) -> float:
-        """Returns the largest absolute position of a joint up to `MAX_OUTSIDE` beyond its limits [rad or m]."""
+        """Returns the largest absolute position of a joint, up to `MAX_OUTSIDE` beyond its limits [rad or m]."""
         factors, offsets = self._joint_motions
         farthest = (max(abs(joint.lower), abs(joint.upper)) + MAX_OUTSIDE for joint in self.joints)
         travels = (factor * most for factor, most in zip(factors[name].tolist(), farthest) if factor)

@@ -12,4 +12,4 @@ def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> 
     Args:
         EXTRA: ik, mpc, tags, data, gym, farm, html, assets or notebook, which stays wanted; see docs/installation.md
     """
-    print("Ready.", file=sys.stderr)  # `rpbi` has done all of it by now
+    print("Ready.", file=sys.stderr)  # the program `rpbi` has already installed and built everything

@@ -15,5 +15,5 @@ def shell(*words: Annotated[str, Argument("[-c COMMAND]", is_raw=True)]) -> None
         ./rpbi shell [-c COMMAND]
     """
     arguments = words if words[:1] == ("-c",) else ("--rcfile", str(workspace() / "dev/tools/shell.bash"))
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # ignored by Python, and inherited otherwise
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # otherwise bash would inherit Python's ignored SIGPIPE
     os.execvp("bash", ["bash", *arguments])

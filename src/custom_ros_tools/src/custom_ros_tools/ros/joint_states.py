@@ -137,7 +137,7 @@ class JointStateSubscriber(rospy.Subscriber):
         """Returns whether a valid joint state has arrived."""
         return self._newest is not None
 
-    recieved = received  # spelled as in the authors' release
+    recieved = received  # misspelt in the original package
 
     def get(self) -> JointState | None:
         """Returns the newest joint state; None before the first message."""

@@ -88,7 +88,7 @@ class SolverNode:
         rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
         self._readers = PROBLEMS
         by_type = {"solve_ik": (SolveIK, self._serve), "solve_trac_ik": (TracIK, self._serve_trac_ik)}
-        by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the authors' release
+        by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the original package
         if name == "exotica":
             self._readers = {**PROBLEMS, EXOTicaProblem._type: (EXOTicaProblem, problem_in_exotica)}
             by_type["solve"] = EXOTica, self._serve_exotica

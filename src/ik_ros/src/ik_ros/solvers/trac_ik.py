@@ -1,4 +1,4 @@
-"""The solver `trac_ik`: TRAC-IK runs two methods in parallel, and takes the faster one (Beeson and Ames 2015)."""
+"""The solver `trac_ik`: TRAC-IK runs two methods in parallel, and takes the first result (Beeson and Ames 2015)."""
 
 import math
 import random

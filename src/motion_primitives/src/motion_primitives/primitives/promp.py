@@ -213,8 +213,10 @@ class ProMP(Primitive):
         self.distribution = WeightDistribution(mean, (spread + prior * np.kron(scales, kernel)) / (count + prior))
 
     def _prior_stds(self, space: Space, weights: Array) -> Array:
-        """Returns the prior's standard deviation for each signal, shape (dof,): equal for all positions, and equal for
-        all components of the rotation vector."""
+        """Returns the prior's standard deviation for each signal, shape (dof,).
+
+        All positions have the same value, and so have all components of the rotation vector.
+        """
         extents, n = np.ptp(weights, axis=1), len(space.names)
         parts = (part for part in (extents[:n], extents[n:]) if len(part))
         return np.concatenate([np.full(len(part), PRIOR_SHARE * max(part.max(), MIN_EXTENT)) for part in parts])

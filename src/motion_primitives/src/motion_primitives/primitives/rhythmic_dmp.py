@@ -87,7 +87,10 @@ class RhythmicExecution(PathExecution):
         return state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Moves the centre to `goal` within the first period, or a quarter of a period if that is later."""
+        """Moves the centre of the motion to `goal`.
+
+        The centre arrives at the end of the first period, or a quarter of a period after the call if that is later.
+        """
         super().set_goal(goal)
         self.goal = None
 

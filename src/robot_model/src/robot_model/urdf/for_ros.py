@@ -41,7 +41,7 @@ def joined_for_ros(robots: Mapping[str, tuple[str, Pose]]) -> str:
             links and joints get the prefix `NAME_`.
 
     Raises:
-        ConfigError: If a file is no URDF, or a mesh belongs to an unknown package.
+        ConfigError: If a file is not a URDF, or a mesh belongs to an unknown package.
     """
     whole = new_element("robot", new_element("link", name=ROOT_LINK), name="_".join(robots))
     for name, (path, pose) in robots.items():
