@@ -1,6 +1,6 @@
 """Models of the YAML keys that set arguments of PyBullet's functions for rigid and soft bodies.
 
-Each model is named after a PyBullet function. Its fields are the function's keyword arguments, except the ids of
+Each model is named after a PyBullet function. A model's fields are the function's keyword arguments, except the ids of
 bodies. A test checks that PyBullet accepts each field with values of the field's type.
 """
 

@@ -61,7 +61,7 @@ MIN_REAL_TIME_FACTOR = 1e-3
 
 
 def checked_real_time_factor(factor: float) -> float:
-    """Checks a real-time factor, and returns it.
+    """Checks a real-time factor, and returns the factor.
 
     Raises:
         ValueError: If the factor is neither 0 (as fast as possible) nor a finite number >= MIN_REAL_TIME_FACTOR.
@@ -91,7 +91,7 @@ WORLD_FRAME = "rpbi/world"
 
 
 class StaticFrame(ConfigModel):
-    """A TF frame with a fixed pose. The interface publishes the frame, so no other node should."""
+    """A TF frame with a fixed pose, which the interface publishes. No other node should publish the frame."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
     parent: FrameId = Field(WORLD_FRAME, description="The frame that its pose is in.")

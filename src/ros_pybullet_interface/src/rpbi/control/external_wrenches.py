@@ -43,7 +43,7 @@ class ExternalWrenches:
     """Applies external wrenches to one body. A new wrench on a link replaces the link's previous wrench.
 
     Args:
-        body: The body. The object is used by the constructor only.
+        body: The body. The constructor keeps no reference to the object.
 
     Attributes:
         can_act: Whether at least one link of the body can move.

@@ -48,7 +48,7 @@ class Playout(NamedTuple):
         start: Time at which set points leave the previous target [ticks].
         end: Time at which set points reach this target [ticks].
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
-        speed: Interval between sending the previous target and this one, divided by the interval between playing both.
+        speed: Interval between sending the previous target and this one, divided by the interval between playing them.
         pace: Mean interval between the arrivals of recent targets [ticks].
         gap: Time from the end of extrapolation to this target's arrival [ticks]; 0 if the target came before that end.
         apart: Interval from the previous target to this one, by stamps or arrivals [ticks]; 0 if unknown.
@@ -71,18 +71,18 @@ class Playout(NamedTuple):
 class JitterBuffer:
     """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
 
-    Send times are estimated in two ways. The first estimate is the stamps, or the arrivals if stamps are not valid. It
-    suits samples at irregular intervals. The second estimate is a regular period, fitted to the first estimate. It
-    suits regular samples that a busy machine sends late. The buffer uses the estimate for which positions change more
-    smoothly over time.
+    Send times are estimated in two ways. The first estimate, for samples at irregular intervals, is the stamps, or the
+    arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late, is a
+    regular period fitted to the first estimate. The buffer uses the estimate for which positions change more smoothly
+    over time.
 
     Transport delays are never negative, so the recent target with the smallest delay counts as undelayed. The buffer
     delay is added. The sum changes slowly, except if a target comes too late for the present delay.
 
     Args:
         dt_s: Length of a tick [s].
-        buffer_s: Buffer delay [s], of which one and a half ticks are the wait for ticks. A target that arrives late by
-            less than the delay is still played on time. 0 plays targets as they come.
+        buffer_s: Buffer delay [s], including one and a half ticks for the wait until the next tick. A target that
+            arrives late by less than the delay is still played on time. 0 plays targets as they come.
     """
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
@@ -205,7 +205,8 @@ class JitterBuffer:
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
         """Estimates when the newest target would have come without delay, relative to its arrival [ticks].
 
-        The smallest delay in the window is not quite zero; an unbiased estimate for uniform delays corrects this.
+        The smallest delay of the recent targets is slightly above zero. The estimate corrects this, as for uniformly
+        distributed delays.
         """
         tick, scale, sent = self._seen[-1].tick, self._rate, times
         if regular:
@@ -217,7 +218,7 @@ class JitterBuffer:
         return undelayed
 
     def _steps(self) -> list[int]:
-        """Returns each target's number of periods relative to the newest target, 0 or negative."""
+        """Returns, for each recent target, the number of periods from the newest target to it, 0 or negative."""
         steps = [0]
         for each in list(self._seen)[:0:-1]:
             steps.append(steps[-1] - each.step)

@@ -93,7 +93,7 @@ class Schedule:
         self._numerator, self._denominator = min(per_tick, Fraction(1)).as_integer_ratio()
 
     def is_due(self, tick: int, since: int | None = None) -> bool:
-        """Returns whether work is due at a tick. At tick 0 it is always due.
+        """Returns whether work is due at a tick. At tick 0, work is always due.
 
         Args:
             tick: The tick.

@@ -26,7 +26,7 @@ class Pacer:
         real_time_factor: Simulated seconds per wall second; 0 to run as fast as possible.
 
     Attributes:
-        real_time_factor: Present real-time factor, as last set.
+        real_time_factor: The real-time factor that was set last.
     """
 
     def __init__(self, dt_s: float, real_time_factor: float = 1.0) -> None:

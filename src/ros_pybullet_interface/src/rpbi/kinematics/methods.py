@@ -16,7 +16,7 @@ from .chain import BulletChain, Target
 Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 """Function that moves m joints such that a link approaches its target, without regard to joint limits.
 
-Arguments: m start positions [rad or m]; m booleans, whether to hold each joint; the largest number of iterations.
+Arguments: m start positions [rad or m]; m booleans, whether to hold each joint; the maximum number of iterations.
 Returns m positions [rad or m].
 """
 BREAK_S = 5e-5
@@ -24,7 +24,7 @@ BREAK_S = 5e-5
 FROZEN = 1e6
 """Damping with which a joint does not move."""
 DAMPING = 1e-3
-"""Damping of the joint with the smallest weight. PyBullet's default of 0.5 needs 100 iterations instead of 10."""
+"""Damping for the relative damping 1. PyBullet's default of 0.5 needs 100 iterations instead of 10."""
 JOINT_ITERATIONS_A_CALL = 140
 """Iterations in one call of PyBullet, times the number of joints.
 
@@ -143,7 +143,7 @@ def towards_posture(
         limits: Limits of the m joints.
         rest: m positions of the posture [rad or m].
         ranges: m weights up to 1, proportional to the joints' ranges. A joint's distance from the posture is divided by
-            its weight.
+            the joint's weight.
         q: m positions of the first solution [rad or m].
         size: Maximum residual of a solution, see `Residual.size`.
 

@@ -97,7 +97,7 @@ class PybulletProblem:
         """Returns the intersection of given joint limits with the problem's limits.
 
         As in PyBullet, the problem's limits are ignored for a joint without URDF limits if the lower limit is above the
-        upper one.
+        upper limit.
 
         Args:
             limits: URDF limits of the n joints.

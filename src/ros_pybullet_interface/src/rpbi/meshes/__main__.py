@@ -22,7 +22,7 @@ from .checks import check_obj
 from .trial import MAX_CPU_S, Use, limit_resources
 
 FOUND_NOTHING = b"cannot extract anything useful"
-"""What PyBullet prints when it leaves a mesh out. For a visual mesh there is no other sign."""
+"""Text that PyBullet prints when it ignores a mesh. For a visual mesh, this text is the only sign."""
 
 
 def main() -> None:

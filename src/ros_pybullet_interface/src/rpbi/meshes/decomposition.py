@@ -1,6 +1,6 @@
 """Decomposes concave meshes into convex parts with PyBullet's V-HACD.
 
-V-HACD takes seconds and does not check its input. It therefore runs in a process of its own, `python -m
+V-HACD takes seconds and does not check its input. V-HACD therefore runs in a separate process, `python -m
 rpbi.meshes.decomposition MESH PARTS PARAMETERS`. The parts are cached; the key is a hash of the mesh's content and the
 parameters.
 """

@@ -111,8 +111,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     """Runs one trial process.
 
     Returns:
-        One message for each mesh that the process finished, and the message for the mesh at which the process failed.
-        The caller ignores the latter if all meshes are finished.
+        One message for each mesh that the process finished, and a message for the next mesh. The caller uses the last
+        message only if the process did not finish all meshes.
     """
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]

@@ -57,7 +57,7 @@ GUIDES = {
     "changeDynamics": "dynamics.md",
     "sensors": "extending.md",
 }
-"""Page that explains the keys under a heading, keyed by heading."""
+"""Page that explains the keys under a heading of the reference page, keyed by heading."""
 HEAD = ("key", "type", "default", "meaning")
 FIRST_EXAMPLES = "basic_example_kuka_lwr"
 """Folder from which the example of each kind of file is taken first; other folders follow."""
@@ -158,7 +158,7 @@ def _places(files: Mapping[str, Schema]) -> Places:
 
 
 def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> Iterator[tuple[str, Schema]]:
-    """Yields path and schema of each mapping at any depth inside a mapping, except mappings that are files too.
+    """Yields path and schema of each mapping at any depth inside a mapping, except mappings with files of their own.
 
     Args:
         mapping: Schema of the outer mapping.

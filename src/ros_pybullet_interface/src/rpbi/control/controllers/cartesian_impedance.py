@@ -59,7 +59,7 @@ class CartesianImpedanceConfig(ControllerConfig):
 class CartesianImpedanceController(Controller):
     """Pulls a point of a link to a target pose by a spring and a damper, and compensates gravity and Coriolis forces.
 
-    Its input `target` is a pose in the world. A redundant arm is pulled to the posture measured at the start, as far as
+    The input `target` is a pose in the world. A redundant arm is pulled to the posture measured at the start, as far as
     the target pose permits.
     """
 

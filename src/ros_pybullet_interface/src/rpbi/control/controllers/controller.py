@@ -81,7 +81,7 @@ class ControlledRobot(NamedTuple):
 
 
 class Controller(ABC):
-    """Base class: computes the commands of some joints of one robot before the physics of each tick.
+    """Base class of controllers. Computes the commands of some joints of one robot before the physics of each tick.
 
     A subclass defines `Config` and `compute`; see docs/controllers.md. The simulation thread makes all calls except
     those of `check`.

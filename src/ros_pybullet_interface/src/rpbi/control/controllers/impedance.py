@@ -182,7 +182,7 @@ def force_for(mobility: Array, acceleration: Array) -> Array:
     """Returns the wrench [N, N m], shape (6,), that gives a point of an arm an acceleration.
 
     Args:
-        mobility: Mobility matrix of the point, shape (6, 6). It may be singular, since `ROUNDING` is added.
+        mobility: Mobility matrix of the point, shape (6, 6). It may be singular, since `ROUNDING` is added first.
         acceleration: Acceleration of the point [m/s^2, rad/s^2], shape (6,).
     """
     return solve(mobility + ROUNDING, acceleration)

@@ -28,7 +28,7 @@ class JointImpedanceConfig(JointSprings, ControllerConfig):
 class JointImpedanceController(Controller):
     """Pulls joints to target positions by springs and dampers, and compensates gravity and Coriolis forces.
 
-    Its input `target` holds positions [rad or m], and optionally efforts [N m or N] to add.
+    The input `target` holds positions [rad or m], and optionally efforts [N m or N] to add.
     """
 
     Config = JointImpedanceConfig

@@ -139,8 +139,8 @@ class TrajectoryFollower:
     def desired(self, time_s: float) -> DesiredState:
         """Returns the desired state of the follower's joints at a time of the world [s].
 
-        For joints without a trajectory, this is the motors' target under position control. In other modes it is the
-        measured position.
+        The desired position of a joint without a trajectory is the motor's target under position control, and the
+        measured position in other modes.
         """
         running = self._running
         trajectories = {} if running is None else running.trajectories

@@ -78,8 +78,8 @@ class GoalTolerances(NamedTuple):
     Attributes:
         path: Tolerances before the end of the trajectory, keyed by joint name.
         goal: Tolerances at the end, keyed by joint name.
-        goal_time_s: Time to reach the goal after the end [s]. 0 selects the configured time, a negative number sets no
-            limit.
+        goal_time_s: Time allowed for reaching the goal after the trajectory's end [s]. 0 selects the configured time, a
+            negative number sets no limit.
     """
 
     path: Mapping[str, JointTolerance] = {}
@@ -93,7 +93,7 @@ class Tolerances(NamedTuple):
     Attributes:
         path: Tolerances before the end of the trajectory, keyed by joint index.
         goal: Tolerances at the end, keyed by joint index.
-        goal_time_s: Time to reach the goal after the end [s].
+        goal_time_s: Time allowed for reaching the goal after the trajectory's end [s].
     """
 
     path: Mapping[int, JointTolerance]

@@ -108,7 +108,7 @@ class Trajectory:
         return _evaluated(self.segments[bisect_right(self._starts, time_s) - 1], time_s)
 
     def spliced(self, new: Trajectory, at_s: float) -> Trajectory:
-        """Returns a trajectory that equals this one until a time and another one from then on.
+        """Returns a trajectory that equals this trajectory until a transition and `new` from then on.
 
         Args:
             new: The other trajectory, of the same joints.
@@ -153,7 +153,7 @@ class Trajectory:
 def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float) -> Trajectory:
     """Returns the minimum-jerk motion from rest to rest (Flash and Hogan, 1985).
 
-    The motion is the quintic with zero velocity and acceleration at both ends. Its highest speed is 15/8 of its mean
+    The motion is the quintic with zero velocity and acceleration at both ends. The peak speed is 15/8 of the mean
     speed.
 
     Args:
@@ -224,7 +224,7 @@ class TrajectoryStateSample(NamedTuple):
     Attributes:
         name: Name of the robot.
         joint_names: n joint names.
-        desired: Desired state of the n joints; without a trajectory, the positions at which the motors hold.
+        desired: Desired state of the n joints, as returned by `TrajectoryFollower.desired`.
         position: n measured positions [rad or m].
         velocity: n measured velocities [rad/s or m/s].
         time_from_start_s: Time since the start of the trajectory [s]; 0 without a trajectory.
