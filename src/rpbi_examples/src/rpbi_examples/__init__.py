@@ -1,1 +1,1 @@
-"""Worlds, robots, launch files, and short programs that the launch files run."""
+"""Examples: worlds, robots, launch files, and the short programs that launch files run."""

@@ -28,7 +28,8 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
         duration_s: ROS time in which the messages were received [s].
 
     Returns:
-        One row for each topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
+        One row for each topic with the columns `messages`, `rate_hz`, `expected_hz`, and `enough`: whether the measured
+        rate reaches the share `ENOUGH` of the expected rate.
     """
     table = pd.DataFrame({"expected_hz": pd.Series(expected_hz, dtype=float)})
     table.index.name = "topic"
@@ -40,14 +41,14 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
 
 
 def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
-    """Computes the errors between joint positions and the latest targets at the same time.
+    """Computes the differences between joint positions and the latest targets at each time of `states`.
 
     Args:
         states: Joint states with columns `position/JOINT`, indexed by time [s].
-        targets: Joint targets with the same columns and index.
+        targets: Joint targets with the same columns, indexed by time [s].
 
     Returns:
-        One row for each joint with the columns `rms` and `max` [rad or m].
+        One row for each joint with the columns `rms` and `max` (largest absolute difference) [rad or m].
     """
     columns = [column for column in targets.columns if column.startswith("position/")]
     latest = targets[columns].ffill()
@@ -88,11 +89,11 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
 
 
 def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
-    """Returns the sum of the normal forces of one other body [N], indexed by time [s]. The sum is 0 without contact.
+    """Returns the sum of the normal forces between a body and another body [N], indexed by time [s].
 
     Args:
         contacts: Contacts of a body, indexed by time [s]. Each contact is a row with the columns `other_body` and
-            `normal_force`. A time without contact also has a row.
+            `normal_force`. A time without contact also has a row; the sum is then 0.
         other_body: Name of the other body.
     """
     if "other_body" not in contacts:  # no contact in the whole recording
@@ -110,7 +111,7 @@ def force_figures(push: pd.Series) -> dict[str, float]:
 
 
 def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
-    """Writes a picture of three forces over time [N]: arm on box, limit of the floor's friction, and at the wrist.
+    """Writes a picture with the push on the box, the floor's friction limit, and the force in the wrist over time [N].
 
     Args:
         push: Force of the arm on the box [N], indexed by time [s].
@@ -164,7 +165,7 @@ def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]
 
 
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], world: str) -> list[str]:
-    """Returns lines of text with cause and remedy for each rate that is too low.
+    """Returns lines of text with cause and remedy for rates that are too low.
 
     Args:
         summary: The summary of the recording.

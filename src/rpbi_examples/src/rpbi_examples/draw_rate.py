@@ -1,4 +1,4 @@
-"""Measures how fast this machine draws images of a world, without physics and ROS. Cameras cannot be faster."""
+"""Measures how fast this machine draws images of a world without physics and ROS: an upper limit for camera rates."""
 
 import argparse
 import json
@@ -20,13 +20,13 @@ TIMEOUT_S = 120.0
 def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> float:
     """Measures the rate at which images of the world's camera are drawn.
 
-    The measurement runs in a separate process with normal priority, since some graphics drivers crash.
+    The measurement runs in a separate process, since some graphics drivers crash.
 
     Args:
         world: Main YAML file.
         camera: Pose of the camera's optical frame in the world.
         seconds: Duration of the measurement [s].
-        renderer: Name of the renderer to measure, as in the diagnostics.
+        renderer: Name of the renderer, as in the diagnostics of the simulator.
 
     Returns:
         Number of images per second, each with colour and depth.
@@ -75,7 +75,7 @@ def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
 
 
 def main() -> None:
-    """Runs `measure` with arguments of the command line, and prints the number of images per second as JSON."""
+    """Runs `measure` with arguments from the command line, and prints the number of images per second as JSON."""
     parser = argparse.ArgumentParser(prog=__name__)
     parser.add_argument("world")
     parser.add_argument("seconds", type=float)

@@ -59,11 +59,11 @@ class Balance(Controller):
     """Makes a humanoid stand on both feet and move a hand to a target.
 
     Every `period_ticks` ticks, a quadratic program computes joint efforts. The efforts bring the capture point over the
-    midpoint between the feet, and the hand to its target. They keep the torso upright, and keep the initial posture and
-    the initial height of the centre of mass. The feet must neither slide nor tip.
+    midpoint between the feet, and the hand to its target. The efforts also keep the torso upright, the initial posture,
+    and the initial height of the centre of mass. Constraints prevent the feet from sliding and tipping.
 
-    The input `target` is the desired pose of the hand's point in the world. Until the first target arrives, the arm
-    keeps its posture.
+    The input `target` is the desired pose, in the world, of the point `point` on the link `hand`. Until the first
+    target arrives, the arm keeps its posture.
     """
 
     Config = BalanceConfig
@@ -82,7 +82,7 @@ class Balance(Controller):
         return check_pose(value.pose if isinstance(value, PoseTarget) else value)
 
     def start(self, state: RobotState, tick: int) -> None:
-        """Stores the measured posture, yaw, and height of the centre of mass as goals."""
+        """Stores the present joint positions, yaw of the first sole, and height of the centre of mass as goals."""
         seed, period_s = self.config.noise_seed, self.config.period_ticks * self.arm.dt_s
         self._estimate = None if seed is None else BaseEstimate(state.base, period_s, seed)
         self._robot.update(state)
@@ -107,8 +107,8 @@ class Balance(Controller):
         return self._efforts
 
     def report(self) -> Mapping[str, float]:
-        """Returns the distances of the centre of mass and of the hand from their goals [m], and the number of times
-        that the quadratic program had no solution.
+        """Returns the horizontal distance of the centre of mass from the midpoint between the feet [m], the distance of
+        the hand from its target [m], and the number of times that the quadratic program had no solution.
         """
         return {**self._errors, "unsolved": float(self._unsolved)}
 
@@ -151,7 +151,7 @@ class Balance(Controller):
 
 
 def _yaw_only(rotation: Array) -> Array:
-    """Returns the rotation about the vertical with the same yaw as a given rotation; both have the shape (3, 3)."""
+    """Returns the rotation about the vertical that has the yaw of `rotation`. Both matrices have the shape (3, 3)."""
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))

@@ -23,13 +23,13 @@ FREE = 6
 class FrameMotion(NamedTuple):
     """Motion of a frame, or of the centre of mass, for a robot with n velocities.
 
-    The arrays have 6 rows for a frame: 3 linear rows [m] and then 3 angular rows [rad]. They have 3 rows for the centre
-    of mass.
+    For a frame, the arrays have 6 rows: 3 linear rows [m] and then 3 angular rows [rad]. For the centre of mass, the
+    arrays have 3 linear rows.
 
     Attributes:
         jacobian: Maps the robot's velocities to `velocity`, shape (6, n) or (3, n).
         velocity: Velocity, shape (6,) or (3,).
-        drift: Acceleration while the robot's velocities are constant, shape (6,) or (3,).
+        drift: Acceleration at constant velocities of the robot (dJ/dt v), shape (6,) or (3,).
     """
 
     jacobian: Array
@@ -41,11 +41,11 @@ class FloatingRobot:
     """Computes mass matrix, bias and kinematics of a robot with a floating base.
 
     The robot has n velocities: 6 of the base and one for each joint. `update` sets the attributes that depend on the
-    state.
+    state. In the attributes, joints are in Pinocchio's order; see `in_given_order`.
 
     Args:
         urdf_filename: The robot's URDF file.
-        joints: Names of all movable joints, in the order of the joint values that `update` receives.
+        joints: Names of all movable joints, in the order of the joint values in the states for `update`.
 
     Attributes:
         mass_matrix: Mass matrix, shape (n, n).
@@ -53,9 +53,9 @@ class FloatingRobot:
         positions: Positions of the joints, shape (n - 6,) [rad].
         velocities: Velocities of base and joints, shape (n,) [m/s, rad/s].
         count: The number n of velocities.
-        effort_limits: Largest efforts of the joints, shape (n - 6,) [N m].
-        lower: Least positions of the joints, shape (n - 6,) [rad].
-        upper: Greatest positions of the joints, shape (n - 6,) [rad].
+        effort_limits: Effort limits of the joints, shape (n - 6,) [N m].
+        lower: Lower position limits of the joints, shape (n - 6,) [rad].
+        upper: Upper position limits of the joints, shape (n - 6,) [rad].
         centre: The centre of mass in the world, shape (3,) [m].
 
     Raises:
@@ -146,12 +146,12 @@ def rotation_of(quat_xyzw: Quaternion) -> Array:
 
 
 def turn_between(start: Array, end: Array) -> Array:
-    """Returns the rotation vector [rad] from `start` to `end`, two rotation matrices, in the world's axes."""
+    """Returns the rotation vector, in the world's axes, from the rotation matrix `start` to `end` [rad]."""
     turn: Array = pin.log3(end @ start.T)
     return turn
 
 
 def turned(start: Array, turn: Array) -> Array:
-    """Rotates `start`, a rotation matrix, by a rotation vector [rad] in the world's axes, and returns the result."""
+    """Rotates the rotation matrix `start` by a rotation vector in the world's axes [rad], and returns the result."""
     end: Array = pin.exp3(turn) @ start
     return end

@@ -1,7 +1,7 @@
 """Finds the largest push that Talos withstands in each direction: `python -m rpbi_examples.balance.largest_push`.
 
-Talos withstands a push if the scene `talos` succeeds: the feet have not moved, the torso is upright, and the hand is at
-rest at its target.
+Talos withstands a push if an episode of the scene `talos` succeeds: the feet have not moved, the torso is upright, and
+the hand is at rest at its target.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MOST, STEP = 80.0, 2.5
 
 
 def stands(env: WorldEnv, seed: int, angle: float, impulse: float) -> bool:
-    """Runs an episode with a given push, and returns whether the scene succeeds.
+    """Runs an episode with a given push, and returns whether the episode succeeds.
 
     Args:
         env: Environment of the scene `talos`.
@@ -108,7 +108,7 @@ def draw(pushes: Mapping[str, float], path: Path) -> None:
 
 
 def main() -> None:
-    """Computes and prints the table, or reads it from the file `--table`. With `--out`, also draws the table."""
+    """Computes and prints the table, or reads a table from the file `--table`. With `--out`, also plots the table."""
     parser = argparse.ArgumentParser(description="Finds the largest push that Talos withstands, by direction.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the start and the target (default: 1)")
     parser.add_argument("--out", type=Path, help="picture of the table")

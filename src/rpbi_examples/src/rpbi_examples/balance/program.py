@@ -30,18 +30,19 @@ FOOT_DAMPING = 20.0
 
 
 class WholeBodyProgram:
-    """Finds the joint efforts t that fulfil the tasks of a whole body best.
+    """Finds the joint efforts t with which a robot best fulfils its tasks.
 
     The unknowns of the quadratic program are the accelerations a of base and joints, and the wrenches w on the feet.
-    The cost is the weighted sum of the tasks' squared errors and of w squared. With the mass matrix M, the bias b, the
-    selection S of the joints, the Jacobian J of the feet, and the robot's velocities v, the constraints are:
+    The cost is a weighted sum of the squared errors of tasks and posture, with small weights on the squares of a and w.
+    With the mass matrix M, the bias b, the selection S of the joints, the Jacobian J of the feet, and the robot's
+    velocities v, the constraints are:
 
     - Dynamics: M a + b = S^T t + J^T w, with t within the effort limits. The efforts follow from a and w.
     - Feet at rest: J a + dJ/dt v = -`FOOT_DAMPING` J v.
     - Soles that neither slide nor tip: C w <= 0.
     - Soft bounds on joint accelerations, which keep the joints within their position limits.
 
-    The solver starts without the last solution, so a solution depends only on robot and tasks.
+    The solver is not warm-started, so a solution depends only on robot and tasks.
 
     Args:
         robot: The robot, whose attributes `solve` reads.

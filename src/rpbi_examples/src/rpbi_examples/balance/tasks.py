@@ -22,7 +22,7 @@ LEASH_M, LEASH_RAD = 0.05, 0.3
 
 
 class AccelerationTask(NamedTuple):
-    """Desired accelerations a of the robot: `jacobian @ a = wanted`.
+    """Condition that the accelerations a of the robot should fulfil: `jacobian @ a = wanted`.
 
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
@@ -78,10 +78,10 @@ def capture(
 ) -> AccelerationTask:
     """Returns the task that brings the capture point over a goal on the floor.
 
-    The centre of mass c moves like a linear inverted pendulum: c'' = w^2 (c - p) with w^2 = g / height. The capture
-    point is c + c'/w. The task places the centre of pressure p beyond the capture point, as seen from the goal, which
-    pushes the capture point back to the goal. Source: Englsberger et al., "Bipedal walking control based on capture
-    point dynamics", IROS 2011.
+    The centre of mass c moves like a linear inverted pendulum over the centre of pressure p: c'' = w^2 (c - p) with
+    w^2 = g / height. The capture point is c + c'/w. As seen from the goal, the task places p beyond the capture point.
+    The capture point then moves back to the goal. Source: Englsberger et al., "Bipedal walking control based on
+    capture point dynamics", IROS 2011.
 
     Args:
         motion: Motion of the centre of mass.
@@ -98,10 +98,10 @@ def capture(
 
 
 class Approach:
-    """A moving pose between the hand and its target, which approaches the target at limited speed.
+    """A pose that moves from the hand to the hand's target at limited speed.
 
     A critically damped spring with limited force pulls the position towards the target. The limit of the force limits
-    the speed. The pose stays near the hand, so that a target out of reach does not make the robot fall.
+    the speed. The pose stays near the hand, so that an unreachable target does not make the robot fall.
 
     Args:
         position: Initial position, shape (3,) [m].

@@ -61,15 +61,15 @@ def demo(
     strict: Annotated[bool, Argument("")] = False,
     out: Annotated[Path, Argument("FOLDER", parse=Path, files="*")] = Path("out/demo"),
 ) -> int:
-    """A KUKA arm moves in a contact simulation, is seen by a camera, recorded and tabulated.
+    """Simulates a KUKA arm that pushes a box, records topics and camera images, and writes plots and tables.
 
-    It has a ROS master of its own. `./rpbi replay` runs its recording again.
+    The demo runs on a separate ROS master. `./rpbi replay` simulates the recording again and compares the states.
 
     Args:
-        seconds: duration of the recording [s], 2 to 3600; 10 without it
-        headless: no window, even if there is a screen
-        strict: a machine that is too slow is a failure
-        out: folder for pictures, tables and the recording; out/demo without it
+        seconds: duration of the recording [s], 2 to 3600; default 10
+        headless: does not open windows, even if a display is available
+        strict: also fails if the machine is too slow for a topic's rate
+        out: folder for pictures, tables and the recording; default out/demo
     """
     if not 2.0 <= seconds <= 3600.0:
         raise UsageError(f"--seconds: expected 2 to 3600, got {seconds:g}")
@@ -147,8 +147,8 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
 
 
 def _start_world() -> None:
-    """Calls the service that starts the world, in a separate process `rosservice`. While rospy itself waits for a
-    service, it suppresses exceptions of signal handlers.
+    """Calls the service that starts the world. A separate process, `rosservice`, makes the call: rospy would suppress
+    exceptions of signal handlers while waiting for the service.
     """
     command = ["rosservice", "call", "/rpbi/start"]
     try:
@@ -229,7 +229,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
 
 def _friction(world: LoadedWorld, *names: str) -> float:
-    """Returns the coefficient of friction between objects: the product of their own coefficients, as in PyBullet."""
+    """Returns the coefficient of friction between objects: as in PyBullet, the product of the objects' coefficients."""
     configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
     return math.prod(configs[name].changeDynamics.lateralFriction for name in names)
 
@@ -265,7 +265,7 @@ def _static_pose(bag: Path, frame: str) -> Pose:
 
 
 def _middle_image(bag: Path, topic: str, dtype: type, channels: int) -> np.ndarray | None:
-    """Returns the image at half of the recording, shape (height, width, channels). None without an image."""
+    """Returns the middle image of a topic, shape (height, width, channels). None if the topic has no image."""
     with BagReader(bag) as recording:
         count = recording.counts.get(topic, 0)
         for number, each in enumerate(recording.messages([topic])):

@@ -47,33 +47,33 @@ def launch(
     example: Annotated[str, Argument("EXAMPLE", offers="examples", files="*.@(launch|yaml)", is_raw=True)] = "",
     *arguments: Annotated[str, Argument("[ARGUMENT ...]", offers="launch_arguments", is_raw=True)],
 ) -> int:
-    """Runs an example, a world of your own or a launch file, until Ctrl-C; without a name, it lists the examples.
+    """Runs an example, a world file or a launch file until Ctrl-C. Without a name, lists the examples.
 
-    An argument that the launch file lacks is refused; the message lists its arguments. The exit code is 1 if a node
-    that the
-    launch file calls required has ended with an error.
+    Arguments that the launch file does not declare are rejected; the message lists the declared arguments. The exit
+    code is 1 if a node with required="true" has ended with an error.
 
-    ROS stops a running simulator when another one of the same name starts, so that is refused. Either give the second a
-    master of its own, or give both a namespace. Only `world.launch`, by which worlds of your own run, has a prefix for
-    TF; TF frames of two examples on one master have the same names, so take a master for each:
+    ROS stops a running node when another node with the same name starts. Therefore, a second simulator with the same
+    name is rejected. Start the second simulator on a separate ROS master, or start both simulators in namespaces.
+    Use separate masters for examples, since TF frames of examples have the same names. Only world files, which
+    `world.launch` runs, have a prefix for TF frames:
 
         ./rpbi launch grasp_example -p 11312
-        export ROS_MASTER_URI=http://localhost:11312      # in the terminals that are to see it
-        ./rpbi launch world.yaml --ns left                # two of your own, on one master
+        export ROS_MASTER_URI=http://localhost:11312      # in each terminal that uses this master
+        ./rpbi launch world.yaml --ns left                # two world files on one master
         ./rpbi launch world.yaml --ns right
 
     Usage:
         ./rpbi launch [EXAMPLE | WORLD.yaml | FILE.launch | PACKAGE FILE.launch [NAME:=VALUE ...]]
 
     Args:
-        NAME:=VALUE: an argument of the launch file; examples have headless, rviz, gui, real_time_factor, start;
-            worlds have controls, too
-        --ns NAMESPACE: of all its nodes, beside another simulator; its TF frames get the prefix NAMESPACE,
-            its clock is the wall's
-        --replace: stops the simulator that runs under the same name, with its launch, and waits for that
-        -p PORT: of a ROS master of its own, on this machine
-        --ros-args: lists the arguments that it has, with their meaning
-        --screen: shows the output of all nodes; further options are those of roslaunch
+        NAME:=VALUE: value of an argument of the launch file; most examples have headless, rviz, gui,
+            real_time_factor and start; world files also have controls
+        --ns NAMESPACE: runs all nodes in this namespace and with wall time; TF frames of a world file get the
+            prefix NAMESPACE
+        --replace: stops a running simulator with the same name and its roslaunch, and waits until both have ended
+        -p PORT: port of a separate ROS master on this machine
+        --ros-args: lists the arguments of the launch file and their meanings
+        --screen: shows the output of all nodes; other options of roslaunch are also accepted
     """
     given = [example, *arguments] if example else []
     examples = {path.stem: path for path in sorted((workspace() / "src/rpbi_examples/launch").glob("*.launch"))}
@@ -106,7 +106,7 @@ def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tu
     """Finds the launch file to run.
 
     Args:
-        name: An example, a launch file, or a package.
+        name: Name of an example or a package, or path of a launch file.
         rest: Words after `name` on the command line. For a package, the first word is its launch file.
         examples: Launch files of the examples, indexed by name.
 
@@ -187,7 +187,7 @@ def _purpose(path: Path) -> str:
 
 
 def _options() -> argparse.ArgumentParser:
-    """Returns the parser of the options that `launch` has in addition to roslaunch's options."""
+    """Returns the parser of the options that `launch` itself interprets."""
     parser = argparse.ArgumentParser(prog="launch", add_help=False, allow_abbrev=False)
     parser.add_argument("--ns")
     parser.add_argument("--replace", action="store_true")
@@ -196,7 +196,7 @@ def _options() -> argparse.ArgumentParser:
 
 
 def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str]) -> None:
-    """Raises an UnknownNameError if an argument is not declared by the launch file; roslaunch would ignore it."""
+    """Raises an UnknownNameError for an argument that the launch file does not declare. roslaunch would ignore it."""
     for argument in arguments:
         name, is_given, _ = argument.partition(":=")
         if is_given and name not in known and not name.startswith("_"):  # reserved by ROS, such as __ns
@@ -223,7 +223,7 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
 
 def _make_way(file: Path, options: argparse.Namespace) -> None:
-    """Checks that the launch would not stop a running simulator. With `--replace`, stops that simulator instead.
+    """Checks that the launch would not stop a running simulator. With `--replace`, stops such a simulator first.
 
     Raises:
         InterfaceError: If the launch would stop a simulator without `--replace`. Also if `--ns` is given although a

@@ -27,24 +27,25 @@ def score(
     noise: Annotated[bool, Argument("")] = False,
     jobs: Annotated[int | None, Argument("N", parse=int)] = None,
 ) -> int:
-    """Runs a scene from many random starts, as fast as possible, and reports how often it succeeds.
+    """Runs episodes of a scene with random starts as fast as possible, and reports the number of successes.
 
         ./rpbi score cup --seeds 1-100 --json cup.json
 
-    It needs no ROS master. Success is determined from the state of the simulation. A seed leads to the same episode in
-    any process, also in the example's launch file: `./rpbi launch cup seed:=17`. FOLDER/SCENE_failures.png has
-    pictures of the ends of failed episodes. After Ctrl-C it reports the episodes that have ended; see docs/examples.md.
+    A ROS master is not needed. Success is determined from the true state of the simulation. The same seed leads to the
+    same episode in any process, also with the scene's launch file: `./rpbi launch cup seed:=17`. The picture
+    FOLDER/SCENE_failures.png shows the ends of failed episodes. After Ctrl-C, the command reports the episodes that
+    have ended. See docs/examples.md.
 
     Usage:
         ./rpbi score SCENE [--seeds A-B] [--json FILE] [--out FOLDER] [--noise] [--jobs N]
 
     Args:
-        scene: {choices}; or module:Class of your own
-        seeds: the seeds, such as 1-100 or 17; 1-100 without it
-        json: file of the results, a row for each seed
-        out: folder of the pictures; out/score without it
-        noise: poses are sensed with noise and delay, as in the launch file with noise:=true; a score of its own
-        jobs: episodes at once, each in a process of its own; the number of processors without it
+        scene: {choices}; or module:Class for your own scene
+        seeds: a range of seeds such as 1-100, or one seed; default 1-100
+        json: file for the results, with a row for each seed
+        out: folder for the pictures; default out/score
+        noise: poses are sensed with noise and delay, as with noise:=true in the launch file
+        jobs: number of processes, each of which runs one episode at a time; default: number of processors
     """
     if ":" not in scene and scene not in SCENES:
         raise UnknownNameError("scene", scene, list(SCENES))
