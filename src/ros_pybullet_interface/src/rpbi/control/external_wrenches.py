@@ -28,7 +28,7 @@ class ExternalWrench(NamedTuple):
         point: Point of application, in the link's URDF frame [m].
         in_link_axes: Whether force and torque are given in the link's axes, and so rotate with the link. If not, they
             are given in the world's axes.
-        duration_s: Duration [s] of the world's time; None to act until another wrench replaces this one.
+        duration_s: Duration in the world's time [s]; None to act until another wrench replaces this one.
     """
 
     force: Vector

@@ -75,7 +75,7 @@ class ResolvedCommand(NamedTuple):
     """A target that was checked for one control mode.
 
     Attributes:
-        mode: This control mode.
+        mode: The control mode.
         values: Positions, velocities or efforts, keyed by joint index.
         velocities: For position targets: velocities at the target positions, keyed by joint index; may be empty.
         stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
@@ -87,9 +87,9 @@ class ResolvedCommand(NamedTuple):
     stamp_ns: int = 0
 
     def merged(self, newer: ResolvedCommand) -> ResolvedCommand:
-        """Returns a newer target, extended by this target's values for other joints, and without velocities.
+        """Returns a newer target, extended by this target's values for joints that the newer target lacks.
 
-        If the control modes differ, returns the newer target unchanged.
+        The result has no velocities. If the control modes differ, returns the newer target unchanged.
         """
         return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
 
@@ -126,7 +126,7 @@ class Motors:
 
     Args:
         mode: Initial control mode.
-        gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index. Missing gains get defaults.
+        gains: PyBullet's `positionGain` and `velocityGain`, keyed by joint index. Defaults are PyBullet's.
         limit_reports: Logs position targets beyond the joints' limits.
         enforce_effort_limits: Whether efforts are clipped to the URDF's effort limits.
         timeout_s: Age at which velocity and effort targets expire, in the world's time [s].
@@ -216,7 +216,7 @@ class Motors:
             self._drive(index, self.targets[index])
 
     def check(self, target: JointCommand) -> ResolvedCommand:
-        """Checks a target for the present control mode, and resolves joint names to indices. Any thread may do so.
+        """Checks a target for the present control mode, and resolves joint names. Any thread may call this method.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -365,7 +365,7 @@ class Motors:
     def limited(self, index: int, value: float) -> float:
         """Clips a target to the limits of a joint, and returns the result.
 
-        In position modes, positions are clipped to the joint's range, and clipping is logged. Under velocity control,
+        In position modes, positions are clipped to the joint's range, and a warning is logged. Under velocity control,
         the URDF's velocity limit applies. Under torque control, the URDF's effort limit applies.
 
         Args:

@@ -20,7 +20,7 @@ class RobotDynamics:
     """Computes the dynamics and kinematics of a robot with n driven joints and a base at rest.
 
     Loads the robot a second time, into a PyBullet client of its own, at the first computation. PyBullet uses the
-    recursive Newton-Euler and composite-rigid-body algorithms. The results agree with Pinocchio's to rounding, and a
+    recursive Newton-Euler and composite-rigid-body algorithms. The results equal Pinocchio's up to rounding, and a
     call takes 1 to 5 microseconds. Attached bodies, and changes of the robot after loading, are not modelled. Joint
     values are in the order of `JointModel.driven`.
 

@@ -127,7 +127,7 @@ class ChangeWatch:
         self.unrecorded = ""
 
     def watched(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Wraps a PyBullet function: a call outside recording methods sets `unrecorded` to `name`."""
+        """Wraps a PyBullet function so that the first call outside recording methods sets `unrecorded` to `name`."""
 
         def call(*arguments: Any, **options: Any) -> Any:
             if not self.recording and not self.unrecorded:
@@ -206,7 +206,7 @@ def _screen() -> Iterator[None]:
     """Checks that there is an X11 screen, and holds a connection to the screen during a `with` block.
 
     Without a screen, PyBullet would end the process. The connection is held until PyBullet has connected, since a
-    virtual screen restarts when its last connection closes.
+    virtual screen restarts when the last connection to the screen closes.
 
     Raises:
         PhysicsError: If there is no screen.

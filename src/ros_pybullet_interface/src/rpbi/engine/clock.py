@@ -10,9 +10,9 @@ SLOWEST_HZ = Fraction(1, 1_000_000)
 class Clock:
     """Counts ticks, and assigns a stamp to each tick.
 
-    Each stamp is greater than all stamps before. Simulated stamps are exact: tick `n` has the stamp `(n + 1) * dt`. The
-    initial state therefore has the stamp dt, since a stamp of 0 means "no time yet" in ROS. When the world is reset,
-    ticks begin at 0 again, and stamps continue to increase.
+    Each stamp is greater than all stamps before. Simulated stamps are exact: before a reset, tick `n` has the stamp
+    `(n + 1) * dt`. The initial state has the stamp dt, since a stamp of 0 means "no time yet" in ROS. When the world is
+    reset, ticks begin at 0 again, and stamps continue to increase.
 
     Args:
         time_step_s: Length of a tick [s], rounded to whole nanoseconds.

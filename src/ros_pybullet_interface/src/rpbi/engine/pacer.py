@@ -38,7 +38,7 @@ class Pacer:
         self.set_factor(real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Sets the real-time factor, and restarts."""
+        """Sets the real-time factor, and calls `restart`."""
         self.real_time_factor = real_time_factor
         self._period_s = self._dt_s / real_time_factor if real_time_factor else 0.0
         self.restart()
@@ -96,7 +96,7 @@ class Pacer:
 
 
 class Load(NamedTuple):
-    """Time that the process has used, either until now or between two instants.
+    """Times used and ticks made by the process, either until now or between two instants.
 
     Attributes:
         wall_s: Time by a monotonic wall clock [s].
@@ -114,7 +114,7 @@ class Load(NamedTuple):
 
     @classmethod
     def now(cls, physics_s: float, ticks: int) -> Load:
-        """Returns the time used until now. The thread that runs the world must make the call.
+        """Returns the times used and ticks made until now. The thread that runs the world must make the call.
 
         Args:
             physics_s: Wall time spent in PyBullet's steps [s].
@@ -123,7 +123,7 @@ class Load(NamedTuple):
         return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)
 
     def since(self, before: Load) -> Load:
-        """Returns the time used since an earlier instant."""
+        """Returns the times used and ticks made since an earlier instant."""
         wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
         return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 

@@ -42,7 +42,7 @@ class JointSprings(ConfigModel):
     )
 
     def by_joint(self, key: str, joints: Iterable[Joint]) -> Array:
-        """Returns the values of a key for joints, shape (n,). Joints that the configuration lacks get the default.
+        """Returns the value of a key for each joint, shape (n,). Joints without a configured value get the default.
 
         Args:
             key: `stiffness` or `damping_ratio`.
@@ -179,10 +179,10 @@ def implicit_wrench(
 
 
 def force_for(mobility: Array, acceleration: Array) -> Array:
-    """Returns the wrench [N, N m], shape (6,), that gives a point of an arm an acceleration.
+    """Returns the wrench [N, N m], shape (6,), that accelerates a point of an arm by `acceleration`.
 
     Args:
-        mobility: Mobility matrix of the point, shape (6, 6). It may be singular, since `ROUNDING` is added first.
+        mobility: Mobility matrix of the point, shape (6, 6), which may be singular.
         acceleration: Acceleration of the point [m/s^2, rad/s^2], shape (6,).
     """
     return solve(mobility + ROUNDING, acceleration)
