@@ -19,7 +19,7 @@ from .motion import CommandedMotion, State
 class CheckConformance:
     """Tests that every check has to pass.
 
-    A subclass names the check, its options and a robot, and provides one safe and one unsafe motion.
+    A subclass names a check, the check's options and a robot, and provides one safe and one unsafe motion.
 
     Attributes:
         check_name: Name of the check in `CHECKS`, or `"their_package.module:Class"`.
@@ -50,7 +50,7 @@ class CheckConformance:
     # --- Helpers for a subclass
 
     def motion(self, start: State, command: Any) -> CommandedMotion:
-        """Returns the motion of a command, without the braking after it."""
+        """Returns a motion that consists of a command without the braking that would follow."""
         return CommandedMotion(self.robot, start, np.array(command, dtype=float), self.period_s)
 
     @property

@@ -1,4 +1,4 @@
-"""Check of the first target after a start: the target has to be safe and near the robot."""
+"""Check of the first target after `Guard.start`: the target has to be safe and near the robot."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ UNKNOWN = (
 
 
 class FirstTarget:
-    """Checks the first target after a start.
+    """Checks the first target after `Guard.start`.
 
     Args:
         config: Configuration of the guard.
@@ -40,10 +40,10 @@ class FirstTarget:
         self._config, self._robot, self._checks = config, robot, checks
 
     def judged(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> State | Violation:
-        """Returns the state at rest from which the robot starts, or the violation that forbids the start.
+        """Returns the guard's initial state, in which the robot rests, or the violation that forbids the start.
 
         Args:
-            target: n positions [rad or m].
+            target: The first target, n positions [rad or m].
             last: The n positions of the last command [rad or m]; None before the first command.
             context: Context of the checks, with the measured positions.
         """
@@ -88,7 +88,7 @@ class FirstTarget:
         return "rad" if self._robot.joints[i].is_revolute else "m"
 
     def _far_outside(self, there: np.ndarray) -> Violation | None:
-        """Returns a violation if a joint is so far outside its limits that the reach of links is unknown."""
+        """Returns a violation if a joint is so far beyond its limits that `RobotModel.reach` is invalid; else None."""
         for name in self._robot.telescopic:
             i = self._robot.joint_names.index(name)
             joint, position = self._robot.joints[i], float(there[i])

@@ -1,4 +1,4 @@
-"""The guard: decides on the command to the robot for each target."""
+"""The guard, which decides for each target which command the robot receives."""
 
 import logging
 import math
@@ -31,7 +31,7 @@ MENDED_BY_BRAKING = ("joint_velocity", "joint_acceleration", "joint_jerk", "join
 
 
 class Decision(NamedTuple):
-    """Answer of a guard to a target.
+    """A guard's decision about a target.
 
     Attributes:
         command: The n positions to command [rad or m]. A safe target that is not smoothed is commanded unchanged. None:
@@ -58,15 +58,15 @@ class _Safe(NamedTuple):
 class Guard:
     """Passes on safe targets, and replaces or refuses unsafe targets.
 
-    A target is safe if both the target and the braking that would follow it pass every check. After every command, a
-    known braking can therefore bring the robot to rest within all limits.
+    A target is safe if the target and the braking that would follow both pass every check. After every command, a known
+    braking can therefore bring the robot to rest within all limits.
 
-    Except at a start, motions are computed from the previous command, never from a measurement. Every command counts as
-    lasting one period, whatever its stamp is, so stamps cannot make the robot faster. The caller ensures that commands
-    are at least a period apart.
+    Except at a start, motions are computed from the previous command, not from a measurement. Each command is assumed
+    to last one period, independently of stamps, so that stamps cannot make the robot faster. The caller ensures that
+    commands are at least a period apart.
 
-    Targets with the same stamp count as one target: only the first of them causes a command. While the stamp does not
-    change, the check `staleness` treats targets as missing.
+    Of several targets with the same stamp, only the first causes a command. The check `staleness` ignores the others,
+    as if they had not arrived.
 
     With the option `shape`, a target that the joints cannot follow is smoothed, and the smoothed command is checked.
 
@@ -117,7 +117,7 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether the robot moves while the guard is halted or targets are late; if so, `next_braking` has commands."""
+        """Whether the robot still moves while the guard is halted or targets are late; `next_braking` then applies."""
         return (self.is_halted or self._is_late) and self.is_moving
 
     @property
@@ -134,7 +134,7 @@ class Guard:
         return self._stop.position.copy()
 
     def way_out(self) -> EscapeDirection | None:
-        """Returns the margins that the last command violates, and the motion that leaves them.
+        """Returns the margins that the last command violates, and a joint motion that reduces all violations.
 
         Returns None if no margin is violated, or before the first command.
         """
@@ -211,7 +211,11 @@ class Guard:
         return decision
 
     def refuse(self, reason: str) -> Decision:
-        """Decides on the command in place of a target that cannot be checked; `reason` becomes the violation."""
+        """Refuses a target that cannot be checked; `reason` becomes the violation.
+
+        With the policy `reject`, and before the first command, the guard halts. Otherwise it commands the next step of
+        the braking.
+        """
         if self.is_halted:
             return Decision(None, None, True)
         decision = self._brake_or_halt(Violation("input", reason, math.nan, math.nan, ""))
@@ -220,7 +224,7 @@ class Guard:
         return decision
 
     def check_watchdogs(self, context: CheckContext) -> Violation | None:
-        """Runs the checks that apply between targets, and returns the first violation; None if there is none.
+        """Runs the checks that do not need a target, and returns the first violation; None if there is none.
 
         After a violation, the guard halts. If targets are late, the guard calls `wait_for_target` instead.
         """
@@ -271,9 +275,15 @@ class Guard:
         return Decision(self._commit(found), is_shaped=wanted != target)
 
     def _overshoot(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
-        """Returns a violation if braking would carry a joint past a target that has not changed.
+        """Returns a violation if braking after a safe command would move a joint past the joint's target.
 
-        Returns None if no joint would pass its target, or with the policy `reject`.
+        Ignores joints whose target has changed. Returns None if no joint would pass its target, or with the policy
+        `reject`.
+
+        Args:
+            target: The present target, n positions [rad or m].
+            before: The previous target, n positions [rad or m].
+            safe: The safe command.
         """
         if self.config.policy == "reject" or before is None or not len(safe.stop.position):
             return None
@@ -288,7 +298,7 @@ class Guard:
 
     @property
     def _braking_commands(self) -> np.ndarray:
-        """Commands that bring the robot to rest, shape (k, n), k >= 1; one row with the position if the robot rests."""
+        """Commands that bring the robot to rest, shape (k, n), k >= 1. If the robot rests: its position, as one row."""
         assert self._state is not None
         return self._stop.position if len(self._stop.position) else self._state.position[None]
 
@@ -314,7 +324,7 @@ class Guard:
         return None
 
     def _start_at(self, target: tuple[float, ...], context: CheckContext) -> Violation | None:
-        """Sets the state at the start if the first target is accepted; otherwise returns the violation."""
+        """Checks the first target: sets the guard's initial state if the target is safe, or returns the violation."""
         last = None if self._state is None else self._state.position
         found = self._first_target.judged(np.array(target), last, context)
         if isinstance(found, Violation):
@@ -325,7 +335,7 @@ class Guard:
     def _evaluate(
         self, command: Sequence[float], context: CheckContext, checks: Sequence[Check], is_trial: bool = False
     ) -> _Safe | Violation:
-        """Runs checks on a command; returns the command with its braking, or the first violation."""
+        """Runs checks on a command. Returns the command and the braking after the command, or the first violation."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
@@ -340,9 +350,9 @@ class Guard:
         return _Safe(tuple(command), state, motion.braking_commands)
 
     def _brake(self, state: State) -> Brake | None:
-        """Returns the braking after a command; None if the limits forbid it.
+        """Returns a braking from the state after a command; None if no braking keeps the limits.
 
-        Joints that already follow the present braking continue this braking.
+        Joints whose command belongs to the present braking continue this braking.
         """
         keeps_braking = np.zeros(len(state.position), dtype=bool)
         if len(self._stop.position):
@@ -368,7 +378,7 @@ class Guard:
         return safe.command
 
     def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
-        """Replaces an unsafe target by a safe command near the target, or else by the next braking command.
+        """Replaces an unsafe target by a safe command near the target, or by the next braking command if none is found.
 
         With the policy `reject`, the guard halts. If the failed check examines only the context, the robot brakes.
         """

@@ -1,4 +1,4 @@
-"""Translates the parameters of the authors' original release and of its README to the configuration of a guard."""
+"""Translates parameters of the authors' original release, and of that release's README, to a guard's configuration."""
 
 import math
 from collections.abc import Mapping
@@ -40,8 +40,8 @@ def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> d
 
     Args:
         given: The parameters; parameters that the original release does not have are returned unchanged.
-        joint_names: Joint names in the order of the numbers in lists; the parameter `joint_name_order` overrides this
-            order.
+        joint_names: Names of the joints to which the numbers in a list belong, in order. The parameter
+            `joint_name_order` replaces these names.
         file: Source of the parameters, for messages.
 
     Raises:

@@ -31,7 +31,7 @@ class LimitsConfig(ConfigModel):
 
 
 class MotionLimits(NamedTuple):
-    """Limits of n joints; a limit that a joint does not have is infinite.
+    """Limits of n joints; infinite where a joint has no limit.
 
     Attributes:
         lower: Lower position limits, shape (n,) [rad or m].

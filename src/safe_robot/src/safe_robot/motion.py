@@ -47,8 +47,8 @@ class Bound(NamedTuple):
 
     Attributes:
         row: Index of the configuration.
-        gradient: n derivatives of the safety distance with respect to the joint positions.
-        room: Distance that remains until the bound is reached; negative beyond the bound.
+        gradient: Derivatives of a safety distance with respect to the joint positions, shape (n,) [m/rad or 1].
+        room: Distance from the configuration to the bound [m]; negative beyond the bound.
     """
 
     row: int
@@ -65,7 +65,8 @@ class CommandedMotion:
         robot: The guarded robot.
         period_s: Time between two rows [s].
         start: The state before the command.
-        is_trial: Whether only safe or unsafe matters; checks may then report any violation, not only the first one.
+        is_trial: Whether the caller only needs to know if the motion is safe. Checks may then report any violation
+            instead of the first violation.
         position: Positions, shape (k, n) [rad or m].
         velocity: Velocities, shape (k, n) [rad/s or m/s].
         acceleration: Accelerations, shape (k, n) [rad/s^2 or m/s^2].
@@ -120,7 +121,7 @@ class CommandedMotion:
 
     @cached_property
     def waypoint_frames(self) -> np.ndarray:
-        """Frames of the robot at the waypoints, see `LinkFrames.at`."""
+        """Frames of the robot's links at the waypoints; see `LinkFrames.at`."""
         return self.robot.frames.at(self.position[self.waypoints])
 
     @property

@@ -28,5 +28,9 @@ def schema() -> Schema:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the path and the text of each schema file below the root of a workspace."""
+    """Returns the text of each schema file, indexed by the file's path.
+
+    Args:
+        root: Root folder of the workspace.
+    """
     return schema_texts(root / "src/safe_robot/schema", {TITLE: schema()})

@@ -16,17 +16,17 @@ WAKE_UP_S = 0.0002
 class TargetQueue(Generic[Item]):
     """Passes targets on, at least a period apart, while the newest target is recent.
 
-    A target that arrives after the period is passed on at once, in the thread that calls `put`. An earlier target
-    waits, so that a burst does not make the robot faster. Waiting targets are passed on only while the newest target is
-    younger than a limit, so that the robot stops when the source of targets has ended.
+    A target that arrives a period or more after the previous target is passed on at once, in the thread that calls
+    `put`. A target that arrives sooner waits, so that a burst does not make the robot faster. Waiting targets are
+    passed on only while the newest target is recent, so that the robot stops when the source of targets has ended.
 
     Args:
         period_s: Shortest time between two targets that are passed on [s].
-        silence_s: Largest age of the newest target [s]; when it is older, waiting targets are dropped after
-            `PATIENCE_S`.
+        silence_s: Largest age at which the newest target counts as recent [s]. When the newest target is older,
+            waiting targets are dropped after `PATIENCE_S`.
         size: Largest number of waiting targets; if there are more, the oldest are dropped.
-        on_target: Called with each target while `lock` is held; returns whether a new period begins.
-        give_up: Called when waiting targets are dropped, with the age of the newest target [s]; `lock` is held.
+        on_target: Called with each target while `lock` is held. Returns whether the next target has to wait a period.
+        give_up: Called with the newest target's age [s] when waiting targets are dropped, while `lock` is held.
 
     Attributes:
         lock: Held while a target is passed on.
@@ -49,7 +49,7 @@ class TargetQueue(Generic[Item]):
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
     def put(self, item: Item, age_s: float) -> None:
-        """Passes a target on at once if the period is over, and otherwise queues the target.
+        """Passes a target on at once if the period since the previous target is over; otherwise, queues the target.
 
         Args:
             item: The target.
@@ -98,7 +98,11 @@ class TargetQueue(Generic[Item]):
                 self.lock.wait(self._rest_s())
 
     def _rest_s(self) -> float | None:
-        """Passes on all due targets, or runs all due steps; returns the time until the next one [s], or None."""
+        """Passes on all due targets, or runs all due steps.
+
+        Returns:
+            Time until the next target or step is due [s]; None if nothing waits.
+        """
         while self._step or self._waiting:
             now_s = time.monotonic()
             if (left_s := self._left_s(now_s)) > WAKE_UP_S:

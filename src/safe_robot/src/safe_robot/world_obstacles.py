@@ -20,8 +20,9 @@ def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) ->
     Args:
         path: The main YAML file of the world.
         joints: Names of the joints of the guarded robot.
-        robot: Name of the guarded robot in the world; its own shapes are left out. By default, the only body of the
-            world that has these joints. If no body has them, the robot's root link is at the world's origin.
+        robot: Name of the guarded robot in the world; the robot's own shapes are left out. By default, the only body of
+            the world that has these joints. If no body has these joints, the robot's root link is assumed to be at the
+            world's origin.
 
     Raises:
         ConfigError: If the world cannot be loaded, does not have such a robot, or has a shape that `Obstacle` cannot

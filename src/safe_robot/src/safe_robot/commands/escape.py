@@ -1,4 +1,4 @@
-"""Search for a joint motion that leaves all violated safety margins at once."""
+"""Search for a joint motion that reduces all violations of safety margins at once."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -22,12 +22,12 @@ MIN_GRADIENT = 1e-4
 
 
 class EscapeDirection(NamedTuple):
-    """Margin violations of a configuration, and the joint motion that leaves all of them.
+    """Margin violations at a configuration, and a joint motion that increases the distances of all violating pairs.
 
     Attributes:
         inside: The margin violations. If no motion was found, also violations that the tested motions would cause.
-        direction: Joint velocities that increase all distances, shape (n,), scaled such that the largest absolute value
-            is 1. None: no such motion was found.
+        direction: Joint velocities of the motion, shape (n,), scaled such that the largest absolute value is 1. None if
+            no such motion was found.
     """
 
     inside: Sequence[MarginViolation]
@@ -35,11 +35,11 @@ class EscapeDirection(NamedTuple):
 
     @property
     def is_locked(self) -> bool:
-        """Whether no motion was found that separates all pairs at once."""
+        """Whether the search for a motion that separates all violating pairs at once has failed."""
         return self.direction is None
 
     def words(self, joint_names: Sequence[str]) -> str:
-        """Returns a message about the violations, and about the joint motion that leaves them, if there is one."""
+        """Returns a message about the violations, and about the joint motion that reduces them if it was found."""
         each = ", ".join(
             f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)"
             for one in self.inside
@@ -55,12 +55,15 @@ class EscapeDirection(NamedTuple):
 def find_escape(
     q: np.ndarray, limits: MotionLimits, inside: Callable[[np.ndarray], Sequence[MarginViolation]]
 ) -> EscapeDirection | None:
-    """Returns the margin violations of a configuration, and a joint motion that leaves all of them.
+    """Returns the margin violations at a configuration, and a joint motion that reduces all violations.
 
-    The motion solves a linear program: maximise t subject to `gradient @ direction >= t |gradient|` for all pairs.
-    Speeds are at most 1, and a joint at a position limit may not move further out. If t is at most `MIN_SPEED_SHARE`,
-    there is no direction. Distances have kinks, for instance where another corner becomes the nearest. The motion is
-    therefore tested. Pairs that do not separate as predicted are added to the program, which is solved again.
+    The motion solves a linear program: maximise t subject to `gradient @ direction >= t |gradient|` for all violating
+    pairs. Joint speeds are at most 1, and a joint at a position limit may not move further out. The search fails if t
+    is at most `MIN_SPEED_SHARE`.
+
+    Gradients of distances can change abruptly, for instance where another corner becomes the nearest. Therefore, a
+    small step along the motion is tested. The gradients of pairs that do not separate as predicted are added to the
+    program, which is then solved again.
 
     Args:
         q: Joint positions, shape (n,) [rad or m].

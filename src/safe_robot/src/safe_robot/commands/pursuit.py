@@ -1,4 +1,4 @@
-"""Computes commands that move joints to a target as fast as their limits allow, and stop them at the target."""
+"""Computes commands that move joints to a target as fast as the joint limits allow, and stop the joints there."""
 
 from typing import NamedTuple
 
@@ -22,8 +22,9 @@ class Pursuit(NamedTuple):
     """Range of the commands that n joints can follow in the next period.
 
     Attributes:
-        wanted: Positions at the end of the range that is nearest to the targets, shape (n,) [rad or m].
-        slowest: Positions at the other end of the range, shape (n,) [rad or m]; most joints brake there.
+        wanted: Command at the end of the range that is nearer to the targets, shape (n,) [rad or m].
+        slowest: Command at the other end of the range, with the smallest accelerations towards the targets, shape (n,)
+            [rad or m].
     """
 
     wanted: np.ndarray
@@ -39,13 +40,11 @@ def pursue(
     stop: np.ndarray,
     acceleration: np.ndarray | None = None,
 ) -> Pursuit:
-    """Returns the range of commands for the next period, one end of which is the command nearest to the targets.
+    """Returns the range of commands for the next period; see `Pursuit`.
 
-    After this command, each joint can still brake without passing its target. A joint that cannot avoid passing its
-    target gets the slowest command. Commands respect the joint limits, but are not yet examined by safety checks.
-
-    The shortest braking from a new state may be longer than the rest of the present braking. It may then pass a target
-    that the present braking does not pass. In this case, the joint continues the present braking.
+    After the command `wanted`, each joint can still brake without passing its target. If a joint has no such command,
+    `wanted` continues the joint's present braking, provided that this braking does not pass the target. Otherwise, the
+    joint gets the slowest command. Commands respect the joint limits, but are not yet examined by safety checks.
 
     Args:
         target: Target positions, shape (n,) [rad or m].
@@ -54,8 +53,8 @@ def pursue(
         braking: Computes the braking of the joints.
         period_s: Time between two commands [s].
         stop: Commands of the present braking, shape (k, n) [rad or m].
-        acceleration: Desired accelerations, shape (n,) [rad/s^2 or m/s^2]. None: those that reach the target in one
-            period.
+        acceleration: Desired accelerations, shape (n,) [rad/s^2 or m/s^2]. None: the accelerations that reach the
+            targets in one period.
     """
     target = np.clip(target, limits.lower, limits.upper)
     exact = state.then(target, period_s).acceleration if acceleration is None else acceleration

@@ -1,8 +1,8 @@
 """Search for a safe command near an unsafe target.
 
 The safety checks provide linear bounds on positions. The QP solver DAQP finds the command that satisfies these bounds
-and is nearest to the target. DAQP is in the extra `ik`. Without DAQP, only commands between braking and the target are
-tried.
+and is nearest to the target. The extra `ik` installs DAQP. Without DAQP, the search only tries interpolations between
+braking and the target.
 """
 
 from __future__ import annotations
@@ -63,8 +63,9 @@ class SafeCommandSearch:
         Args:
             target: Target positions, shape (n,) [rad or m].
             state: Present state of the robot.
-            stop: Commands of the braking from this state, which has passed the checks; shape (k, n), k >= 1 [rad or m].
-            judged: Runs checks on n positions in the given order. Returns the safe command, or a violation.
+            stop: Commands of the braking from this state, shape (k, n), k >= 1 [rad or m]. They have passed the checks.
+            judged: Runs checks, in the given order, on a command of n positions. Returns the safe command, or a
+                violation.
         """
         for command in self._commands(target, state, stop):
             found = judged(command, sorted(self._checks, key=lambda check: check.name != self._suspect))
@@ -74,7 +75,7 @@ class SafeCommandSearch:
         return None
 
     def _commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields candidate commands, the best first; the caller stops at the first safe one."""
+        """Yields candidate commands in order of preference."""
         best, slowest = pursue(target, state, self._limits, self._braking, self._period_s, stop)
         for wanted in self._detours(best, slowest, state, stop) if self._keeps_bounds else [best]:
             best = wanted
@@ -83,7 +84,11 @@ class SafeCommandSearch:
             yield stop[0] + share * (best - stop[0])
 
     def _detours(self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields the command nearest to `wanted` that satisfies the bounds, then commands with additional bounds."""
+        """Yields commands near `wanted` that satisfy the bounds of the checks.
+
+        The first command satisfies the bounds at the end of braking; it is `wanted` if this is impossible. Each further
+        command also satisfies the bounds that the braking after the previous command would violate.
+        """
         there, after = stop[-1:], StoppingTrajectory(wanted, state, self._braking, self._period_s)
         spread = np.abs(after.of(wanted)[-1] - there[0])
         end = after.of(slowest)[-1]
@@ -100,7 +105,7 @@ class SafeCommandSearch:
                 yield found
 
     def _add_missed(self, detour: CommandQP, command: np.ndarray, state: State) -> bool:
-        """Adds to `detour` the bounds that the braking after a command violates; returns whether bounds were added."""
+        """Adds the bounds that braking after a command violates to `detour`, and returns whether bounds were added."""
         stop = StoppingTrajectory(command, state, self._braking, self._period_s)
         at = stop.of(command)
         missed = [bound for bound in self._bounds(at, np.zeros_like(command), state) if bound.room < 0.0]
@@ -118,17 +123,17 @@ def can_keep_bounds() -> bool:
 
 
 class StoppingTrajectory:
-    """Positions of n joints at `MOMENTS` instants of braking after a command, linearised about the command.
+    """Linear function of a command that predicts positions of n joints at `MOMENTS` instants of the braking afterwards.
 
     Args:
-        command: Commanded positions, shape (n,) [rad or m].
+        command: Commanded positions at which the prediction is exact, shape (n,) [rad or m].
         state: State before the command.
         braking: Computes the braking of the joints.
         period_s: Time between two commands [s].
 
     Attributes:
-        slope: Derivative of each joint's position with respect to its commanded position, shape (MOMENTS, n). At the
-            first instant, the joints are at the command; at the last instant, they rest.
+        slope: Derivative of each joint's position with respect to the joint's command, shape (MOMENTS, n). At the first
+            instant, the joints are at the command. At the last instant, the joints rest.
     """
 
     def __init__(self, command: np.ndarray, state: State, braking: Braking, period_s: float) -> None:
@@ -140,15 +145,15 @@ class StoppingTrajectory:
         self._start = state.position
 
     def of(self, command: np.ndarray) -> np.ndarray:
-        """Returns the linearised positions during braking after a command, shape (MOMENTS, n) [rad or m]."""
+        """Returns the predicted positions during braking after a command, shape (MOMENTS, n) [rad or m]."""
         return self._offset + self.slope * (command - self._start)
 
 
 class CommandQP:
     """Quadratic program for a command that is as near as possible to a desired command and satisfies linear bounds.
 
-    Bounds apply to the command and to the braking after it. If a solution turns out to be unsafe, the caller adds
-    bounds that are linearised at this solution, and solves again.
+    Bounds apply to the command and to the braking after the command. If a solution turns out to be unsafe, the caller
+    adds bounds that are linearised at this solution, and solves again.
 
     Args:
         wanted: Desired positions, at one end of the range of commands, shape (n,) [rad or m].
@@ -162,12 +167,12 @@ class CommandQP:
         self._rooms: list[float] = []
 
     def add(self, bounds: Sequence[Bound], at: np.ndarray, stop: StoppingTrajectory) -> None:
-        """Adds bounds on the positions at the last k instants of braking.
+        """Adds bounds on the positions at the last k of the `MOMENTS` instants of braking.
 
         Args:
             bounds: Bounds that are linearised at the positions `at`.
-            at: Positions at these instants, shape (k, n) [rad or m].
-            stop: Computes the positions at these instants from the command.
+            at: Positions at the k instants, shape (k, n) [rad or m].
+            stop: Computes the positions at all instants from the command.
         """
         slope, way = stop.slope[-len(at) :], stop.of(self._wanted)[-len(at) :] - at
         for row, gradient, room in bounds:

@@ -33,9 +33,9 @@ class ShapingConfig(ConfigModel):
 class Shaper:
     """Computes commands that follow targets of n joints within the limits of velocity, acceleration and jerk.
 
-    Targets within these limits are passed on unchanged. After a target that violates them, commands follow the targets
-    like a critically damped second-order filter, within limits and without overshoot, until all joints have caught up.
-    Jitter of targets therefore does not reach the robot.
+    Targets that respect these limits are passed on unchanged. After a target that violates a limit, commands follow the
+    targets like a critically damped second-order filter, within the limits and without overshoot. This filter stays
+    active until all joints have caught up with their targets. Jitter of targets therefore does not reach the robot.
 
     Args:
         config: Parameters of the smoothing.
@@ -75,7 +75,7 @@ class Shaper:
     def _can_command(self, position: np.ndarray, state: State) -> bool:
         """Returns whether the joints can reach a position in one period and then stop, within their limits.
 
-        While joints are behind their targets, they must also have caught up.
+        While the filter is active, the acceleration and jerk must be at most `CAUGHT_UP_SHARE` of their limits.
         """
         limits, share = self._limits, CAUGHT_UP_SHARE if self._is_behind else 1.0
         after = state.then(position, self._period_s)
@@ -93,7 +93,10 @@ class Shaper:
         )
 
     def _smooth(self, position: np.ndarray, state: State) -> np.ndarray:
-        """Returns the n accelerations of the filter [rad/s^2 or m/s^2], computed with the implicit Euler method."""
+        """Returns the filter's accelerations towards a target position, shape (n,) [rad/s^2 or m/s^2].
+
+        The filter is integrated with the implicit Euler method.
+        """
         rate, period_s = self._rate, self._period_s
         way = position - state.position - period_s * state.velocity
         acceleration: np.ndarray = (rate * rate * way - 2.0 * rate * state.velocity) / (1.0 + rate * period_s) ** 2

@@ -1,4 +1,4 @@
-"""Markers for RViz: the closest points of near pairs, and the boxes that links stay in."""
+"""Markers for RViz: the closest points of shapes near each other, and the boxes that links must not leave."""
 
 from collections.abc import Iterator
 from threading import Condition
@@ -25,9 +25,10 @@ NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.
 
 
 class GuardMarkers:
-    """Publishes near pairs and boxes on `robot_safety/markers`, and only boxes on `safe_robot/box_limit/marker`.
+    """Publishes markers of near pairs of shapes and of the boxes that links must not leave.
 
-    A topic without subscribers gets no messages.
+    The topic `robot_safety/markers` shows pairs and boxes, and `safe_robot/box_limit/marker` shows only boxes. A topic
+    without subscribers gets no messages.
 
     Args:
         guard: The guard.
@@ -59,7 +60,7 @@ class GuardMarkers:
         self._publisher.publish([self._marker("", 0, Marker.CUBE, action=Marker.DELETEALL), *markers, *self._boxes()])
 
     def _lines(self, q: np.ndarray) -> Iterator[Marker]:
-        """Yields a line for each near pair, and its distance as text."""
+        """Yields two markers for each near pair: a line between the closest points, and the distance as text."""
         for check in self._guard.checks:
             if not isinstance(check, (SelfCollision, Environment)):
                 continue

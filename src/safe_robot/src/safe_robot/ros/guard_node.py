@@ -101,7 +101,7 @@ class GuardNode:
         self._queue.put(message, (_now() - stamp).to_sec() if stamp else 0.0)
 
     def _handle_target(self, message: JointState) -> bool:
-        """Sends a command for a target, reports the decision and returns whether a command was sent.
+        """Sends a command for a target, reports the decision, and returns whether a command was sent.
 
         While the node shuts down, topics are closed, and the target is dropped.
         """
@@ -148,13 +148,13 @@ class GuardNode:
         self._brake_for(violation, header)
 
     def _brake_for(self, violation: Violation | None, header: Header | None = None) -> None:
-        """Starts to send braking commands, if the guard has any, and reports the violation; the lock is held."""
+        """Starts to send the guard's braking commands, if any, and reports the violation; the caller holds the lock."""
         self._queue.run_instead(self._brake)
         if violation is not None:
             self._status.publish(header or Header(stamp=_now()), violation, self._measurements.obstacles)
 
     def _brake(self) -> bool:
-        """Sends the next braking command; returns False if none is left, or if sending failed."""
+        """Sends the next braking command. Returns False if no command is left, or if sending failed."""
         command = self._guard.next_braking()
         if command is None:
             return False

@@ -51,13 +51,13 @@ class GuardStatus:
         obstacles: tuple[Obstacle, ...] | None = None,
         note: str = "",
     ) -> None:
-        """Reports a decision.
+        """Publishes the status of a decision, and the violation if there is one.
 
         Args:
             header: Header of the target.
             violation: Violation of the target; None if the target is safe.
             obstacles: Bodies of the environment; the same tuple object while no body changes.
-            note: Message of the status for a safe target.
+            note: Text of the status if there is no violation.
         """
         if violation is None:
             self._status.publish(self._status_message(header, note, None))
@@ -99,7 +99,10 @@ class GuardStatus:
         self._warn(self._subject, "halted; call robot_safety/start_subscriber to continue")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:
-        """Returns a text about the motion that leaves violated margins, computed once for each configuration."""
+        """Returns a text about violated margins and the motion that reduces the violations; empty during motions.
+
+        The text is computed again only after the last command or the obstacles have changed.
+        """
         if self._guard.is_moving:
             return ""
         place = self._guard.last_command, obstacles

@@ -19,7 +19,7 @@ class MasterConnection:
     A master that hangs, or a pulled cable, is not detected.
 
     Args:
-        lost: Called in a thread of its own when the master has ended.
+        lost: Called in a separate thread when the master has ended.
 
     Attributes:
         uri: The master's address.

@@ -72,7 +72,7 @@ class Measurements:
         return None if self._live_obstacles is None else self._live_obstacles.obstacles
 
     def wait(self, timeout_s: float) -> None:
-        """Waits for the first measured state, at most for a time [s]."""
+        """Waits until the positions of all guarded joints have been measured, at most for `timeout_s` [s]."""
         self._has_measured.wait(timeout_s)
 
     def context(self, sent_s: float, age_s: float = 0.0, stamp_step_s: float | None = None) -> CheckContext:
@@ -118,7 +118,7 @@ class Measurements:
 
 
 class LiveObstacles:
-    """Visual shapes of the bodies on `rpbi/markers`, except those left out, at their poses in TF.
+    """Tracks obstacles: the visual shapes of bodies on `rpbi/markers`, at the bodies' poses in TF.
 
     Args:
         base_frame: TF frame of the robot's root.
