@@ -157,7 +157,7 @@ class Route:
 
 
 def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
-    """Returns the vector x, y [m] and the shorter rotation [rad] from a pose to a goal."""
+    """Returns the vector x, y [m] and the rotation of at most half a turn [rad] from a pose to a goal."""
     return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
 
 

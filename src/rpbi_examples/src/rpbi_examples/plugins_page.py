@@ -46,7 +46,7 @@ def plugins_page() -> str:
 
 
 def plugin_files(root: Path) -> dict[Path, str]:
-    """Returns the text of the page, indexed by the file's path in a workspace."""
+    """Returns a dict with the page's text, indexed by the page's path in the workspace `root`."""
     return {root / "docs/plugins.md": plugins_page()}
 
 

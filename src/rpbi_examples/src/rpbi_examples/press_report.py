@@ -114,7 +114,7 @@ class Press:
         return self._has_touched and self.samples[-1].time_s - self._released_s > RELEASED_S
 
     def report(self) -> PressReport | None:
-        """Evaluates the press. Returns None if the press was too short or was mostly a pause of the simulator; see
+        """Evaluates the press. Returns None if the press was too short, or if the simulator mostly paused; see
         `MIN_PRESS_S` and `MIN_SHARE`.
         """
         times_s, depths_m, measured_n, felt_n = np.array(

@@ -1,4 +1,4 @@
-"""Plans the motion of an arm that pushes a box over the floor with a ball at its hand, between two goals."""
+"""Plans motions of an arm that pushes a box over the floor to a goal. A ball at the arm's hand touches the box."""
 
 import math
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ class Push(NamedTuple):
     end: tuple[float, float]
 
     def beside(self, way_m: float) -> tuple[float, float]:
-        """Returns the point on the push's line at a distance before `start` [m], or after `start` if negative."""
+        """Returns the point on the push's line at the distance `way_m` before `start` [m]. Negative: after `start`."""
         length = math.dist(self.start, self.end)
         x, y = ((begin - end) / length * way_m for begin, end in zip(self.start, self.end))
         return self.start[0] + x, self.start[1] + y
@@ -88,7 +88,7 @@ class Move(NamedTuple):
 
 
 def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
-    """Returns the push that brings a box nearest to a goal. None if every push gains less than `NEAR_M`.
+    """Returns the push that brings a box nearest to a goal. None if the box would come less than `NEAR_M` nearer.
 
     The ball pushes perpendicularly against the middle of a side, so that the box hardly turns.
 
@@ -126,7 +126,7 @@ class Pusher:
         self._solver = solver
 
     def moves(self, positions: Sequence[float], push: Push) -> list[Move]:
-        """Returns all moves for a push: up, above the start, down, to the box, the push, back, and up.
+        """Returns the ball's moves for a push: up, above the start, down, to the box, along the push, back, and up.
 
         Args:
             positions: Joint positions before the first move [rad].
@@ -154,7 +154,7 @@ class Pusher:
         return [self._approach(positions, corners[0]), *lines]
 
     def _approach(self, positions: Sequence[float], point: Vector) -> Move:
-        """Returns the move from joint positions [rad] to a point of the ball [m]. The ball's path is not straight."""
+        """Returns the move from joint positions [rad] that brings the ball to a point [m], along a curved path."""
         ends = np.array((positions, self._solve(point)))
         return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, MIN_DURATION_S))
 
@@ -168,7 +168,7 @@ class Pusher:
         )
 
     def _solve(self, point: Sequence[float]) -> tuple[float, ...]:
-        """Returns joint positions [rad] with the ball at a point [m]. The result depends only on the point.
+        """Returns joint positions [rad] at which the ball is at a point [m]. The result depends only on the point.
 
         Raises:
             ValueError: If the point is out of reach.

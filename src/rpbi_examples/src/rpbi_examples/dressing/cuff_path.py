@@ -27,7 +27,7 @@ HELD_OUT_M = 0.25
 
 
 class ArmPosition(NamedTuple):
-    """Joint positions of a person's arm in the world, each of shape (3,) [m]."""
+    """Positions of shoulder, elbow and wrist of a person's arm in the world, each of shape (3,) [m]."""
 
     shoulder: Array
     elbow: Array
@@ -39,7 +39,7 @@ class CuffPath:
     fingertips, then over hand and forearm, and ends past the elbow.
 
     Args:
-        arm: Joint positions of the person's arm.
+        arm: Positions of shoulder, elbow and wrist of the person's arm.
 
     Attributes:
         length: Length of the path [m].
@@ -53,11 +53,11 @@ class CuffPath:
         self.length = sum(math.dist(a, b) for a, b in pairwise(self._corners))
 
     def place(self, done: float) -> Array:
-        """Returns the point at a given distance along the path [m], shape (3,) [m]."""
+        """Returns the point at the distance `done` along the path [m], shape (3,) [m]."""
         return _along(self._corners, done)
 
     def ahead(self, done: float) -> Array:
-        """Returns the direction in which the cuff is pulled at a given distance along the path [m].
+        """Returns the direction in which the cuff is pulled at the distance `done` along the path [m].
 
         Returns:
             Unit vector, shape (3,). In front of the fingertips, it is the direction from the wrist to the elbow.
@@ -68,7 +68,7 @@ class CuffPath:
 
 
 def is_held_out(arm: ArmPosition) -> bool:
-    """Returns whether an arm is held out to the cuff; see `HELD_OUT_M`."""
+    """Returns whether an arm is held out towards the cuff's initial position; see `HELD_OUT_M`."""
     forearm = _unit(arm.wrist - arm.elbow)
     return math.dist(arm.wrist + (HAND_M + BEFORE_HAND_M) * forearm, CUFF) < HELD_OUT_M
 
@@ -78,7 +78,7 @@ def _unit(vector: Array) -> Array:
 
 
 def _along(corners: Sequence[Array], distance: float) -> Array:
-    """Returns the point at a given distance along a polyline [m]; beyond the end, the last corner."""
+    """Returns the point at a given distance along a polyline [m], or the last corner if the polyline is shorter."""
     for a, b in pairwise(corners):
         length = math.dist(a, b)
         if distance <= length:

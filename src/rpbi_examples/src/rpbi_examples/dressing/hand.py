@@ -45,7 +45,7 @@ class HandTarget(NamedTuple):
 
 
 def holding(cuff: Array, ahead: Array) -> HandTarget:
-    """Returns the pose of a level hand that holds the cuff's right side.
+    """Returns the hand's pose for holding the right side of a cuff. The hand is horizontal.
 
     Args:
         cuff: Middle of the cuff, shape (3,) [m].
@@ -63,7 +63,7 @@ class HandSolver:
     """Forward and inverse kinematics of the robot that holds the cuff.
 
     Attributes:
-        joint_names: Names of the arm's joints. All joint positions in this class have the same order.
+        joint_names: Names of the arm's joints. The methods expect joint positions in this order.
     """
 
     def __init__(self) -> None:
@@ -95,7 +95,7 @@ class HandSolver:
 
 
 class Dressing:
-    """Computes targets that move the cuff along a person's arm and follow the arm's motion.
+    """Computes targets of the robot's hand that move the cuff along a person's arm. The arm may move meanwhile.
 
     The cuff slows down as a force on the arm approaches its limit, and moves back while a limit is exceeded. The target
     waits while the cuff lags behind the target, so that the hand does not jump afterwards.
@@ -124,10 +124,10 @@ class Dressing:
         """Advances the target along the cuff's path, and returns the corresponding target of the robot's hand.
 
         Args:
-            arm: Joint positions of the person's arm.
+            arm: Positions of shoulder, elbow and wrist of the person's arm.
             cuff: Present position of the middle of the cuff, shape (3,) [m].
-            force_share: Largest ratio of a force on the arm to its limit.
-            dt: Time since the last target [s].
+            force_share: Largest ratio of a force on the arm to the force's limit; see `ArmForce.share`.
+            dt: Time since the last call [s].
         """
         path = CuffPath(arm)
         if self._left_m is None:

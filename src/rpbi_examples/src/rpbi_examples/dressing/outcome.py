@@ -63,7 +63,7 @@ class ArmForce:
     - The mean force on the whole arm must not exceed `limit_n`, which is chosen for comfort.
 
     Args:
-        limit_n: Largest sum of the forces on the arm [N].
+        limit_n: Limit of the mean force on the whole arm [N].
 
     Attributes:
         arm_n: Sum of the forces on the arm, averaged over `MEAN_S` [N].
@@ -124,7 +124,7 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 
     Args:
         rings: Corners of the sleeve's rings, shape (11, 14, 3) [m]. The first ring is the cuff.
-        arm: Joint positions of the person's arm.
+        arm: Positions of shoulder, elbow and wrist of the person's arm.
         force: Forces on the arm during the whole trial.
     """
     upper_arm = arm.shoulder - arm.elbow
@@ -140,7 +140,7 @@ def rings_of(corners: ArrayLike) -> Array:
     """Extracts the sleeve's rings from the corners of its triangles.
 
     Args:
-        corners: Three corners of each triangle, 9 numbers per triangle in any shape [m].
+        corners: Coordinates of the triangles' corners, 9 numbers per triangle, as an array of any shape [m].
 
     Returns:
         Corners of all rings except the last, shape (11, 14, 3) [m].
@@ -157,7 +157,7 @@ def rings_of(corners: ArrayLike) -> Array:
 
 
 def _encloses(ring: Array, point: Array, axis: Array) -> bool:
-    """Returns whether a ring encloses a line exactly once.
+    """Returns whether a ring winds around a line exactly once.
 
     Args:
         ring: Corners of the ring, shape (14, 3) [m].

@@ -1,4 +1,4 @@
-"""The telepresence example without ROS: a random person holds out an arm and is dressed."""
+"""The telepresence example without ROS: a simulated person holds out an arm, and a robot pulls a sleeve over it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
 
     Args:
         seed: Seed of the person's height and of the arm's pose.
-        force_limit_n: Largest sum of forces on the arm [N]. Above this limit, the cuff moves back.
+        force_limit_n: Limit of the mean force on the whole arm [N]. Above the limit, the cuff moves back.
         speed: Speed of the cuff without contact [m/s].
     """
     world = World.from_file(WORLD)
@@ -56,7 +56,7 @@ class Trial:
         world: World of the example, possibly with additional objects.
         person: Simulated person whose motion the avatar follows.
         dressing: The controller of the cuff.
-        force_limit_n: Largest sum of forces on the arm [N].
+        force_limit_n: Limit of the mean force on the whole arm [N].
 
     Attributes:
         force: Forces on the arm so far.
@@ -133,7 +133,7 @@ def _joint_positions(robot: Any) -> dict[str, float]:
 
 
 def main() -> int:
-    """Runs a trial for each seed of the command line. Returns 1 if a person is not dressed, otherwise 0."""
+    """Runs a trial for each seed from the command line. Returns 0 if all persons were dressed, otherwise 1."""
     parser = argparse.ArgumentParser(description="Dresses random people, as fast as possible and without ROS.")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
     parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")

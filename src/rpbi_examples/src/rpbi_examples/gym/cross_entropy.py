@@ -87,8 +87,8 @@ def run_episodes(envs: Any, policies: Any, features: Any, seeds: Sequence[int]) 
 
     Args:
         envs: A vector of n environments.
-        policies: Maps the features, shape (n, features), to actions, shape (n, actions).
-        features: Maps the observations of all environments to features, shape (n, features).
+        policies: Function from features, shape (n, features), to actions, shape (n, actions).
+        features: Function from the observations of all environments to features, shape (n, features).
         seeds: A seed for each environment.
     """
     observations, infos = envs.reset(seed=list(seeds))

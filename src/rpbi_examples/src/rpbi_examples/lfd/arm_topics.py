@@ -1,4 +1,4 @@
-"""Controls the arm that learns, through topics and services: moves to positions, teleoperation, and plans."""
+"""Moves the learning arm through topics and services: to positions, by teleoperation, and along plans."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ END_S = 0.5
 class Arm:
     """Moves the arm's tip, and switches the person's teleoperation of the arm on and off.
 
-    All places are x and y in the person's frame `rpbi/teleop_origin`, shape (2,) [m].
+    A place is a position x, y in the person's frame `rpbi/teleop_origin`, shape (2,) [m].
 
     Args:
         tf: Access to TF.
@@ -113,9 +113,9 @@ class Arm:
                 )
 
     def follow(self, plan: PushPlan) -> None:
-        """Moves the target along a plan, and returns at the end of the plan.
+        """Moves the tip's target along a plan, and returns at the end of the plan.
 
-        Publishes velocities on the topic of the person's signals. Meanwhile, signals of the person are ignored.
+        Publishes velocities on the topic of the person's signals, and ignores the person's signals until the end.
         """
         call_service("operator_node/toggle", SetBool, False)  # signals of the person are ignored meanwhile
         try:
@@ -138,7 +138,7 @@ class Arm:
             call_service("operator_node/toggle", SetBool, True)
 
     def _pace(self, planned: Array) -> float:
-        """Returns the speed of the plan as a share of its full speed. While the tip lags behind, the share is below 1.
+        """Returns the speed along the plan, relative to the planned speed: 1, or less while the tip lags behind.
 
         Args:
             planned: Present place in the plan.

@@ -64,7 +64,7 @@ class Direction(Enum):
 
     @classmethod
     def along(cls, axis: int, sign: float) -> Direction:
-        """Returns the direction along an axis (0 or 1) with the sign of a number."""
+        """Returns the direction along an axis (0 or 1) in which the coordinate changes with the given sign."""
         return next(each for each in cls if each.axis == axis and each.sign * sign > 0.0)
 
 
@@ -73,12 +73,12 @@ ROUND = (Direction.RIGHT, Direction.UP, Direction.LEFT, Direction.DOWN)
 
 
 class _Leg(NamedTuple):
-    """Part of the path around the box: the tip moves along x or y until this coordinate has a value.
+    """Part of the path around the box, along x or y. The leg ends when the tip's coordinate `axis` is near `value`.
 
     Attributes:
-        axis: Index of the coordinate: 0 for x, 1 for y.
+        axis: Index of the coordinate that changes: 0 for x, 1 for y.
         value: Value of the coordinate at the end of the leg [m].
-        tolerance: Distance from the value at which the leg is complete [m].
+        tolerance: Largest distance from `value` at which the leg is complete [m].
     """
 
     axis: int
@@ -89,9 +89,9 @@ class _Leg(NamedTuple):
 class Person:
     """Decides which arrow key is held. Positions are in the person's frame: x to the right, y away from the person.
 
-    Each push is along x or y, and starts near the middle of the box's rear side. A push off the middle turns the box
-    back. Before a push, the person moves the tip around the box. When the tip is at rest, the person chooses the next
-    key press from the present positions of box and tip.
+    Each push is along x or y, and starts near the middle of the box's rear side. If the box has turned, the person
+    pushes beside the middle to turn the box back. Before a push, the person moves the tip around the box. When the tip
+    is at rest, the person chooses the next key press from the present positions of box and tip.
 
     Args:
         goal: Goal pose of the box.

@@ -1,5 +1,5 @@
-"""`lfd_person.py`: a simulated person who demonstrates a push with keys. The node publishes keys like the keyboard's
-node, or presses keys in the window of the keyboard's node.
+"""`lfd_person.py`: a simulated person who demonstrates a push with keys. The node publishes the same messages as the
+keyboard node, or presses keys in the window of the keyboard node.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class ScriptedPerson:
 
 
 def key_topics() -> Send:
-    """Returns a function that publishes key presses like the keyboard's node."""
+    """Returns a function that publishes key presses and releases with the same messages as the keyboard node."""
     topics = {
         is_down: rospy.Publisher(f"~{name}", Key, queue_size=100)
         for is_down, name in ((True, "keydown"), (False, "keyup"))
@@ -118,7 +118,7 @@ def key_topics() -> Send:
 
 
 def window_keys() -> Send:
-    """Returns a function that presses keys in the window of the keyboard's node, with xdotool.
+    """Returns a function that presses and releases keys in the window of the keyboard node, with xdotool.
 
     Raises:
         InterfaceError: If xdotool fails.

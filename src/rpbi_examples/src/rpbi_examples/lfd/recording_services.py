@@ -60,7 +60,7 @@ def finish_episode(out: Path, error: BoxError, plan: PushPlan | None = None) -> 
 def read_episode(bag: str | Path) -> pd.DataFrame:
     """Reads an episode's bag, and returns one table with the columns of `Run.table`.
 
-    The table has a row for each recorded pose of the tip. The other columns have the values nearest in time.
+    The table has a row for each recorded pose of the tip. All other columns hold the values nearest to the row's time.
 
     Raises:
         InterfaceError: If the bag cannot be read, or lacks the frame of the tip or of the box.

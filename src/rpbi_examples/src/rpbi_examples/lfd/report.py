@@ -41,7 +41,7 @@ class BoxError(NamedTuple):
 
     @classmethod
     def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
-        """Returns the distance and angle of a pose in the goal's frame.
+        """Computes the error of a box from the box's pose in the goal's frame.
 
         Args:
             position: x, y, z [m].
@@ -51,7 +51,7 @@ class BoxError(NamedTuple):
 
     @property
     def is_at_goal(self) -> bool:
-        """Whether the box counts as at its goal."""
+        """Whether the error is small enough for the box to be at its goal."""
         return self._is_within(1.0)
 
     @property
@@ -67,7 +67,7 @@ class BoxError(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A demonstration or an execution. Positions are in the person's frame.
+    """A recorded demonstration, or the recorded execution of a plan. Positions are in the person's frame.
 
     Attributes:
         episode: Number of the recorded episode.
@@ -230,7 +230,7 @@ def _outline(box: PlanarPose) -> Array:
 
 
 def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
-    """Draws an arrow from one plot to a neighbouring plot. The layout must have placed both plots."""
+    """Draws an arrow from one plot to a neighbouring plot. Both plots must already be at their final positions."""
     one, other = begin.get_position(), end.get_position()
     x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
     if abs(one.y0 - other.y0) > 0.1:

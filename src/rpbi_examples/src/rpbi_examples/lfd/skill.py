@@ -70,7 +70,7 @@ class PushPlan(NamedTuple):
         return float(self.times[-1])
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns position [m] and velocity [m/s] at a time [s]. After the end, returns the last position and 0."""
+        """Returns position [m] and velocity [m/s] at a time [s]. After the end: the last position and zero velocity."""
         place, velocity = (
             np.array([np.interp(time_s, self.times, column) for column in rows.T])
             for rows in (self.places, self.velocities)

@@ -51,9 +51,10 @@ def _run() -> None:
 
 
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
-    """Moves the arm to the target, and then switches on the tracking of the target.
+    """Moves the arm to the pose `target`, a matrix of shape (4, 4), and then starts the tracking of the target.
 
-    Switches on the solver and its setup node. Also switches on the motion of the target, if `~target_toggle` is given.
+    The tracking needs the solver and the solver's setup node, which are switched on. If `~target_toggle` is given, the
+    motion of the target is also switched on.
     """
     problem = IKProblem(has_target=True, target=_pose(target), start=_home())
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
@@ -65,8 +66,8 @@ def _track(robot: str, solver: str, target: np.ndarray) -> None:
 
 
 def _draw_a_round(robot: str, start: np.ndarray) -> None:
-    """Plans one trajectory to the figure eight and once around the figure. Publishes the trajectory to the robot's
-    trajectory controller.
+    """Plans one trajectory to the figure eight, whose pose is `start`, and once around the figure. Publishes the
+    trajectory to the robot's trajectory controller.
     """
     figure = FigureEight()
     times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)

@@ -16,9 +16,9 @@ HZ = 50.0
 
 
 def wait_until_ready() -> None:
-    """Waits for a message on the topic `~ready`. Returns at once if the parameter is empty or missing.
+    """Waits for a message on the topic that `~ready` names. Returns at once if this parameter is empty or missing.
 
-    With a real robot, `~ready` names the topic of the commands for the robot's driver. The simulated arm must not move
+    With a real robot, this is the topic of the commands for the robot's driver. The simulated arm must not move
     before the first command, since the guard accepts a first target only at the robot's present position.
     """
     topic = str(rospy.get_param("~ready", ""))
@@ -85,7 +85,7 @@ class JointTargets:
     def _sleep(self) -> None:
         """Waits for the next period, and raises ROSInterruptException if ROS shuts down.
 
-        With wall time, rospy's sleep does not raise.
+        With wall time, rospy's sleep does not raise this exception.
         """
         self._rate.sleep()
         if rospy.is_shutdown():

@@ -34,7 +34,9 @@ class RunningNode(NamedTuple):
     uri: str
 
     def stop(self, master: str) -> None:
-        """Stops the node and waits for its end. If its `roslaunch` is on this machine, also waits for the launch's end.
+        """Stops the node and waits until the node has ended.
+
+        If the `roslaunch` that started the node runs on this machine, also waits until this `roslaunch` has ended.
 
         Args:
             master: Address of the node's ROS master. The master may end together with `roslaunch`.
@@ -52,7 +54,7 @@ class RunningNode(NamedTuple):
             time.sleep(_POLL_S)
 
     def _launch_process(self, master: str) -> int | None:
-        """Returns the process id of the `roslaunch` that started the node. None without one on this machine."""
+        """Returns the process id of the `roslaunch` that started the node. None if it does not run on this machine."""
         _, _, uris = _proxy(master).getParam(_CALLER, "/roslaunch/uris")
         for uri in uris.values() if isinstance(uris, dict) else ():
             host, _ = rosgraph.network.parse_http_host_and_port(uri)
@@ -78,7 +80,7 @@ def master_of(port: str | None) -> str:
 
 
 def running_simulators(file: str, master: str) -> list[RunningNode]:
-    """Returns the running simulators that ROS would stop if a launch file with nodes of the same names were run.
+    """Returns the running simulators that ROS would stop if a launch file were run, because of equal node names.
 
     Killed nodes are not returned, although they stay registered with the master.
 
@@ -96,7 +98,7 @@ def running_simulators(file: str, master: str) -> list[RunningNode]:
 
 
 def simulator_namespace(nodes: Set[str], master: str) -> str | None:
-    """Returns the namespace of the first simulator among some nodes, such as `left`. None before a simulator runs.
+    """Returns the namespace, such as `left`, of the first simulator among some nodes. None if no simulator runs.
 
     Args:
         nodes: Full names of the nodes.
@@ -115,7 +117,7 @@ def clocks(master: str) -> list[RunningNode]:
 
 
 def _state(master: str) -> list[list[tuple[str, list[str]]]]:
-    """Returns the master's publishers, subscribers and services, each with its nodes. Empty lists without a master."""
+    """Returns publishers, subscribers and services with their nodes. Empty lists if the master does not answer."""
     try:
         return _proxy(master).getSystemState(_CALLER)[2]
     except MASTER_FAILURES:

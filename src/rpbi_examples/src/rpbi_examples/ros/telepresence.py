@@ -77,7 +77,7 @@ class TelepresenceNode:
         """Dresses the person and reports the result. Returns at the end of the cuff's path, or when ROS shuts down.
 
         Raises:
-            InterfaceError: If arm or sleeve are unknown at the end.
+            InterfaceError: If the pose of the arm or the sleeve is unknown at the end.
         """
         wait_until_ready()
         rate, still_s, last_s = rospy.Rate(TARGET_HZ), 0.0, rospy.get_time()
@@ -113,7 +113,7 @@ class TelepresenceNode:
         self._show(arm, force_n)
 
     def _arm(self) -> ArmPosition | None:
-        """Looks up the joint positions of the person's arm on TF. None if a pose is missing or too old."""
+        """Looks up shoulder, elbow and wrist of the person's arm on TF. None if a pose is missing or too old."""
         places = []
         for name in JOINTS_OF_ARM:
             message = self._tf.get_tf_msg("rpbi/world", f"rpbi/human/{name}")

@@ -22,7 +22,7 @@ CONFIG = "-d"
 
 
 def main() -> None:
-    """Replaces this process with RViz. RViz gets the same arguments, and displays for the running world.
+    """Replaces this process with RViz. RViz receives this process's arguments, and displays for the running world.
 
     Without a simulator that loaded a world from a file, RViz starts without these displays. The same holds if the file
     is invalid; the simulator reports the error then.
