@@ -59,7 +59,7 @@ class MirroredHands:
         return self._on_circles(time_s - RAMP_S / 2.0 if time_s > RAMP_S else time_s**2 / (2.0 * RAMP_S))
 
     def _on_circles(self, time_s: float) -> tuple[float, ...]:
-        """Returns the positions of the n joints [rad] at a time on the circles [s].
+        """Returns the positions of the n joints [rad] at a time since the start of the circles [s].
 
         Inverse kinematics always start from the same posture, so that all rounds are equal.
         """

@@ -1,4 +1,6 @@
-"""Scenes: tasks of robots in a world, with a score. A new scene is a class in its own file and an entry in `SCENES`."""
+"""Scenes: robot tasks in a world, with a score. To add a scene, write its class in a new file, and add an entry to
+`SCENES`.
+"""
 
 from __future__ import annotations
 

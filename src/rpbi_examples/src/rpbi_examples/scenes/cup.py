@@ -1,4 +1,4 @@
-"""A Kinova Jaco grasps a cup with balls in it, lifts it and puts it on a shelf."""
+"""A Kinova Jaco arm grasps a cup that contains balls, lifts the cup and puts the cup on a shelf."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Bend = tuple[float, float]
 
 
 class Cup(Scene):
-    """A Jaco holds a cup between two fingers, by friction, and moves so smoothly that no ball leaves the cup."""
+    """A Kinova Jaco arm grasps a cup that contains balls, and puts the cup on a shelf without spilling a ball."""
 
     world = "{rpbi_examples}/configs/cup/config.yaml"
     watch = Watched(robots=("kinova",), bodies=("cup", "shelf", *BALLS), contacts=("cup",))
@@ -116,7 +116,7 @@ class Cup(Scene):
         }
 
     def _until(self, name: str, motion: Iterator[None]) -> Iterator[None]:
-        """Continues a motion until a body, or a link of the robot, touches the cup.
+        """Continues a motion until the body or robot link `name` touches the cup.
 
         Raises:
             SceneFailedError: If the motion ends without contact.

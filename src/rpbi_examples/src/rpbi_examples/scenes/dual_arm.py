@@ -37,7 +37,7 @@ of a flange points at the box.
 
 
 class DualArm(Scene):
-    """Two iiwas carry a box together: they share its weight and press it with a constant internal force."""
+    """Two KUKA iiwa arms press a box between their flanges with a constant force, and carry the box to a goal."""
 
     world = "{rpbi_examples}/configs/dual_arm/config.yaml"
     watch = Watched(robots=("left", "right"), bodies=("box",), contacts=("box",))
@@ -92,7 +92,7 @@ class DualArm(Scene):
             self._shares.append(left / max(left + right, 1.0))
 
     def has_succeeded(self) -> bool:
-        """Returns whether the box was carried level and with the desired force, and is released at its goal."""
+        """Returns whether the box stayed level, was pressed with the desired force, and is released at its goal."""
         off_m, off_rad = self._error()
         is_there = off_m < NEAR_M and off_rad < NEAR_RAD and self._touching() == {"table"}
         is_held = np.quantile(np.abs(np.array(self._forces or [0.0]) - FORCE_N), 0.95) < MAX_CHANGE * FORCE_N
@@ -104,8 +104,8 @@ class DualArm(Scene):
         return "" if off_m < NEAR_M else f"the box slipped: it is {1e3 * off_m:.0f} mm from its goal"
 
     def figures(self) -> dict[str, float]:
-        """Returns the final error, the largest tilt, the range of the internal force, and the left arm's share of the
-        load.
+        """Returns the box's final error and largest tilt, the range of the pressing force, and the left arm's share of
+        the load.
         """
         off_m, off_rad = self._error()
         low, high = np.quantile(self._forces or [0.0], (0.025, 0.975))
@@ -137,7 +137,7 @@ class DualArm(Scene):
             yield
 
     def _pressure(self, robot: str) -> float:
-        """Returns the force of an arm on the box along the box's y axis [N]."""
+        """Returns the magnitude of the force of an arm on the box along the box's y axis [N]."""
         axis: Vector = rotated(self.seen.poses["box"].quat_xyzw, (0.0, 1.0, 0.0))
         return abs(sum(touch.normal_force * dot(touch.normal, axis) for touch in self._touches(robot)))
 

@@ -64,7 +64,7 @@ def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) 
     """Runs an episode of a scene with each seed, and yields the results as they arrive.
 
     Closing the generator ends its processes. After an error of the world, the episode counts as failed, and the next
-    episode has a new world.
+    episode runs in a new world.
 
     Args:
         scene: A name of `SCENES`, or `module:Class`.

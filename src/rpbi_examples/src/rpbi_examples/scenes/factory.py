@@ -1,4 +1,4 @@
-"""A robot with two arms takes parts of three kinds from a belt and sorts them into a box; a camera sees their tags."""
+"""A two-armed robot sorts parts of three kinds from a belt into a box. A camera detects the tags of the parts."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SIDES = {"left": 1.0, "right": -1.0}
 
 
 class Factory(Scene):
-    """Each arm takes the parts on its side; the belt continues when none is left there."""
+    """A two-armed robot sorts parts from a belt into a box. The belt moves on when neither arm can reach a part."""
 
     world = "{rpbi_examples}/configs/factory/config.yaml"
     watch = Watched(robots=("nextage", "conveyor"), bodies=tuple(PARTS), tags=("tag_detections",))
@@ -92,7 +92,7 @@ class Factory(Scene):
         return self.of - len(missing(self.seen.poses)), self.of
 
     def fault(self) -> str:
-        """Returns the parts that are not in the compartment of their kind."""
+        """Returns a text with the names of the parts that are not in the compartment of their kind."""
         return f"not in the box: {', '.join(missing(self.seen.poses))}"
 
     def figures(self) -> dict[str, float]:
@@ -109,8 +109,8 @@ class Factory(Scene):
     def _has_brought(self) -> bool:
         """Returns whether the belt has brought parts into reach.
 
-        This is so if a part is `STATION_M` past the belt's middle. It is also so if all remaining parts are on the belt
-        and are past the middle on average.
+        True if a part is `STATION_M` past the belt's middle. Also true if all remaining parts are on the belt and their
+        mean position is past the middle.
         """
         places = [tag.position[1] for tag in on_belt(self.sensed.tags).values()]
         are_last = len(places) + len(self._placed) >= self.of

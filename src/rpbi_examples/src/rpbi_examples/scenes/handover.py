@@ -1,4 +1,4 @@
-"""A person waves, hands a thing to a Panda, and takes the thing back. Person and robot react to each other."""
+"""A simulated person hands a thing to a Panda and takes the thing back. Person and robot react to each other."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ HANDS = {"human", "panda"}
 
 
 class Handover(Scene):
-    """A person waves, holds out a thing and later an empty palm; a Panda takes the thing, shows it and returns it."""
+    """A simulated person waves and hands a thing to a Panda. The Panda shows the thing and puts it back on the palm."""
 
     world = "{rpbi_examples}/configs/handover/config.yaml"
     watch = Watched(("human", "panda"), bodies=tuple(HALF_HEIGHTS_M), contacts=("human", *HALF_HEIGHTS_M))
@@ -59,7 +59,7 @@ class Handover(Scene):
 
     @cached_property
     def person(self) -> SwayingPerson:
-        """The person, whom `note` creates in the first cycle, so that equal seeds lead to equal episodes."""
+        """The simulated person. `note` creates the person in the first cycle, so that a seed determines the episode."""
         return SwayingPerson(self, self.random)
 
     def prepare(self) -> None:
@@ -70,7 +70,7 @@ class Handover(Scene):
         self.change(self.thing, mass=mass, lateralFriction=friction)
 
     def act(self) -> Iterator[None]:
-        """Makes the person and the robot act at the same time. Fails if another body touches the thing."""
+        """Makes person and robot act simultaneously. Fails if a body other than person and robot touches the thing."""
         yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
 
     def beside(self) -> Iterator[None]:
@@ -78,8 +78,8 @@ class Handover(Scene):
         yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:
-        """Makes the person wave, and hold out the thing until only the robot holds it. Then makes the person hold out
-        the empty palm until the thing is back.
+        """Makes the person wave, and hold out the thing until only the robot touches the thing. Then makes the person
+        hold out the empty palm until only the person touches the thing.
         """
         person, holders = self.person, self._holders
         yield from together(person.wave(WAVES), person.go(REST, 4.5))
@@ -148,8 +148,8 @@ class Handover(Scene):
         return was_handed_over and is_back and is_standing and self._holders.all_names <= HANDS
 
     def figures(self) -> dict[str, float]:
-        """Returns the largest force on the person, the time for which only the robot held the thing, and the thing's
-        tilts.
+        """Returns the largest force on the person, the time for which only the robot held the thing, and the final and
+        the largest tilt of the thing.
         """
         return {
             "largest force on the person [N]": self._force_n,

@@ -30,7 +30,7 @@ class Watched(NamedTuple):
         bodies: Bodies whose poses are observed, at the rate `base_state_hz` in YAML.
         wrenches: Force-torque sensors, as `ROBOT/JOINT`.
         contacts: Bodies whose contact forces are observed, at the rate `contacts: {hz: ...}` in YAML.
-        tags: Values of `topic` of AprilTag detectors, with the rate `hz` and without latency in YAML.
+        tags: AprilTag detectors without latency, observed at the rate `hz` in YAML. A detector is named by its `topic`.
     """
 
     robots: tuple[str, ...]
@@ -119,7 +119,7 @@ class Shove(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Changes dynamics of a body or a link.
+    """Changes dynamics parameters of a body or a link.
 
     Attributes:
         target: `NAME` or `NAME/LINK`.
@@ -139,7 +139,7 @@ class Switch(NamedTuple):
 
 
 class GainChange(NamedTuple):
-    """Changes configuration keys of a controller `ROBOT/CONTROLLER`, like its service `set_gains`."""
+    """Changes configuration keys of a controller `ROBOT/CONTROLLER`, like the controller's service `set_gains`."""
 
     target: str
     values: Mapping[str, float | Vector]
@@ -246,7 +246,7 @@ class Scene(ABC):
         return self.of * self.has_succeeded(), self.of
 
     def fault(self) -> str:
-        """Returns the reason for a failure in a few words, from the end of the episode. Empty if unknown."""
+        """Returns the reason for a failure in a few words, from the state at the episode's end. Empty if unknown."""
         return ""
 
     # --- Changes of the world
@@ -264,7 +264,7 @@ class Scene(ABC):
         self._changes.append(Shove(target, force, duration_s))
 
     def change(self, target: str, **values: float) -> None:
-        """Changes dynamics of a body or a link, such as `mass` [kg] or `lateralFriction`; see `Change`."""
+        """Changes dynamics parameters of a body or a link, such as `mass` [kg] or `lateralFriction`; see `Change`."""
         self._changes.append(Change(target, values))
 
     def switch(self, robot: str, start: tuple[str, ...] = (), stop: tuple[str, ...] = ()) -> None:
@@ -388,5 +388,5 @@ def run_scene(scene: Scene, stage: Stage) -> SceneResult:
 
 
 def broken_off(scene: Scene, error: InterfaceError) -> SceneResult:
-    """Returns the result of an episode that an error of its world has ended: 0 completed parts, the error as reason."""
+    """Returns the result of an episode that ended with an error of the world. The reason is the error's message."""
     return SceneResult(False, 0, scene.of, scene.seen.time_s, {}, " ".join(str(error).split()))

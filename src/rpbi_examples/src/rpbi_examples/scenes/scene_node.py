@@ -63,7 +63,7 @@ NODE = "scene"
 
 
 class SimulatorStage(Stage):
-    """Steps the simulator, and waits for the messages that the scene observes.
+    """Steps the simulator, and waits for the messages from which the scene observes the world.
 
     Since the simulator waits for the scene, the same seed leads to the same episode on any computer. When ROS shuts
     down, all methods raise a ROSInterruptException.

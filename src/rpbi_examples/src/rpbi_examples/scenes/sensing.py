@@ -53,7 +53,7 @@ class SensedPoses(Generic[Key]):
         self._smoothed: dict[Key, tuple[int, Pose]] = {}
 
     def track(self, time_s: float, poses: Mapping[Key, Pose]) -> dict[Key, Pose]:
-        """Measures the present poses, and returns the filtered poses of the measurements that have arrived.
+        """Measures the present poses, and returns the filtered poses from measurements whose delay has passed.
 
         Args:
             time_s: Present time [s].

@@ -37,11 +37,12 @@ NEAR_M, MAX_SLIP_M, MAX_LEAN_DEG, MOST_LEAN_DEG = 0.02, 0.01, 5.0, 15.0
 
 
 class Talos(Scene):
-    """A torque-controlled Talos balances: it reaches for a ball, and is pushed at its torso from a random direction.
+    """A torque-controlled Talos reaches for a ball, and keeps its balance when the torso is pushed.
 
     Attributes:
-        target: Target of the hand's point, in the world.
-        push_angle: Angle of the push from the robot's initial forward direction, positive to the left [rad].
+        target: Target pose, in the world, of the point between the fingers.
+        push_angle: Random direction of the push: the angle from the robot's initial forward direction, positive to the
+            left [rad].
         impulse: Impulse of the push [N s].
     """
 
@@ -78,7 +79,7 @@ class Talos(Scene):
         yield from self.beside()
 
     def beside(self) -> Iterator[None]:
-        """Shows the ball, waits until the hand is at the ball, pushes the robot, and waits until the hand is back.
+        """Shows the ball, waits while the hand reaches the ball, pushes the robot, and waits while the hand returns.
 
         Raises:
             SceneFailedError: If the hand does not reach the ball, or the robot falls.
@@ -106,7 +107,7 @@ class Talos(Scene):
             self._late_error_m = max(self._late_error_m, self._error_m())
 
     def has_succeeded(self) -> bool:
-        """Returns whether the robot stood only on its feet, is upright at the end, and the hand returned and stayed."""
+        """Returns whether the robot stood only on its feet, is upright, and has returned the hand to the ball."""
         stood = not self._has_touched and self._slip_m < MAX_SLIP_M and self._most_lean_deg < MOST_LEAN_DEG
         on_floor = {touch.other_link for touch in self.seen.contacts["floor"]}
         stands = on_floor == FEET and tilt_deg(self.pose(TORSO)) < MAX_LEAN_DEG

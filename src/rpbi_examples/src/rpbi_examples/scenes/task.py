@@ -55,8 +55,8 @@ class SceneTaskConfig(WorldTaskConfig):
 
 
 class SceneTask(WorldTask):
-    """Makes a scene the task of an environment. Actions move the scene's robots. With the action None, the scene itself
-    moves all robots.
+    """Task of a Gymnasium environment that runs a scene. Actions move the scene's robots. With the action None, the
+    scene itself moves all robots.
     """
 
     Config = SceneTaskConfig
@@ -95,7 +95,7 @@ class SceneTask(WorldTask):
             yield ObservationPart("goal", (-FARTHEST,) * count, (FARTHEST,) * count, lambda: self.scene.goal_numbers)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Creates a new scene, and prepares its episode. The scene's random numbers come from `seed` if it is set."""
+        """Creates a new scene, and prepares its episode. If the attribute `seed` is set, it replaces `random`."""
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
         self._beside, self._has_failed = None, False
@@ -106,7 +106,7 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots that the action controls; `Scene.beside` moves all others. With None, does nothing."""
+        """Moves the robots that the action controls. Lets `Scene.beside` move the others. With None, does nothing."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)
@@ -161,7 +161,7 @@ def make_env(scene: str, render_mode: str | None = None, noise: bool = False) ->
     """Creates an environment for a scene.
 
     Args:
-        scene: A name of `SCENES`, or `module:Class`.
+        scene: Name in `SCENES`, or `module:Class`.
         render_mode: Render mode of the environment, as in Gymnasium.
         noise: Whether poses are sensed with noise and delay.
 
@@ -220,7 +220,7 @@ def see(world: World, watch: Watched, time_s: float) -> Seen:
 
 
 def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
-    """Yields number and world pose of each detected tag. Only cameras with a fixed pose under `poses` are used."""
+    """Yields number and world pose of each detected tag. Only uses cameras with a fixed pose in the world's `poses`."""
     frames = {each.tf_id: Pose(*each.pose) for each in world.config.poses}
     for sensor in (sensor for name in world.bodies for sensor in world.sensors_of(name)):
         if isinstance(sensor, AprilTagsSensor) and sensor.topic in watch.tags:

@@ -38,7 +38,7 @@ share of removed stains.
 
 
 class Wiping(Scene):
-    """A KUKA LWR4+ wipes a board lane by lane; a controller in the tick holds the force.
+    """A KUKA LWR4+ wipes a board lane by lane with a sponge. A controller keeps the normal force constant.
 
     Attributes:
         force: Desired normal force [N].
@@ -137,7 +137,7 @@ class Wiping(Scene):
         return arm
 
     def _wipe(self, sponge: Pose) -> None:
-        """Records pose and force of the sponge. If the force is held, removes stains completely under the sponge."""
+        """Records pose and force of the sponge. If the force is held, removes the stains that the sponge covers."""
         board, force = self.seen.poses["board"], self._normal_force()
         self.stamps.append(Stamp.of(board.inverse() @ sponge))
         self.forces.append(force)

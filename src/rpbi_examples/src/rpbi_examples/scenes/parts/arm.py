@@ -32,7 +32,7 @@ class LedArm:
         base_link: First link of the kinematic chain.
         link: Last link of the kinematic chain, which is moved.
         base: Pose of `base_link` in the world.
-        slot: Input for the joint targets. Default: `ROBOT/target`.
+        slot: Input of the world for the joint targets. Default: `ROBOT/target`.
 
     Attributes:
         joint_names: Names of the joints in the chain.
@@ -61,7 +61,7 @@ class LedArm:
         return list(self._positions)
 
     def positions_at(self, pose: Pose) -> list[float]:
-        """Returns joint positions for a pose of the link in the world, near the last targets [rad or m].
+        """Returns joint positions [rad or m] at which the link has a pose in the world, near the last targets.
 
         Raises:
             SceneFailedError: If the pose is out of reach.

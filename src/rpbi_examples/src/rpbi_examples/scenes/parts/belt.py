@@ -1,4 +1,4 @@
-"""The conveyor belt of the factory, the parts on the belt, and the box for the parts, as in configs/factory."""
+"""The conveyor belt of the world in configs/factory, the parts on the belt, and the box for the parts."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ class Kind(NamedTuple):
 
     Attributes:
         height_m: Height of a part [m].
-        half_m: Half of a part's width along the part's y axis, along which the fingers close [m].
-        turn: Angle of symmetry: a part looks the same after this rotation about the vertical [rad]. 0: any rotation.
+        half_m: Half of a part's width along the part's y axis [m]. The fingers close along this axis.
+        turn: Angle of symmetry [rad]: a part looks the same after this rotation about the vertical. 0 stands for any
+            angle.
         x_m: x of the middle of the compartment for this kind [m].
     """
 
@@ -41,10 +42,10 @@ PARTS = {f"{name}_{number}": kind for name, kind in KINDS.items() for number in 
 
 
 def on_belt(tags: Mapping[int, Pose]) -> dict[str, Pose]:
-    """Returns the poses of the tags above the belt, indexed by the part's name.
+    """Returns the poses of the tags above the belt, indexed by the name of the tagged part.
 
     Args:
-        tags: Poses of all seen tags in the world, indexed by tag number.
+        tags: Poses of all detected tags in the world, indexed by tag number.
     """
     seen = {part: tags[number] for number, part in enumerate(PARTS, 1) if number in tags}
     return {part: tag for part, tag in seen.items() if abs(tag.position[0] - BELT_X_M) < BELT_HALF_M}
@@ -66,7 +67,7 @@ def missing(poses: Mapping[str, Pose]) -> list[str]:
 
 
 def grasp_yaw(kind: Kind, yaw: float, wanted: float) -> float:
-    """Returns the yaw for a hand that grasps a part [rad]: of all yaws that fit the part, the nearest to `wanted`.
+    """Returns the yaw, nearest to `wanted`, with which a hand can grasp a part [rad].
 
     Args:
         kind: Kind of the part.

@@ -39,7 +39,7 @@ class Holders:
     Attributes:
         names: Names of the bodies that touch the thing now.
         all_names: Names of all bodies that have touched the thing so far.
-        alone_s: Longest time for which only this body touched the thing [s], indexed by the body's name.
+        alone_s: Longest time for which a body alone touched the thing [s], indexed by the body's name.
     """
 
     def __init__(self, scene: Scene, thing: str) -> None:
@@ -79,7 +79,7 @@ class Holders:
         return self._scene.seen.time_s - self._since_s
 
     def is_alone(self, name: str, duration_s: float) -> bool:
-        """Returns whether only the named body has touched the thing, for at least a duration up to now [s]."""
+        """Returns whether only the named body has touched the thing during the last `duration_s` seconds."""
         return self.names == {name} and self.has_lasted_s() >= duration_s
 
     def force(self, name: str) -> float:
@@ -87,7 +87,7 @@ class Holders:
         return sum(each.normal_force for each in self._scene.seen.contacts[self._thing] if each.other == name)
 
     def links(self) -> set[str]:
-        """Returns the names of the links of other bodies that touch the thing."""
+        """Returns the names of all links that touch the thing."""
         return {touch.other_link for touch in self._scene.seen.contacts[self._thing]}
 
 
@@ -171,7 +171,7 @@ class PandaArm(LedArm):
 
 
 def above(place: Vector, height_m: float) -> Vector:
-    """Returns a position that is raised by a height [m]."""
+    """Returns the position at a height above `place` [m]."""
     return plus(place, (0.0, 0.0, height_m))
 
 

@@ -36,8 +36,8 @@ class Patch(NamedTuple):
     """The convex hull of the points at which a tool touches a plane.
 
     Attributes:
-        edges: Outward normal and offset of each edge, shape (n, 3). A point is inside if the product of each row with
-            (x, y, 1) is at most 0. Without edges, the patch is empty.
+        edges: Outward normal and offset of each edge, shape (n, 3). A point is inside if the dot product of each row
+            with (x, y, 1) is at most 0. Without edges, the patch is empty.
     """
 
     edges: np.ndarray
@@ -125,7 +125,7 @@ def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
 
 
 def share_of_way(places: Sequence[Sequence[float]], holds: Sequence[bool]) -> float:
-    """Returns the share of a path's length along which a condition holds. A step counts by the value at its end.
+    """Returns the share of a path's length along which a condition holds, as decided at the end of each segment.
 
     Args:
         places: Points of the path. The first two values of each point are x and y [m].

@@ -113,7 +113,7 @@ class SwayingPerson:
 
 
 def together(*acts: Iterator[None]) -> Iterator[None]:
-    """Runs several actions at the same time, until all have ended. Each cycle advances the actions in their order."""
+    """Runs several actions at the same time until all have ended. In each cycle, the actions advance in order."""
     running = list(acts)
     while running := [act for act in running if next(act, running) is None]:
         yield

@@ -1,4 +1,4 @@
-"""Two arms of one robot that keep a distance between them, a zone that one arm at a time may enter, and grippers."""
+"""Moves two arms of a robot with a minimum distance, reserves a zone for one arm at a time, and moves grippers."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class TwoArms:
         robot: Name of the robot in the world.
         urdf: URDF file of the robot.
         base_link: Link on which both arms are mounted.
-        links: Link that is moved, indexed by the arm's name.
+        links: For each arm, the link that is moved, indexed by the arm's name.
         base: Pose of `base_link` in the world.
-        joints: Positions of other joints, such as fingers, that are assumed for the distances [rad or m].
-        least_m: Least distance between the arms [m].
+        joints: Fixed positions of other joints, such as fingers, for the computation of distances [rad or m].
+        least_m: Minimum distance between the arms [m].
 
     Attributes:
         arms: The arms, indexed by name.
@@ -64,7 +64,7 @@ class TwoArms:
     def send(self, name: str, pose: Pose) -> bool:
         """Sends an arm to a pose in the world, unless the pose is too near to the other arm.
 
-        A pose at less than the least distance is accepted if the distance does not decrease.
+        If the arms are nearer than the minimum distance, poses are accepted that do not decrease the distance.
 
         Returns:
             Whether the arm was sent.
@@ -84,15 +84,15 @@ class TwoArms:
         return True
 
     def measured_m(self) -> float:
-        """Returns the present distance between the arms [m]; inf if it is larger than `FAR_M`."""
+        """Returns the present distance between the arms [m], or inf if larger than `FAR_M`."""
         return self._distance_m(self._scene.seen.joints[self._robot], FAR_M)
 
     def _distance_m(self, joints: Mapping[str, float], most_m: float) -> float:
-        """Returns the distance between the arms at given joint positions [m]; inf if it is larger than `most_m`.
+        """Returns the distance between the arms at given joint positions [m], or inf if larger than `most_m`.
 
         Args:
             joints: Positions of some joints [rad or m]. Other joints are at their last targets.
-            most_m: Largest distance that is computed [m].
+            most_m: Distance above which the result is inf [m].
         """
         sent = [position for arm in self.arms.values() for position in arm.positions]
         places = zip(self._names, [*sent, *self._joints.values()])
