@@ -1,6 +1,6 @@
 """Tools for the simulator: console commands, windows, tracking, interpolation and an emulated driver.
 
-The names in `__all__` are re-exported from `rpbi_data`, which is imported for them at their first use.
+The names in `__all__` are re-exported from `rpbi_data`.
 """
 
 from typing import Any

@@ -17,6 +17,6 @@ FILES: dict[str, type[ConfigModel]] = {
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns the text of each schema file, keyed by its path in the workspace `root`."""
+    """Returns the text of each schema file, keyed by the file's path. `root` is the workspace folder."""
     found = {name: json_schema(model, name) for name, model in FILES.items()}
     return schema_texts(root / "src/rpbi_utils/schema", found)

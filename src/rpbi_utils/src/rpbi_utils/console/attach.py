@@ -18,17 +18,17 @@ def attach(
     max_force: Annotated[float, Argument("N", parse=number)] = 0.0,
     ns: Namespace = None,
 ) -> str:
-    """Attaches one thing to another at their present poses, until it is detached or breaks off.
+    """Attaches an object to another object at their present relative pose.
 
         ./rpbi attach box panda/panda_hand --max-force 20
         ./rpbi detach box
 
     Args:
-        CHILD, PARENT: objects, or links as OBJECT/LINK
-        name: by which it is detached; without it, the child's
-        ball: the position alone is held, it may turn
-        max_force: breaks off beyond it [N]; without it, it never does
-        ns: of the simulator, if it was started in one
+        CHILD, PARENT: objects, or links written as OBJECT/LINK
+        name: name of the attachment, as used by `detach`; default: name of the child object
+        ball: hold only the position; the child may rotate freely
+        max_force: force above which the attachment breaks [N]; without this option, it never breaks
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     attachment = Attachment(
         name=name or child.partition("/")[0],

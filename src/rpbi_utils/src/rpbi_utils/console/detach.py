@@ -10,10 +10,11 @@ from .running_simulator import OBJECTS, Namespace, RunningSimulator
 
 
 def detach(*names: Annotated[str, Argument("NAME ...", offers=OBJECTS)], ns: Namespace = None) -> str:
-    """Releases what was attached.
+    """Removes attachments that `attach` or the world's file has made.
 
     Args:
-        ns: of the simulator, if it was started in one
+        NAME: name of an attachment
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     simulator = RunningSimulator(ns)
     return "\n".join(simulator.call("rpbi/detach", SetString, name).message for name in names)

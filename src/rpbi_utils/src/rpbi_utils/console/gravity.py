@@ -17,10 +17,10 @@ def gravity(
     *,
     ns: Namespace = None,
 ) -> str:
-    """Changes gravity, until the next reset.
+    """Changes gravity until the next reset.
 
     Args:
-        X Y Z: [m/s^2]
-        ns: of the simulator, if it was started in one
+        X Y Z: acceleration in the world frame [m/s^2]
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     return str(RunningSimulator(ns).call("rpbi/set_gravity", SetGravity, Vector3(x, y, z)).message)

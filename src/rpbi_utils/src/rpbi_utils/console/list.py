@@ -6,10 +6,10 @@ from .running_simulator import Namespace, RunningSimulator
 
 
 def list(*, ns: Namespace = None) -> str:
-    """Lists the objects in the running world, with types.
+    """Lists the names and types of the objects in the running world.
 
     Args:
-        ns: of the simulator, if it was started in one
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     objects = {printable(name): printable(kind) for name, kind in RunningSimulator(ns).objects().items()}
     width = max(map(len, objects), default=0)

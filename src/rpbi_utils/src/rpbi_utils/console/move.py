@@ -24,10 +24,10 @@ def move(
     stop: Annotated[bool, Argument("", excludes="instead")] = False,
     ns: Namespace = None,
 ) -> str:
-    """Moves joints or a link of a robot in a given time, or puts an object somewhere at once.
+    """Moves joints or a link of a robot in a given time, or teleports another object to a pose.
 
-    It ends when the robot is there and prints the remaining error, or with 1 if the robot did not arrive. Ctrl-C leaves
-    the robot moving.
+    The command waits for the end of the motion and prints the remaining error. The exit code is 1 if the robot did not
+    reach the goal. Ctrl-C ends the command, but the robot keeps moving.
 
         ./rpbi move panda panda_joint4:=-90deg panda_joint6:=1.6
         ./rpbi move panda/panda_grasptarget 0.5 0 0.3 180deg 0 0
@@ -41,13 +41,14 @@ def move(
         ./rpbi move OBJECT X Y Z [ROLL PITCH YAW] [--ns NAMESPACE]
 
     Args:
-        JOINT:=POSITION: [rad or m], or as 30deg
-        X Y Z: [m], in the world
-        ROLL PITCH YAW: [rad] about the world's axes, or as 90deg; without them, the orientation of a link is free
-        duration_s: how long it takes [s]; 2 without it
-        home: all joints go to where they started
-        stop: ends a motion; its joints hold where they are
-        ns: of the simulator, if it was started in one
+        JOINT:=POSITION: goal of a joint [rad or m]; 30deg is an angle in degrees
+        X Y Z: goal position in the world frame [m]
+        ROLL PITCH YAW: goal orientation about the world's fixed axes [rad], or 90deg; if omitted, a link may have any
+            orientation, and an object gets the identity
+        duration_s: duration of the motion [s]; default: 2
+        home: moves all joints to their start positions
+        stop: ends the running motion; the joints hold their present positions
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     simulator = RunningSimulator(ns)
     body, _, link = name.partition("/")

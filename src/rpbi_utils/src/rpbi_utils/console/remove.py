@@ -11,10 +11,11 @@ from .running_simulator import OBJECTS, Namespace, RunningSimulator
 
 
 def remove(*names: Annotated[str, Argument("NAME ...", offers=OBJECTS)], ns: Namespace = None) -> str:
-    """Takes objects or cameras out of the running world.
+    """Removes objects or cameras from the running world.
 
     Args:
-        ns: of the simulator, if it was started in one
+        NAME: name of an object or a camera
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     simulator = RunningSimulator(ns)
     objects = simulator.objects()

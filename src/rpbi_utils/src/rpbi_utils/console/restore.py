@@ -13,10 +13,11 @@ from .running_simulator import Namespace, RunningSimulator
 def restore(file: Annotated[Path, Argument("FILE.world", parse=Path, files="*.world")], *, ns: Namespace = None) -> str:
     """Restores the running world to a saved state.
 
-    It simulates again from the start of the world, so it takes a while if that was long ago. Stamps do not go back.
+    The simulator simulates again from the start of the world or from the file's keyframe, which may take a while.
+    Message stamps continue to increase.
 
     Args:
         file: file that `save` wrote, on the simulator's computer
-        ns: of the simulator, if it was started in one
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     return str(RunningSimulator(ns).call("rpbi/restore", SetString, str(file.absolute())).message)

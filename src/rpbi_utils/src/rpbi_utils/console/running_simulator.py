@@ -21,7 +21,7 @@ Namespace = Annotated[str | None, Argument("NAMESPACE")]
 
 
 class RunningSimulator:
-    """The simulator that runs in a namespace.
+    """Client of the simulator that runs in a namespace.
 
     Args:
         namespace: Namespace of the simulator, such as `left`. None: the namespace of this process.
@@ -78,10 +78,10 @@ class RunningSimulator:
         return dict(zip(listed.names, listed.types))
 
     def require(self, body: str, name: str, what: str) -> str:
-        """Checks that a body has a topic or service, and returns the name `rpbi/BODY/NAME`.
+        """Checks that a body subscribes to a topic or offers a service, and returns its name `rpbi/BODY/NAME`.
 
         Args:
-            body: Name of the object.
+            body: Name of the body.
             name: Last part of the name of the topic or service.
             what: Kind of body that has the topic or service, such as `a robot`; used in the error message.
 
@@ -101,12 +101,12 @@ class RunningSimulator:
 def joint_values(
     simulator: RunningSimulator, robot: str, words: Sequence[str], are_positions: bool
 ) -> dict[str, float]:
-    """Reads words like `JOINT:=VALUE` and returns the values, keyed by joint name.
+    """Parses words of the form `JOINT:=VALUE` and returns the values, keyed by joint name.
 
     Args:
         simulator: Simulator of the robot.
         robot: Name of the robot.
-        words: Words to read. The suffix `deg` converts a value from degrees to radians.
+        words: Words to parse. A value with the suffix `deg` is converted from degrees to radians.
         are_positions: Whether the values are positions, which are checked against the joint limits.
 
     Raises:
@@ -131,9 +131,9 @@ def joint_values(
 
 
 def _check_limit(joint: JointInfo, word: str) -> None:
-    """Raises an InterfaceError for a position beyond the joint's limits.
+    """Raises an InterfaceError if the position in `word` is beyond the joint's limits.
 
-    The message suggests the suffix `deg` if the position would be valid in degrees.
+    The message suggests the suffix `deg` if the position would be within the limits in degrees.
     """
     lower, upper, position = joint.jointLowerLimit, joint.jointUpperLimit, number(word)
     if not lower < upper or lower - LIMIT_ROUNDING <= position <= upper + LIMIT_ROUNDING:

@@ -16,12 +16,14 @@ def save(
     keyframe: Annotated[bool, Argument("")] = False,
     ns: Namespace = None,
 ) -> str:
-    """Saves the state of the running world in a file, from which `restore` makes the same world, to the last bit.
+    """Saves the state of the running world in a file; `restore` reproduces this state exactly, bit by bit.
 
     Args:
-        file: file that the simulator writes, on its computer, in your home or its ~state_folder
-        keyframe: makes a keyframe first, which changes what follows a little; the file is then restored at once
-        ns: of the simulator, if it was started in one
+        file: file on the simulator's computer, below the folder in the simulator's parameter ~state_folder (default:
+            home)
+        keyframe: makes a keyframe first, so that `restore` need not simulate again; the keyframe changes the further
+            simulation a little
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     service = "rpbi/save_keyframe" if keyframe else "rpbi/save"
     return str(RunningSimulator(ns).call(service, SetString, str(file.absolute())).message)

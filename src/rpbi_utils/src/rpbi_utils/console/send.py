@@ -32,9 +32,9 @@ def send(
     duration_s: Annotated[float, Argument("S", "--for", number)] = 1.0,
     ns: Namespace = None,
 ) -> str:
-    """Sends targets to a robot's joints, a velocity to its base, or a force to anything that can move.
+    """Sends targets to a robot's joints, a velocity to a mobile robot's base, or applies a force to an object.
 
-    Positions act at once; `move` takes its time.
+    Position targets act at once; `move` reaches positions in a given time.
 
     Usage:
         ./rpbi send ROBOT JOINT:=VALUE ... [--velocity | --effort] [--for S] [--ns NAMESPACE]
@@ -42,13 +42,13 @@ def send(
         ./rpbi send OBJECT[/LINK] --push FX FY FZ [--for S] [--ns NAMESPACE]
 
     Args:
-        JOINT:=VALUE: a position [rad or m], or as 30deg
+        JOINT:=VALUE: position of a joint [rad or m]; 30deg is an angle in degrees
         velocity: the values are velocities [rad/s or m/s], for robots under velocity control
         effort: the values are efforts [N m or N], for robots under torque control
-        drive: velocity of the base [m/s, m/s, rad/s], in its own frame
+        drive: velocity of the base in the base's frame [m/s, m/s, rad/s]
         push: force on the link's origin [N], in the world's axes
-        duration_s: how long [s]; 1 without it. Positions are sent once
-        ns: of the simulator, if it was started in one
+        duration_s: duration of velocities, efforts or the force [s]; default: 1. Positions are sent once.
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     simulator = RunningSimulator(ns)
     body, _, link = name.partition("/")
@@ -95,7 +95,10 @@ def _check_mode(simulator: RunningSimulator, robot: str, quantity: str) -> None:
 
 
 def _publish(simulator: RunningSimulator, topic: str, message: Any, duration_s: float = 0.0, last: Any = None) -> None:
-    """Publishes a message once or, if `last` is given, for `duration_s` [s of wall time] and then publishes `last`."""
+    """Publishes a message once. If `last` is given, repeats the message for `duration_s` [s], then publishes `last`.
+
+    The duration is in wall time.
+    """
     rospy.init_node("rpbi_world", anonymous=True, disable_signals=True, disable_rostime=True)
     try:
         with warnings.catch_warnings():

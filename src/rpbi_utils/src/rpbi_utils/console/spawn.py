@@ -24,7 +24,7 @@ Numbers = list[float] | None
 
 
 def kinds() -> Iterator[str]:
-    """Yields the names of the types that can be added to a world: all types of objects, and `camera`."""
+    """Yields the type names that can be added to a world: all object types, then `camera`."""
     from rpbi.bodies import BODY_TYPES  # slow to import, and rarely needed
 
     yield from BODY_TYPES
@@ -40,22 +40,22 @@ def spawn(
     type: Annotated[str | None, Argument("TYPE", choices=kinds)] = None,
     ns: Namespace = None,
 ) -> str:
-    """Puts an object, a robot or a camera into the running world.
+    """Adds an object, a robot or a camera to the running world.
 
-    A URDF by itself is a thing without motors that falls; with --type robot its base is fixed and its joints are held
-    by position. Files are read where the simulator runs.
+    A URDF file alone makes a free-floating object without motors. With --type robot, it makes a robot with a fixed base
+    and position-controlled joints. The simulator reads the files on its own computer.
 
         ./rpbi spawn box.yaml --name second_box --at 0.5 0 1
         ./rpbi spawn kuka_iiwa/model.urdf --type robot --name arm
 
     Args:
-        FILE: its YAML, as a world names it, or a URDF; {package}/PATH is resolved
-        name: another name than in the file; without it, a URDF is called as its file
-        at: where [m], in place of basePosition
-        rpy: how turned [rad], in place of baseOrientation
+        FILE: YAML file of the object or camera, or a URDF file; may have the form {package}/PATH
+        name: name of the object; default: the name in the YAML file, or the URDF's file name
+        at: position in the world frame [m], instead of basePosition
+        rpy: orientation as fixed-axis angles [rad], instead of baseOrientation
         type: {choices};
-            without it, the keys of the file decide
-        ns: of the simulator, if it was started in one
+            default: the type whose keys fit the file best
+        ns: namespace of the simulator; default: ROS_NAMESPACE
     """
     simulator = RunningSimulator(ns)
     try:
@@ -87,10 +87,10 @@ def spawn(
 
 
 def kind_in(data: Mapping[str, Any]) -> str:
-    """Returns the type of object, or `camera`, whose configuration model fits the keys of YAML data best.
+    """Returns the object type, or `camera`, whose configuration model fits the keys of YAML data best.
 
-    Models whose required keys are all present come first. Among these, the model that knows the most of the given keys
-    is chosen. Ties are broken by more required keys, then by fewer keys in total.
+    Models are ranked by these criteria, the first being the most important: all required keys are present; the largest
+    number of given keys is known; the most keys are required; the fewest keys in total.
     """
     from rpbi.bodies import BODY_TYPES
     from rpbi.config.sensors import RgbdSensorConfig
@@ -105,9 +105,10 @@ def kind_in(data: Mapping[str, Any]) -> str:
 
 
 def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
-    """Returns YAML data for an object that is given by a URDF file only.
+    """Returns YAML data for an object that is described only by the URDF file `path`.
 
-    The type `robot` has a fixed base and position-controlled joints. All other types have a free base and no motors.
+    For the kind `robot`, the base is fixed and the joints are position-controlled. For all other kinds, the base is
+    free and there are no motors.
     """
     name = re.sub(r"\W", "_", Path(path).stem)
     if kind != "robot":
@@ -117,7 +118,7 @@ def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
 
 
 def _placement(data: Mapping[str, Any], at: Numbers, rpy: Numbers) -> dict[str, Any]:
-    """Returns the YAML keys that place an object at a position `at` [m] and at angles `rpy` [rad]."""
+    """Returns the YAML keys and values that place an object at position `at` [m] with angles `rpy` [rad]."""
     keys: dict[str, Any] = {} if at is None else {"basePosition": at}
     if rpy is not None:
         keys["baseOrientation"] = quat_of(rpy).tolist()

@@ -12,14 +12,14 @@ LIMIT_S = 10.0
 
 
 class RequestResult(NamedTuple):
-    """Result of a request that has finished, failed or timed out.
+    """Result of a request that has succeeded, failed or timed out.
 
     Attributes:
         name: Name of the request, as shown to the user.
         value: Return value of the request's function; None after a failure.
-        error: Reason of the failure; empty on success.
+        error: Reason for the failure; empty on success.
         duration_s: Duration of the request [s].
-        then: Function that the window calls with this result; None to call nothing.
+        then: Function that the window calls with this result; None for no call.
     """
 
     name: str
@@ -33,7 +33,7 @@ class BackgroundRequests:
     """Runs each requested function in its own thread.
 
     Args:
-        deliver: Function that is called with each request's result exactly once, from any thread.
+        deliver: Function that is called exactly once with each request's result, from a background thread.
     """
 
     def __init__(self, deliver: Callable[[RequestResult], None]) -> None:
@@ -48,7 +48,7 @@ class BackgroundRequests:
     ) -> None:
         """Starts a function in the background and returns at once.
 
-        The result is an error if the function raises an exception or takes longer than `limit_s` [s].
+        The result contains an error if the function raises an exception or takes longer than `limit_s` [s].
         """
         threading.Thread(target=self._watch, args=(name, function, then, limit_s), name=name, daemon=True).start()
 

@@ -1,4 +1,4 @@
-"""Configuration of `stand_in_node.py`, and the limits of robots."""
+"""Configuration of `stand_in_node.py`, including the limits of robots' joints."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NoNegativeTime = Annotated[NonNegative, Unit("s")]
 
 
 class DriverJointLimits(ConfigModel):
-    """Limits of a joint in a robot's controller."""
+    """Limits that a robot's controller checks for one joint."""
 
     lower: Angle = Field(description="Lowest position.")
     upper: Angle = Field(description="Highest position.")
@@ -57,7 +57,7 @@ class DriverJointLimits(ConfigModel):
 
 
 class NoiseConfig(ConfigModel):
-    """Noise and delay of measured states."""
+    """Noise and delay that are added to measured joint states."""
 
     position: Annotated[NonNegative, Unit("rad or m")] = Field(0.0, description="Standard deviation of positions.")
     velocity: Annotated[NonNegative, Unit("rad/s or m/s")] = Field(0.0, description="That of velocities.")
@@ -67,7 +67,7 @@ class NoiseConfig(ConfigModel):
 
 
 class FakeDriverConfig(ConfigModel):
-    """Behaviour of a robot's controller at its topics."""
+    """Emulated robot driver: the robot, its joint limits, timing, delays and noise, and names and units of joints."""
 
     robot: Name = Field(description="The robot in the simulator of the same namespace, `rpbi/NAME`.")
     limits: Text = Field(description=f"Whose limits it has: {', '.join(ROBOTS)}, or a YAML file of such limits.")
@@ -90,7 +90,7 @@ class FakeDriverConfig(ConfigModel):
     noise: NoiseConfig = Field(NoiseConfig(), description="Noise and delay of the published states.")
 
     def load_limits(self) -> dict[str, DriverJointLimits]:
-        """Returns the limits, keyed by the joints' names in the simulator, in the order of the driver's joints.
+        """Returns the joint limits, keyed by joint name in the simulator. The keys have the driver's joint order.
 
         Raises:
             ConfigError: If the limits cannot be read or are invalid.
@@ -121,7 +121,7 @@ class FakeDriverConfig(ConfigModel):
 
 
 class RobotLimits(ConfigModel):
-    """A YAML file of limits."""
+    """Content of a YAML file with the limits of a robot's joints."""
 
     joints: dict[Text, DriverJointLimits] = Field(description="Limits of each joint, by its name in the simulator.")
 

@@ -14,23 +14,23 @@ from .config import DriverJointLimits, FakeDriverConfig
 RATE_WINDOW_S = 1.0
 """Time over which the rate of commands is measured [s]."""
 REST_SHARE = 0.02
-"""Velocity up to which a joint counts as at rest when commands end, as a share of the joint's velocity limit."""
+"""Velocity up to which a joint counts as at rest when commands end, as a fraction of the joint's velocity limit."""
 EFFORT_SHARE = 0.999
-"""Effort from which a motor counts as saturated, as a share of the motor's limit.
+"""Effort from which a motor counts as saturated, as a fraction of the motor's limit.
 
-Less than 1 because of rounding: motors never exceed the limit itself.
+Less than 1 to tolerate rounding, since motors never exceed the limit itself.
 """
 MAX_CYCLE_S = 0.05
 """Longest time by which one cycle advances a reflex stop [s]. On a slow machine, longer cycles count as this time."""
 SPACING_GAIN = 0.05
-"""Share of a command's lateness that is added to the time of its set point.
+"""Fraction of a command's lateness that is added to the time of the command's set point.
 
 Lateness is measured from the nominal time, which is one cycle after the previous set point.
 """
 MAX_GAP_S = 0.2
-"""Lateness of a command above which the command's arrival becomes the time of its set point [s]."""
+"""Lateness above which a command's arrival time becomes the time of the command's set point [s]."""
 MIN_SPACING = 0.5
-"""Shortest time between two set points, as a share of a cycle."""
+"""Shortest time between two set points, as a fraction of a cycle."""
 
 Vector = tuple[float, ...]
 
@@ -67,7 +67,10 @@ class Reflex(NamedTuple):
 
 @dataclass
 class Counters:
-    """Counts of events since the start. `peaks` are the largest values since the last recovery, as shares of limits."""
+    """Counts of events since the controller started.
+
+    `peaks` has the largest commanded velocity, acceleration and jerk since the last recovery, divided by their limits.
+    """
 
     commands: int = 0
     ignored: int = 0
@@ -77,7 +80,7 @@ class Counters:
 
 
 class _Motion(NamedTuple):
-    """A commanded position, with velocity and acceleration from finite differences to the previous commands."""
+    """Commanded joint positions. Velocities and accelerations are finite differences of successive commands."""
 
     position: Vector
     velocity: Vector
@@ -85,11 +88,11 @@ class _Motion(NamedTuple):
 
 
 class SetPoint(NamedTuple):
-    """Target position of the motors at a time.
+    """Target positions of the motors at one time.
 
     Attributes:
-        time_s: Time by the clock of the commands [s]. Set points are nearly one cycle apart, even if commands arrive
-            unevenly.
+        time_s: Time on the same clock as the arrival times of commands [s]. Successive set points are about one cycle
+            apart, even if commands arrive unevenly.
         position: Joint positions [rad or m].
     """
 
@@ -98,14 +101,14 @@ class SetPoint(NamedTuple):
 
 
 class RobotController:
-    """Checks each command, forwards valid ones unchanged, and stops the robot at the first violation of a limit.
+    """Checks each command, forwards valid commands unchanged, and stops the robot at the first violation of a limit.
 
-    Velocity, acceleration and jerk are finite differences over one cycle, `1/command_hz`, even if commands arrive
-    unevenly. The rate and the time-out of the commands are checked separately.
+    Such a stop is called a reflex. Velocity, acceleration and jerk are finite differences of successive commands over
+    one cycle of `1/command_hz`, even if commands arrive unevenly. The command rate and time-out are checked separately.
 
     Args:
         config: Configuration of the controller.
-        limits: Limits, keyed by joint name. All vectors of joint values have the same order.
+        limits: Joint limits, keyed by joint name. All vectors of joint values are in the order of these keys.
         position: Initial joint positions [rad or m].
     """
 
@@ -141,7 +144,7 @@ class RobotController:
         During a reflex, commands are only counted.
 
         Args:
-            now_s: Arrival of the command, by the caller's clock [s].
+            now_s: Arrival time of the command, on the caller's clock [s].
             position: Commanded joint positions [rad or m].
         """
         if self.mode is Mode.REFLEX:
@@ -162,17 +165,17 @@ class RobotController:
         self._waiting.append((now_s + delay_s, self._planned_s + delay_s, motion))
 
     def refuse_command(self, what: str) -> None:
-        """Triggers a reflex because of a malformed command, for instance without a joint. `what` is the reason."""
+        """Triggers a reflex because a command is malformed, for example lacks a joint. `what` describes the fault."""
         if self.mode is Mode.REFLEX:
             self.counters.ignored += 1
         else:
             self._stop(Reflex("command_invalid", "", 0.0, 0.0, what))
 
     def cycle(self, now_s: float, position: Sequence[float], effort: Sequence[float]) -> list[SetPoint]:
-        """Checks the measured state, advances a reflex stop, and returns the new set points.
+        """Checks the measured state, continues braking during a reflex, and returns the new set points.
 
         Args:
-            now_s: Present time, by the clock of the commands [s].
+            now_s: Present time, on the same clock as the arrival times of commands [s].
             position: Measured joint positions [rad or m].
             effort: Measured efforts of the motors [N m or N].
 
@@ -196,7 +199,7 @@ class RobotController:
         """Ends a reflex. Returns None on success, otherwise the reason for the refusal.
 
         Args:
-            position: Measured joint positions, which become the set point [rad or m].
+            position: Measured joint positions [rad or m]. They become the set point.
         """
         if self.mode is not Mode.REFLEX:
             return "there is no reflex to recover from"
@@ -221,7 +224,7 @@ class RobotController:
         return None
 
     def _note_arrival(self, now_s: float) -> Reflex | None:
-        """Records the arrival of a command; returns a reflex if commands arrive at a wrong rate."""
+        """Records the arrival of a command. Returns a reflex if the rate of commands is wrong, otherwise None."""
         config, arrivals_s = self._config, self._arrivals_s
         if self.mode is Mode.IDLE:
             arrivals_s.clear()
@@ -245,7 +248,7 @@ class RobotController:
         return self._beyond_limits(motion.position, self._sent.position)
 
     def _refuse(self, motion: _Motion) -> Reflex | None:
-        """Returns a reflex for the first limit that the step to a command violates; None if all limits are kept."""
+        """Returns a reflex for the first limit that a new command violates; None if the command keeps all limits."""
         last = self._motion.position
         for name, limits, start, end in zip(self._names, self._limits, last, motion.position):
             step = 3.0 * limits.velocity * self._cycle_s if limits.step is None else limits.step
@@ -277,7 +280,7 @@ class RobotController:
         return None
 
     def _overloaded(self, now_s: float, effort: Sequence[float]) -> Reflex | None:
-        """Returns a reflex if a motor has been saturated for too long."""
+        """Returns a reflex if a motor has been saturated for too long, otherwise None."""
         wrong = None
         for name, limits, torque in zip(self._names, self._limits, effort):
             if abs(torque) < EFFORT_SHARE * limits.torque:
@@ -296,7 +299,10 @@ class RobotController:
         return None
 
     def _silent(self, now_s: float) -> Reflex | None:
-        """Returns a reflex if commands have stopped while the robot moves. If the robot is at rest, returns None."""
+        """Returns a reflex if commands have stopped while the robot moves, otherwise None.
+
+        If commands have stopped while the robot is at rest, sets the mode to IDLE.
+        """
         if self.mode is not Mode.MOVE or now_s - self._arrivals_s[-1] <= self._config.timeout_s or self._waiting:
             return None
         shares = [abs(v) / limits.velocity for v, limits in zip(self._motion.velocity, self._limits)]
@@ -323,14 +329,14 @@ class RobotController:
         self._waiting.clear()
 
     def _planned(self, now_s: float) -> float:
-        """Returns the set point's time of a command that arrives now [s]: nearly one cycle after the previous time."""
+        """Returns the set-point time [s] of a command that arrives now: about a cycle after the previous set point."""
         planned_s = self._planned_s + self._cycle_s
         if now_s - planned_s > MAX_GAP_S:
             return now_s
         return max(planned_s + SPACING_GAIN * (now_s - planned_s), self._planned_s + MIN_SPACING * self._cycle_s)
 
     def _brake(self, now_s: float, cycle_s: float) -> list[SetPoint]:
-        """Decelerates every joint at its acceleration limit. Returns the new set point; an empty list at rest."""
+        """Decelerates every joint at its acceleration limit. Returns the new set point, or an empty list at rest."""
         if not self.is_braking:
             return []
         position, velocity = [], []

@@ -19,9 +19,9 @@ class Measurement:
         self._waiting: deque[tuple[float, JointValues]] = deque()
 
     def observe(self, now_s: float, state: JointValues) -> JointValues | None:
-        """Queues the state at time `now_s` [s], and returns the newest state that is older than the delay, with noise.
+        """Queues the state at time `now_s` [s]. Returns the newest state whose age has reached the delay, with noise.
 
-        Returns None if no further state has become older than the delay since the last call.
+        Returns None if no further state has reached this age since the last call.
         """
         self._waiting.append((now_s + self._config.delay_s, state))
         known = None

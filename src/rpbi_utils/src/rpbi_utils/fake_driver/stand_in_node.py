@@ -1,4 +1,4 @@
-"""`stand_in_node.py`: emulates a robot's driver. A simulator in the same namespace simulates the robot."""
+"""`stand_in_node.py`: emulates a robot's driver for a robot that a simulator in the same namespace simulates."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class FakeDriver:
         self._command(lambda: JointValues.of(self._driver_names.values(), message.data))
 
     def _command(self, read: Callable[[], JointValues]) -> None:
-        """Passes a command to the controller; `read` returns the command with the driver's joint names and units."""
+        """Passes a command to the controller. `read` returns the command with the driver's joint names and units."""
         with self._lock:
             if self._controller is None:
                 self._warn("command", "ignored: the robot in the simulator has not said where it is")
@@ -84,7 +84,7 @@ class FakeDriver:
             self._report_changes()
 
     def _cycle(self, message: JointState) -> None:
-        """Runs a controller cycle with a joint state of the simulated robot; publishes targets and measurements."""
+        """Runs a controller cycle with the simulated robot's joint state. Publishes targets and measured states."""
         try:
             values = values_in(message).in_order(tuple(self._limits))
         except (InterfaceError, ValueError) as error:

@@ -1,6 +1,6 @@
 """Smooth motions through waypoints; `Interpolator` is the core of `interpolation_node.py`.
 
-The functions for complete series of numbers have the names and arguments of the authors' release.
+The exported functions and the class `TCubicHermiteSpline` have the names and arguments of the authors' release.
 """
 
 from .release import TCubicHermiteSpline as TCubicHermiteSpline

@@ -42,7 +42,7 @@ _LowerCase = BeforeValidator(lambda value: value.lower() if isinstance(value, st
 
 
 class WaypointError(ValueError):
-    """Waypoints that cannot be followed; the message names the key, the expected and the actual value."""
+    """Waypoints cannot be followed. The message names the key, the expected value and the actual value."""
 
 
 class InterpolationParameters(ConfigModel):
@@ -56,7 +56,7 @@ class InterpolationParameters(ConfigModel):
 
 
 class TranslationConfig(ConfigModel):
-    """Position of the frame: each axis is constant or a row of the waypoints."""
+    """Position of the target frame. Each coordinate is constant or taken from a row of the waypoint matrix."""
 
     translation_x: Metres | None = optional("Constant x; without it, x is planned.")
     translation_x_index: Count | None = optional("Row of x, not counting the time, if it is planned.")
@@ -66,12 +66,12 @@ class TranslationConfig(ConfigModel):
     translation_z_index: Count | None = optional("Row of z.")
 
     def axis(self, name: str) -> tuple[float | None, int | None]:
-        """Returns the constant value [m] and the row of the axis `x`, `y` or `z`; None for a missing value or row."""
+        """Returns the constant coordinate [m] and the row index of axis `x`, `y` or `z`. Either one may be None."""
         return getattr(self, f"translation_{name}"), getattr(self, f"translation_{name}_index")
 
 
 class RotationConfig(ConfigModel):
-    """Orientation of the frame: constant, or rows of the waypoints."""
+    """Orientation of the target frame: constant, or taken from rows of the waypoint matrix."""
 
     rotation_repr: Annotated[Literal["none", "theta", "euler", "quat", "axis_angle"], _LowerCase] = Field(
         "none",
@@ -89,18 +89,18 @@ class RotationConfig(ConfigModel):
 
     @property
     def rows(self) -> range:
-        """Rows of the waypoints that hold the orientation; empty for a constant orientation."""
+        """Indices of the waypoint rows that contain the orientation; empty for a constant orientation."""
         if self.rotation_repr == "none" or not self.rotation_vec_index:
             return range(0)
         return range(self.rotation_vec_index[0], self.rotation_vec_index[0] + ROWS_OF[self.rotation_repr])
 
     @property
     def is_path(self) -> bool:
-        """Whether the rows are interpolated together as an orientation, rather than one by one as numbers."""
+        """Whether the orientation's rows are interpolated together as a rotation, not one by one as numbers."""
         return self.rotation_repr in ("quat", "axis_angle") or (self.rotation_repr != "none" and self.shortest_path)
 
     def quat(self, values: Sequence[float]) -> Quaternion:
-        """Converts the values of `rows`, in the representation `rotation_repr`, to an orientation x, y, z, w.
+        """Converts the values in the rows `rows`, which have the form `rotation_repr`, to a quaternion x, y, z, w.
 
         Raises:
             WaypointError: If a quaternion is zero.
@@ -143,7 +143,7 @@ class RotationConfig(ConfigModel):
 
 
 class MotionDimensions(ConfigModel):
-    """Meaning of the rows of the waypoints: a frame's pose, or joints."""
+    """Meaning of the rows of the waypoint matrix: the pose of a frame, or the positions of joints."""
 
     number: Annotated[Count, Field(ge=1)] = Field(description="Number n of planned rows, without the time.")
     trans: TranslationConfig | None = optional("Position of a frame.")
@@ -173,7 +173,7 @@ class MotionDimensions(ConfigModel):
 
     @property
     def scalar_rows(self) -> tuple[int, ...]:
-        """Rows that are interpolated one by one as numbers."""
+        """Indices of the rows that are interpolated one by one as numbers."""
         path = self.rotation.rows if self.rotation.is_path else ()
         return tuple(row for row in range(self.number) if row not in path)
 
@@ -181,8 +181,8 @@ class MotionDimensions(ConfigModel):
         """Returns the frame's pose.
 
         Args:
-            scalars: Values of `scalar_rows`.
-            quat_xyzw: Orientation on the path; None to compute the orientation from `scalars` or constants.
+            scalars: Values of the rows `scalar_rows`.
+            quat_xyzw: Interpolated orientation; None to compute the orientation from `scalars` or constants.
         """
         assert self.trans is not None
         values = dict(zip(self.scalar_rows, scalars))
@@ -194,7 +194,7 @@ class MotionDimensions(ConfigModel):
 
 
 class InterpolationConfig(ConfigModel):
-    """Interpolation between waypoints."""
+    """Settings of the interpolation between waypoints: curve, sample time, limits, and treatment of new waypoints."""
 
     use_interpolation: Switch = Field(
         True, description="Whether to interpolate; otherwise waypoints are published unchanged, at their times."
@@ -213,7 +213,7 @@ class InterpolationConfig(ConfigModel):
 
 
 class PublisherConfig(ConfigModel):
-    """Destination of the targets."""
+    """TF frames or joint topic to which the interpolated targets are published."""
 
     header_frame_id: FrameId | None = optional("Parent frame of the target.")
     msg_child_frame_id: FrameId | None = optional("TF frame of the target.")
@@ -221,13 +221,13 @@ class PublisherConfig(ConfigModel):
 
 
 class CommunicationConfig(ConfigModel):
-    """Topics and frames."""
+    """Topics and TF frames of `interpolation_node.py`."""
 
     publisher: PublisherConfig = Field(PublisherConfig(), description="Destination of the targets.")
 
 
 class WaypointMotionConfig(ConfigModel):
-    """A motion through waypoints."""
+    """A motion through waypoints: meaning of the waypoints, interpolation, and destination of the targets."""
 
     motion_dimensions: MotionDimensions = Field(description="Meaning of the rows of the waypoints.")
     interpolation: InterpolationConfig = Field(InterpolationConfig(), description="Interpolation between waypoints.")

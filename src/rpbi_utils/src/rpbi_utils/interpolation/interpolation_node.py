@@ -42,10 +42,10 @@ NS_PER_S = 1_000_000_000
 
 
 class InterpolationNode:
-    """Receives waypoints, and publishes the samples of a motion through the waypoints in ROS time.
+    """Receives waypoints, plans a motion through the waypoints, and publishes samples of the motion in ROS time.
 
     Raises:
-        ConfigError: If parameters or the motion's file are wrong.
+        ConfigError: If a parameter or the YAML file of the motion is invalid.
     """
 
     def __init__(self) -> None:
@@ -150,7 +150,7 @@ class InterpolationNode:
             self._warn_of_no_limits(added.peaks.without_limit(self._limits))
 
     def _warn_of_no_limits(self, peaks: dict[str, float]) -> None:
-        """Warns of peaks without a limit, unless similar peaks were reported before."""
+        """Logs the peaks of quantities without a limit, unless similar or higher peaks were logged before."""
         if all(peak <= MORE * self._unlimited.get(key, 0.0) for key, peak in peaks.items()):
             return
         self._unlimited |= peaks
@@ -162,7 +162,7 @@ class InterpolationNode:
         self._interpolator.forget()
 
     def _report(self) -> None:
-        """Logs the start of a motion from rest, and the end of a motion."""
+        """Logs when a motion starts from rest and when a motion ends."""
         plan = self._interpolator.plan
         moves = plan is not None and self._now_s < plan.scalars.end_s + self._interpolator.delay_s
         if moves != self._moves:
@@ -182,7 +182,10 @@ class InterpolationNode:
 
 
 def _limits_of(config: WaypointMotionConfig) -> MotionLimitsConfig:
-    """Returns the limits of a motion. Takes missing velocity limits of joints from `robot_description`, if possible."""
+    """Returns the limits of a motion.
+
+    If the velocity limits of joints are missing, takes them from the ROS parameter `robot_description` if possible.
+    """
     limits, joints = config.interpolation.limits, config.motion_dimensions.joint_names
     parameter = rospy.resolve_name(ROBOT_DESCRIPTION)
     if joints is None or limits.velocity is not None or not rospy.has_param(parameter):
@@ -196,7 +199,7 @@ def _limits_of(config: WaypointMotionConfig) -> MotionLimitsConfig:
 
 
 def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy.Time, TargetSample], None]:
-    """Returns a function that publishes the pose of a sample on /tf."""
+    """Returns a function that publishes a sample's pose on /tf with a given stamp."""
     child = "/".join(part for part in (namespace.strip("/"), config.msg_child_frame_id) if part)
     publisher = rospy.Publisher("/tf", TFMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
@@ -209,7 +212,7 @@ def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy
 
 
 def _joint_publisher(config: WaypointMotionConfig) -> Callable[[rospy.Time, TargetSample], None]:
-    """Returns a function that publishes the joint positions and velocities of a sample."""
+    """Returns a function that publishes a sample's joint positions and velocities with a given stamp."""
     topic, names = config.communication.publisher.joint_topic, config.motion_dimensions.joint_names
     publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 

@@ -30,7 +30,7 @@ class TargetSample(NamedTuple):
 
     Attributes:
         time_s: Time of the sample [s].
-        state: Values, velocities and accelerations of the rows that are interpolated as numbers.
+        state: Values, velocities and accelerations of the waypoint rows that are interpolated as numbers.
         pose: Pose of the target frame; None for targets of joints.
     """
 
@@ -43,8 +43,8 @@ class Plan(NamedTuple):
     """A planned motion.
 
     Attributes:
-        scalars: Trajectory of the rows that are interpolated as numbers.
-        path: Path of the orientation; None if the orientation is constant or among those rows.
+        scalars: Trajectory of the waypoint rows that are interpolated as numbers.
+        path: Path of the orientation; None if the orientation is constant or interpolated as numbers.
         knots_s: Times of the waypoints [s].
     """
 
@@ -53,13 +53,13 @@ class Plan(NamedTuple):
     knots_s: tuple[float, ...]
 
     def spliced(self, new: Plan, at_s: float) -> Plan:
-        """Returns a plan that follows this plan until time `at_s` [s], and the plan `new` afterwards."""
+        """Returns a plan that equals this plan until time `at_s` [s] and the plan `new` afterwards."""
         path = None if self.path is None or new.path is None else self.path.spliced(new.path, at_s)
         kept = tuple(time_s for time_s in self.knots_s if time_s <= at_s)
         return Plan(self.scalars.spliced(new.scalars, at_s), path, (*kept, *(t for t in new.knots_s if t > at_s)))
 
     def since(self, time_s: float) -> Plan:
-        """Returns this plan without the parts before a time [s]."""
+        """Returns this plan without the waypoints before a time [s] and the segments that end before that time."""
         path = None if self.path is None else self.path.since(time_s)
         return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
 
@@ -68,9 +68,9 @@ class Added(NamedTuple):
     """Result of planning a motion through new waypoints.
 
     Attributes:
-        peaks: Peaks of the new motion.
-        stretch: Factor by which the motion was slowed down; 1 for an unchanged motion.
-        excess: Limit that the motion would exceed most without being slowed down.
+        peaks: Largest speeds and accelerations of the new motion.
+        stretch: Factor by which the motion's duration was extended to keep the limits; 1 if it was not extended.
+        excess: The limit that the motion exceeded most before it was slowed down.
     """
 
     peaks: Peaks
@@ -81,23 +81,23 @@ class Added(NamedTuple):
 class Interpolator:
     """Plans a motion through waypoints and returns samples of the motion. New waypoints may arrive at any time.
 
-    Samples lie on a time grid with steps of `inter_dt` from the first waypoint on. The last sample is at the end of
-    the motion. Without interpolation, the samples are the waypoints, and limits are ignored.
+    Samples are `inter_dt` apart, starting at the first waypoint. The last sample is at the end of the motion. Without
+    interpolation, the samples are the waypoints, and limits are ignored.
 
     New waypoints leave the next `nochange_window_length` samples unchanged. After these samples, the new motion begins
     with the old motion's position and velocity. New waypoints before the first changed sample are ignored.
 
-    A motion that exceeds a limit is refused or slowed down. To slow it down, all times between its waypoints are
-    multiplied by the same factor.
+    A motion that exceeds a limit is refused or slowed down. Slowing down multiplies the durations of all segments
+    between waypoints by the same factor.
 
-    All times are seconds of one clock, which must not go back.
+    All times passed to methods are in seconds on the same clock, which must not go backwards.
 
     Args:
         config: Description of the motion.
         limits: Limits that replace the limits in `config`; None to use the limits in `config`.
 
     Attributes:
-        delay_s: Total duration of all pauses [s]. The plan runs later than the waypoints' times by this delay.
+        delay_s: Total duration of all completed pauses [s]. Plan time is clock time minus this duration.
     """
 
     def __init__(self, config: WaypointMotionConfig, limits: MotionLimitsConfig | None = None) -> None:
@@ -117,7 +117,7 @@ class Interpolator:
         return self._plan
 
     def add(self, waypoints: Waypoints, now_s: float) -> Added:
-        """Plans a motion through waypoints, whose times are seconds of the clock.
+        """Plans a motion through waypoints. The waypoints' times are on the same clock as `now_s` [s].
 
         Raises:
             WaypointError: If all waypoints are in the past or too early to change a sample, or if the motion cannot
@@ -149,7 +149,10 @@ class Interpolator:
         return added
 
     def newest(self, now_s: float) -> TargetSample | None:
-        """Returns the newest sample up to a time [s]; None if this sample was already returned or does not exist."""
+        """Returns the newest sample up to a time [s].
+
+        Returns None if this sample does not exist or was already returned, or if the motion is paused.
+        """
         plan = self._plan
         if plan is None or self._paused_s is not None:
             return None
@@ -175,7 +178,7 @@ class Interpolator:
         self._plan, self._sent_s = None, -math.inf
 
     def _own_s(self, now_s: float) -> float:
-        """Converts a time of the clock to the time of the plan [s], which does not advance during pauses."""
+        """Converts clock time [s] to plan time [s], which does not advance during pauses."""
         return (now_s if self._paused_s is None else self._paused_s) - self.delay_s
 
     def _on_grid(self, time_s: float) -> float:
@@ -184,7 +187,7 @@ class Interpolator:
         return self._grid_s + steps * self._config.inter_dt
 
     def _sample_time(self, plan: Plan, now_s: float) -> float | None:
-        """Returns the time of the newest sample [s]; None before the first sample."""
+        """Returns the time of the newest sample up to `now_s` [s]; None before the first sample."""
         if not self._config.use_interpolation:
             return max((each for each in plan.knots_s if each <= now_s + ROUNDING_S), default=None)
         end_s, time_s = plan.scalars.end_s, self._on_grid(now_s)
@@ -207,10 +210,10 @@ class Interpolator:
         first: int = 0,
         after: tuple[float, Plan] | None = None,
     ) -> tuple[Plan, Added]:
-        """Returns the plan of `_through`, slowed down until it keeps the limits.
+        """Returns the plan of `_through`, slowed down until the plan keeps the limits, and the result for `add`.
 
         Raises:
-            WaypointError: If the motion exceeds a limit and must not, or cannot, be slowed down enough.
+            WaypointError: If the motion exceeds a limit, and slowing down is disabled or does not suffice.
         """
         start_s, stretch, asked = times_s[0] if after is None else after[0], 1.0, Excess()
         for _ in range(MAX_TRIES):
@@ -241,9 +244,9 @@ class Interpolator:
 
         Args:
             waypoints: All waypoints.
-            times_s: Times of all waypoints [s], in place of the times in `waypoints`.
+            times_s: Times of all waypoints [s], which replace the times in `waypoints`.
             first: Index of the first waypoint to pass through.
-            after: Time at which the new motion begins [s], and the old plan, which is followed until then.
+            after: Time at which the old plan ends [s], and the old plan. None: the plan begins at the first waypoint.
         """
         method = self._config.method if self._config.use_interpolation else "linear"
         scalars = _scalar_knots(waypoints, times_s, method)[first:]
@@ -282,7 +285,10 @@ def _scalar_knots(waypoints: Waypoints, times_s: tuple[float, ...], method: str)
 
 
 def _estimated_accelerations(times_s: tuple[float, ...], values: Array, rates: Array) -> Array:
-    """Estimates accelerations: at inner points the mean of both adjacent cubics' accelerations, at the ends zero."""
+    """Estimates accelerations at K points, shape (K, S).
+
+    An inner point gets the mean of the accelerations of both adjacent cubic polynomials; the ends get zero.
+    """
     accelerations = np.zeros_like(values)
     h = np.diff(times_s)[:, np.newaxis]
     slopes = np.diff(values, axis=0) / h

@@ -17,11 +17,11 @@ from rpbi.control.trajectories.trajectory import Trajectory
 from .rotation import RotationPath
 
 POINTS = np.linspace(0.0, 1.0, 65)
-"""Shares of a segment at which peaks of scalar rows are evaluated. In between, peaks are at most 0.1 % higher."""
+"""Fractions of a segment at which peaks of scalar rows are evaluated. In between, peaks are at most 0.1 % higher."""
 TURN_POINTS = 17
 """Number of points of a segment at which peaks of orientations are evaluated."""
 MARGIN = 1e-3
-"""Margin between a peak and its limit, as a share of the peak."""
+"""Margin between a peak and its limit, as a fraction of the peak."""
 UNITS = {
     "velocity": "m/s or rad/s",
     "acceleration": "m/s^2 or rad/s^2",
@@ -33,7 +33,7 @@ Each = Positive | ListOf[Positive]
 
 
 class MotionLimitsConfig(ConfigModel):
-    """Limits of a motion through waypoints; missing ones do not apply."""
+    """Limits of the speed and acceleration of a motion through waypoints."""
 
     velocity: Annotated[Each, Unit("m/s, rad/s")] | None = optional(
         "Largest speed of each row that is interpolated as a number: one for all, or a list. For joints, the largest "
@@ -49,10 +49,10 @@ class MotionLimitsConfig(ConfigModel):
     )
 
     def check_rows(self, count: int, method: str) -> None:
-        """Checks the limits against the number of rows and the method of interpolation.
+        """Checks that the limits fit the number of scalar rows and the interpolation method.
 
         Raises:
-            KeyedError: If a list has another length, or if an acceleration limit is given for the method `linear`.
+            KeyedError: If a list does not have the length `count`, or the method `linear` has an acceleration limit.
         """
         for key in ("velocity", "acceleration"):
             value = getattr(self, key)
@@ -69,7 +69,7 @@ class Excess(NamedTuple):
 
     Attributes:
         stretch: Factor by which the motion's duration has to grow; at most 1 if the motion keeps all limits.
-        text: The limit and the motion's peak in words; empty without limits.
+        text: Description of the limit and of the motion's peak; empty without limits.
     """
 
     stretch: float = 0.0
@@ -80,7 +80,7 @@ class Peaks(NamedTuple):
     """Largest speeds and accelerations of a motion.
 
     Attributes:
-        velocity: Largest speed of each row that is interpolated as a number [m/s or rad/s], shape (S,).
+        velocity: Largest speed of each waypoint row that is interpolated as a number [m/s or rad/s], shape (S,).
         acceleration: Largest acceleration of each of these rows [m/s^2 or rad/s^2], shape (S,).
         angular_velocity: Largest angular speed of the orientation path [rad/s]; 0 without a path.
         angular_acceleration: Largest angular acceleration of the orientation path [rad/s^2]; 0 without a path.
@@ -93,10 +93,10 @@ class Peaks(NamedTuple):
 
     @classmethod
     def of(cls, scalars: Trajectory, path: RotationPath | None) -> Peaks:
-        """Returns the peaks between the first and the last knot.
+        """Returns the peaks of a motion between its first and its last knot.
 
         Args:
-            scalars: Trajectory of the rows that are interpolated as numbers.
+            scalars: Trajectory of the waypoint rows that are interpolated as numbers.
             path: Path of the orientation; None without a path.
         """
         ends = [*(each.start_s for each in scalars.segments[1:]), scalars.end_s]
@@ -112,7 +112,7 @@ class Peaks(NamedTuple):
         return cls(_largest(rates), _largest(bends), *_turning(path))
 
     def excess(self, limits: MotionLimitsConfig) -> Excess:
-        """Returns the limit that the peaks exceed most, or come closest to."""
+        """Returns the limit that the peaks exceed most. If they keep all limits, returns the closest one."""
         worst = Excess()
         for key, power in zip(self._fields, (1.0, 0.5, 1.0, 0.5)):
             limit, peaks = getattr(limits, key), np.atleast_1d(getattr(self, key))
@@ -127,7 +127,7 @@ class Peaks(NamedTuple):
         return worst
 
     def without_limit(self, limits: MotionLimitsConfig) -> dict[str, float]:
-        """Returns the peaks of quantities without a limit, keyed by the name of the missing limit."""
+        """Returns the largest peak of each quantity without a limit, keyed by the quantity, such as `velocity`."""
         peaks = {key: float(np.max(getattr(self, key), initial=0.0)) for key in self._fields}
         return {key: peak for key, peak in peaks.items() if getattr(limits, key) is None and peak > 0.0}
 

@@ -1,8 +1,8 @@
-"""Interpolates complete series of numbers. Names and arguments are those of the authors' release.
+"""Interpolates series of points. The functions have the names and arguments of the authors' release.
 
-The functions `interpolate_...` return sample times [s] and samples. From the first time on, samples are
-`1/sample_freq` [s] apart. The last sample is at the last time, after a step that may be shorter. The first time need
-not be 0.
+The functions `interpolate_...` return sample times [s] and samples. Samples are `1/sample_freq` [s] apart, starting at
+the first time in `time_seq`, which need not be 0. The last sample is at the last time in `time_seq`; the step before
+the last sample may be shorter.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ROUNDING = 1e-9
 
 
 def sample_times(start_s: float, end_s: float, step_s: float) -> Array:
-    """Returns times [s] in equal steps from the start, and the end. The last step may be shorter.
+    """Returns times from start to end, both included, in equal steps [s]. The last step may be shorter.
 
     Raises:
         ValueError: If the step is not positive.
@@ -36,7 +36,7 @@ def sample_times(start_s: float, end_s: float, step_s: float) -> Array:
 
 
 def interpolate_linearly_quaternions(time_seq: ArrayLike, quat_seq: ArrayLike, sample_freq: float = 100) -> Samples:
-    """Interpolates K quaternions x, y, z, w, shape (4, K), with constant angular velocity between two quaternions.
+    """Interpolates K quaternions x, y, z, w, shape (4, K), with constant angular velocity between neighbours.
 
     The samples have the shape (N, 4).
     """
@@ -59,7 +59,7 @@ def interpolate_cubic_hermite_spline(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Interpolates K values with K given derivatives by cubic polynomials. Both have the shape (K,) or (K, S)."""
+    """Interpolates K values with K derivatives, both of shape (K,) or (K, S), by cubic polynomials."""
     curve = CubicHermiteSpline(time_seq, pos_seq, dpos_seq)
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -72,7 +72,7 @@ def interpolate_poly_fit(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Samples the polynomial of order `poly_order` that fits K values best, by least squares."""
+    """Fits a polynomial of order `poly_order` to K values by least squares, and samples the polynomial."""
     curve = np.poly1d(np.polyfit(np.asarray(time_seq, float), np.asarray(pos_seq, float), poly_order))
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -85,7 +85,7 @@ def interpolate_interp1d(
     plot_flag: bool = False,
     plot_title: str = "None",
 ) -> Samples:
-    """Interpolates K values by `scipy.interpolate.interp1d`. Its `kind` may be linear, nearest, quadratic or cubic."""
+    """Interpolates K values by `scipy.interpolate.interp1d` of a `kind` such as linear, nearest, quadratic or cubic."""
     curve = interp1d(time_seq, pos_seq, kind=kind)
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
@@ -109,7 +109,7 @@ def interpolate_cubic_hermite_spline_source_code(
     plot_flag: bool = False,
     plot_title: str = "PositionVsTime",
 ) -> Samples:
-    """Interpolates K values, shape (K,), by a `TCubicHermiteSpline`, which averages the derivatives of neighbours."""
+    """Interpolates K values with K derivatives, both of shape (K,), by a `TCubicHermiteSpline`."""
     spline = TCubicHermiteSpline()
     spline.Initialize(list(zip(*(np.asarray(each).tolist() for each in (time_seq, pos_seq, derpos_seq)))), 0)
     return _sampled(
@@ -150,7 +150,7 @@ def poly5(
 
 
 class TCubicHermiteSpline:
-    """Cubic spline through key points. Its slope at a key point is a mean of the neighbours' given derivatives."""
+    """Cubic spline through key points. The slope at a key point is averaged from the given derivatives nearby."""
 
     FINITE_DIFF, CARDINAL = 0, 1
     ZERO, GRAD, CYCLIC = 0, 1, 2
@@ -170,13 +170,13 @@ class TCubicHermiteSpline:
         """Sets the key points.
 
         Args:
-            data: K key points, each with time [s], value and derivative, in any order.
-            tan_method: Slope at an inner point. FINITE_DIFF: mean of the derivatives at both neighbours and at the
-                point, which counts twice. CARDINAL: mean of the derivatives at both neighbours, times 1 - `c`.
+            data: K tuples of time [s], value and derivative, one for each key point, in any order.
+            tan_method: Slope at an inner point. FINITE_DIFF: weighted mean of the derivatives at the point (weight 2)
+                and at both neighbours (weight 1). CARDINAL: mean of the derivatives at both neighbours, times 1 - `c`.
             end_tan: Slope at both ends. ZERO: 0. GRAD: mean of the derivatives at the end and its neighbour, times
                 `m`. CYCLIC: slope of an inner point, as if both ends were the same point.
-            c: Tension of CARDINAL.
-            m: Factor of GRAD.
+            c: Tension for CARDINAL, see `tan_method`.
+            m: Factor for GRAD, see `end_tan`.
         """
         times_s, values, given = (list(column) for column in zip(*sorted(map(tuple, data))))
         d = np.asarray(given, dtype=float)
@@ -209,9 +209,9 @@ class TCubicHermiteSpline:
         return periods, start + rest
 
     def EvaluateC(self, t: float, pi: tuple[float, float] | None = None) -> float:  # noqa: N802
-        """Returns the value of the periodically continued curve at a time [s].
+        """Returns the value of the periodically repeated curve at a time [s].
 
-        Each period begins at the last value of the previous period.
+        Each repetition is shifted so that it begins at the last value of the previous period.
 
         Args:
             t: Time [s].

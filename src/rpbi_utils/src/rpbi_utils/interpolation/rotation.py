@@ -65,12 +65,12 @@ class RotationKnot(NamedTuple):
 
 
 class RotationSegment(NamedTuple):
-    """The segment between two knots.
+    """Part of a path between two successive knots.
 
     Attributes:
         start_s: Time of the first knot [s].
         base: Orientation of the first knot, x, y, z, w.
-        turn: Rotation vector relative to `base` over time, in fixed axes [rad].
+        turn: Trajectory of the rotation vector relative to `base`, in fixed axes [rad].
     """
 
     start_s: float
@@ -79,10 +79,10 @@ class RotationSegment(NamedTuple):
 
 
 class RotationPath:
-    """Orientations through knots; immutable.
+    """Immutable path of orientations through knots.
 
-    Two knots are joined by the shorter rotation. The rotation vector is linear in time if one of the knots has only an
-    orientation, cubic if both knots have angular velocities, and quintic if both also have angular accelerations.
+    Successive knots are joined by the shorter rotation. The rotation vector is quintic in time if both knots have an
+    angular velocity and acceleration, cubic if both have only an angular velocity, and otherwise linear.
     Before the first knot and after the last knot, the orientation is constant.
 
     Attributes:
@@ -99,7 +99,7 @@ class RotationPath:
 
     @classmethod
     def through(cls, knots: Sequence[RotationKnot]) -> RotationPath:
-        """Returns the path through at least one knot. Times must increase strictly; quaternions must have norm 1."""
+        """Returns the path through one or more knots. Times must increase strictly; quaternions must have norm 1."""
         knots = list(knots)
         for i, after in enumerate(knots[1:]):  # q and -q are the same rotation: avoids jumps of the numbers
             if math.fsum(p * q for p, q in zip(knots[i].quat_xyzw, after.quat_xyzw)) < 0.0:

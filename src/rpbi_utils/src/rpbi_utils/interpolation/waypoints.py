@@ -23,7 +23,7 @@ class Waypoints(NamedTuple):
         scalars: Values of the S rows that are interpolated as numbers [m or rad], shape (K, S).
         rates: First derivatives of the scalars [m/s or rad/s], shape (K, S); None to estimate the derivatives.
         accelerations: Second derivatives of the scalars [m/s^2 or rad/s^2], shape (K, S); None to estimate them.
-        quats_xyzw: K orientations; None if the orientation is constant or part of the scalars.
+        quats_xyzw: K orientations x, y, z, w; None if the orientation is constant or part of the scalars.
     """
 
     times_s: tuple[float, ...]
@@ -33,7 +33,7 @@ class Waypoints(NamedTuple):
     quats_xyzw: tuple[Quaternion, ...] | None = None
 
     def slower(self, factor: float) -> Waypoints:
-        """Returns the waypoints with the derivatives of a motion that takes `factor` times as long. Keeps the times."""
+        """Scales the derivatives for a motion that takes `factor` times as long. Keeps the times."""
         rates = None if self.rates is None else self.rates / factor
         accelerations = None if self.accelerations is None else self.accelerations / factor**2
         return self._replace(rates=rates, accelerations=accelerations)
@@ -63,12 +63,12 @@ def waypoint_matrix(layout: Sequence[tuple[str, int]], data: Sequence[float], of
 
 
 def read_waypoints(matrix: Array, dimensions: MotionDimensions) -> Waypoints:
-    """Returns the waypoints in a matrix.
+    """Converts a matrix to waypoints.
 
     Args:
         matrix: Each column is a waypoint. Row 0 has the times [s], and the next n rows have the values. Optionally, n
             rows with first derivatives follow, and then n rows with second derivatives.
-        dimensions: Number n and meaning of the rows.
+        dimensions: Number n of values per waypoint, and the meaning of their rows.
 
     Raises:
         WaypointError: If the matrix has another shape, times do not increase, or a number is not finite.
@@ -102,7 +102,7 @@ def read_waypoints(matrix: Array, dimensions: MotionDimensions) -> Waypoints:
 
 
 def estimated_rates(times_s: Sequence[float] | Array, values: Array) -> Array:
-    """Estimates smooth derivatives at K points; the derivatives are zero at both ends.
+    """Estimates derivatives at K points for a smooth curve. The derivatives are zero at both ends.
 
     Args:
         times_s: K times [s].

@@ -1,4 +1,4 @@
-"""Reads numeric fields of serialised messages, selected by the fields' names."""
+"""Reads numeric fields from serialised messages. The fields are selected by name."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def split_name(name: str, topics: Collection[str]) -> tuple[str, str] | None:
     """Splits a name such as `/arm/joint_states/position[0]` into the topic and the path of the field.
 
     Args:
-        name: Name with a leading slash. The path may also be written as `position/0` or `position/JOINT`.
+        name: Name with a leading slash. The field may also be written as `position/0` or `position/JOINT`.
         topics: Names of topics. The longest topic with which `name` begins is chosen.
 
     Returns:
@@ -63,11 +63,13 @@ def split_name(name: str, topics: Collection[str]) -> tuple[str, str] | None:
 
 
 class FieldReader:
-    """Reads one field, or all numbers of a part, from messages of one topic. The message type may change.
+    """Reads one numeric field, or all numbers in an array or sub-message, from the messages of one topic.
+
+    The message type may change between messages.
 
     Args:
         topic: Name of the topic, for error messages.
-        path: Path of the field or part; empty for the whole message.
+        path: Path of the field, array or sub-message; empty for the whole message.
     """
 
     def __init__(self, topic: str, path: str) -> None:
@@ -75,10 +77,10 @@ class FieldReader:
         self._plan: _Plan | None = None
 
     def read(self, message_type: MessageType, raw: bytes) -> Values:
-        """Returns the numbers of a message; an empty result if an array in the message is too short for the path.
+        """Returns the selected numbers of a message. The result is empty if an array is too short for the path.
 
         Raises:
-            FieldError: If messages of the type have no such field, or the field is not a number.
+            FieldError: If the message type lacks the field, or the field is not numeric.
             ValueError: If the bytes do not fit the message type.
         """
         plan = self._plan
@@ -97,7 +99,7 @@ class FieldReader:
         return _Plan(message_type, [(*span, raw[slice(*span)]) for span in fixed], len(raw), stamp, found)
 
     def _chosen(self, message_type: MessageType, leaves: Mapping[str, Leaf]) -> dict[str, Leaf]:
-        """Returns the numeric leaves at or below the path, keyed by name. Raises a FieldError if the path is wrong."""
+        """Returns the numeric leaves at or below the path, keyed by name. Raises FieldError if the path is wrong."""
         if self.path in leaves:
             if not _is_number(leaves[self.path]):
                 what = "text" if leaves[self.path].kind == "string" else "binary data"
@@ -128,7 +130,7 @@ class FieldReader:
 
 
 class _Plan:
-    """Byte positions of the selected numbers in all messages of one layout."""
+    """Byte positions of the selected numbers in messages that have the same layout."""
 
     def __init__(
         self,
@@ -171,7 +173,7 @@ def _is_number(leaf: Leaf) -> bool:
 
 
 def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
-    """Returns whether a message type can have numbers at or below a path, for any length of its arrays."""
+    """Returns whether a message type may have numbers at or below a path if its arrays are long enough."""
     if not isinstance(field_type, MessageType):
         return not path and field_type != "string"
     paths = ((field, _path_below(field, path)) for field in field_type.fields)
@@ -179,9 +181,9 @@ def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
 
 
 def _path_below(field: Field, path: str) -> str | None:
-    """Returns the rest of a path below a field; None if the path leads to another field.
+    """Returns the part of a path after a field's name and array index; None if the path begins with another field.
 
-    The empty path leads to all fields except headers.
+    The empty path matches all fields except headers.
     """
     if not path:
         return None if field.name == "header" else ""

@@ -1,4 +1,4 @@
-"""Collects the samples of a live plot's lines, and returns the visible part of the lines."""
+"""Collects the samples of a live plot's lines, and returns the samples in the visible time span."""
 
 from __future__ import annotations
 
@@ -104,7 +104,9 @@ class LivePlot:
         """Number of changes of the visible data so far."""
 
     def add(self, name: str, time_s: float, value: float, rank: int = 0) -> None:
-        """Appends a sample to a line, and creates the line if necessary. All lines restart if time goes back.
+        """Appends a sample to a line, and creates the line if necessary.
+
+        If time goes back by more than `ANEW_S`, all older samples of all lines are dropped.
 
         Args:
             name: Name of the line.
@@ -125,7 +127,7 @@ class LivePlot:
             self.changes += 1
 
     def note(self, name: str, text: str) -> None:
-        """Sets the reason why lines of a name get no samples. An empty text removes the reason."""
+        """Sets the reason why the lines for a user-given name get no samples. An empty text removes the reason."""
         with self._lock:
             if self._notes.get(name, "") != text:
                 self._notes[name] = text
@@ -153,7 +155,7 @@ class LivePlot:
 
 
 def thinned(times: Array, values: Array, start_s: float, end_s: float, columns: int) -> tuple[Array, Array]:
-    """Reduces samples to the lowest and highest value per pixel column, which look the same in a picture.
+    """Reduces many samples to the lowest and highest value in each pixel column. The drawn line looks the same.
 
     Args:
         times: Times of the samples [s], ascending, shape (N,).

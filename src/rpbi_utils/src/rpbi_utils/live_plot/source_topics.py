@@ -1,4 +1,4 @@
-"""Feeds a plot with fields of topics. Topics may appear later, change their type, and disappear."""
+"""Feeds a plot with fields from topics. Topics may appear later, change their type, and disappear."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PATIENCE_S = 3.0
 
 
 class FieldSource:
-    """Subscribes to topics as raw bytes, and reads fields by the message definitions that the publishers send.
+    """Subscribes to topics as raw bytes, and reads fields with the message definitions that the publishers send.
 
     Args:
         names: Names such as `/arm/joint_states/position[0]`. Relative names are in this node's namespace.
@@ -120,7 +120,7 @@ class _Topic:
         self._subscriber.unregister()
 
     def is_published(self, is_published: bool) -> None:
-        """Shows in the plot that the topic has no publisher or no message yet. Otherwise, removes this text."""
+        """Shows a text in the plot if the topic has no publisher or no message yet; otherwise removes the text."""
         for name, _ in self.fields:
             if not is_published:
                 self._plot.note(name, "nobody publishes it")
@@ -163,7 +163,10 @@ class _Topic:
         return self._types[key]
 
     def _fail(self, names: Iterable[str], text: str) -> None:
-        """Shows and logs an error once per name. Names that have had values are skipped: some messages lack joints."""
+        """Shows and logs an error once for each name.
+
+        Skips names whose values have already been plotted, since single messages may lack a joint.
+        """
         for name in names:
             if name not in self._drawn and self._errors.get(name) != text:
                 self._errors[name] = text

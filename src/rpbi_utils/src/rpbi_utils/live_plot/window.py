@@ -60,7 +60,7 @@ class Chart(NamedTuple):
     height: float
 
     def y(self, value: Any) -> Any:
-        """Returns the vertical position of a value, or of each value of an array [px]."""
+        """Returns the vertical position [px] of a value, or of each value in an array."""
         return self.top + (self.high - value) * (self.height / (self.high - self.low))
 
 
@@ -81,7 +81,7 @@ class Canvas(QWidget):
 
     @property
     def is_paused(self) -> bool:
-        """Whether the view is paused; samples are still collected."""
+        """Whether the view is paused. Samples are collected during pauses, too."""
         return self._frozen is not None
 
     def pause(self) -> None:
@@ -215,7 +215,7 @@ class Canvas(QWidget):
 
 
 class LivePlotWindow(QMainWindow):
-    """Window with the plot, buttons, the newest event, and the rates of redraws and values.
+    """Window with the plot, buttons, the latest status message, and the rates of redraws and values.
 
     Args:
         plot: Lines to draw.
@@ -286,7 +286,7 @@ class LivePlotWindow(QMainWindow):
         self._message.setText("cleared")
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
-        """Writes a new file in the folder; `write` receives a temporary path, which is renamed at the end."""
+        """Writes a new file in the folder. `write` receives a temporary path, which is renamed at the end."""
         path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -327,7 +327,7 @@ def _legend_row(line: Line) -> tuple[str, QColor]:
 
 
 def _range(values: list[np.ndarray]) -> tuple[float, float]:
-    """Returns the ends of the vertical axis for arrays of values. The ends are round numbers, so they change rarely."""
+    """Returns the lower and upper end of the vertical axis. Both are round numbers, so that the axis changes rarely."""
     filled = [each for each in values if len(each)]
     low = min((float(each.min()) for each in filled), default=0.0)
     high = max((float(each.max()) for each in filled), default=1.0)

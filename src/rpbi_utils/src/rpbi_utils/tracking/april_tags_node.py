@@ -1,4 +1,4 @@
-"""`apriltag_node.py`: detects AprilTags in a camera's images. The topics are those of apriltag_ros."""
+"""`apriltag_node.py`: detects AprilTags in a camera's images. Uses the topic names and types of apriltag_ros."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LUMA = np.array([0.299, 0.587, 0.114])
 def grey_image(message: ImageMessage) -> Image:
     """Converts an image message to grey bytes, shape (rows, columns).
 
-    Raises a ValueError if the encoding is not in `CHANNELS` or the size of the data is wrong.
+    Raises a ValueError if the encoding is unsupported or the size of the data is wrong.
     """
     channels = CHANNELS.get(message.encoding)
     if channels is None:
@@ -47,7 +47,7 @@ def grey_image(message: ImageMessage) -> Image:
 
 
 class AprilTagNode:
-    """Detects tags in images on `image_rect`, with the camera matrix on `camera_info`, and publishes their poses.
+    """Detects tags in images on `image_rect`, and publishes the tags' poses. The camera matrix is on `camera_info`.
 
     Raises:
         ConfigError: If the configuration is wrong.

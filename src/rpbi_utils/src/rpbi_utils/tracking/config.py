@@ -30,7 +30,7 @@ FAMILY_SIZE = 587
 
 
 class TrackedObjectConfig(ConfigModel):
-    """An object, tracked either by Vicon or by AprilTags."""
+    """An object that is tracked either by Vicon or by AprilTags."""
 
     name: FrameId = Field(description="TF frame of the object that is broadcast.")
     vicon: Text | None = optional("Subject and segment, as `SUBJECT/SEGMENT`; the topic is `vicon/SUBJECT/SEGMENT`.")
@@ -62,12 +62,12 @@ class TrackedObjectConfig(ConfigModel):
 
     @property
     def offset(self) -> Pose:
-        """Pose of the object's frame in the tracked frame."""
+        """Pose of the object's frame in the frame of the Vicon segment, tag or tag bundle."""
         return Pose(self.position, self.orientation)
 
 
 class TrackingNodeConfig(ConfigModel):
-    """Objects of a tracking system, and the processing of their poses."""
+    """Objects that `tracked_object_node.py` tracks, and parameters for filtering and broadcasting their poses."""
 
     frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
     timeout_s: Seconds = Field(
@@ -89,7 +89,7 @@ class TrackingNodeConfig(ConfigModel):
 
 
 class StandaloneTag(ConfigModel):
-    """A tag that the node reports."""
+    """Id, size and TF frame of a tag that `apriltag_node.py` reports."""
 
     id: Count = Field(description="Its number in the family.")
     size: PositiveMetres = Field(description="Side of its black square.")
@@ -97,7 +97,7 @@ class StandaloneTag(ConfigModel):
 
 
 class AprilTagNodeConfig(ConfigModel):
-    """Tags that the node reports. They belong to the family tag36h11."""
+    """Tags of the family tag36h11 that `apriltag_node.py` reports."""
 
     standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
     publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")

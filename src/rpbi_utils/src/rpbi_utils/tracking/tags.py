@@ -82,7 +82,7 @@ class TagDetector:
         )
 
     def detect(self, grey: Image) -> list[DetectedTag]:
-        """Returns the tags in an image, shape (rows, columns), sorted by id. Ids that are found twice are left out."""
+        """Returns the tags in an image of shape (rows, columns), sorted by id. Omits ids that are found twice."""
         corners, ids, _ = self._find(grey)
         numbers = [] if ids is None else ids.ravel().tolist()
         # OpenCV starts at the bottom right of the upright tag, and continues clockwise
@@ -129,7 +129,10 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
 def tag_poses(
     detector: TagDetector, grey: Image, camera_matrix: npt.NDArray[np.float64], sizes: Mapping[int, float]
 ) -> Iterator[tuple[int, Pose]]:
-    """Yields the id and the pose of each tag in an image. Skips tags whose id is not a key of `sizes` [m]."""
+    """Yields the id and the pose of each tag in an image whose id is a key of `sizes`.
+
+    `sizes` has the side of the black square [m] for each id.
+    """
     for tag in detector.detect(grey):
         if tag.id in sizes and (pose := tag_pose(tag, sizes[tag.id], camera_matrix)) is not None:
             yield tag.id, pose
@@ -181,7 +184,7 @@ def write_tag(number: int, size: float, folder: Path) -> Path:
 
 
 def main() -> None:
-    """Runs the command."""
+    """Runs the program `make_april_tag`, which writes the mesh of a tag."""
     parser = argparse.ArgumentParser(
         prog="make_april_tag", description="Makes a mesh of an AprilTag (tag36h11) for `createVisualShape`."
     )

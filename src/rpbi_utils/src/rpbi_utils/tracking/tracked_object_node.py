@@ -42,14 +42,14 @@ class TrackedObject:
         self._is_seen = False
 
     def note_seen(self) -> None:
-        """Records that the object is visible now."""
+        """Records that the object is visible now. Logs a message if the object was lost before."""
         self._seen_s = time.monotonic()
         if not self._is_seen:
             self._is_seen = True
             rospy.loginfo("%s: is seen", self.config.name)
 
     def tell_if_lost(self) -> None:
-        """Logs a warning once when no pose has arrived for `timeout_s`."""
+        """Logs a warning if no pose has arrived for `timeout_s`. Logs only one warning per loss."""
         if self._is_seen and time.monotonic() - self._seen_s > self._timeout_s:
             self._is_seen = False
             rospy.logwarn("%s: is lost: no pose for %g s; nothing is broadcast", self.config.name, self._timeout_s)
@@ -118,9 +118,9 @@ class TrackedObjectNode:
             self._publisher.publish(TFMessage([transform]))
 
     def _in_world(self, frame_id: str, stamp: rospy.Time) -> Pose:
-        """Returns the pose of a detection's source frame in the configured frame, at the time of the detection.
+        """Returns the pose of the frame `frame_id` in the configured parent frame, at time `stamp`.
 
-        If TF does not cover this time, returns the newest pose.
+        If TF does not cover this time, uses the newest transform.
         """
         if frame_id == self._frame_id:
             return Pose()

@@ -23,7 +23,7 @@ from robot_model.geometry import (
 
 
 class SmoothingConfig(ConfigModel):
-    """Smoothing of poses: strongest at rest, with the lowest frequency, and weaker in motion, to reduce the delay."""
+    """Parameters of a low-pass filter for poses. Its cut-off frequency grows with speed, to reduce the delay."""
 
     min_cutoff_hz: HzOrOff = Field(2.0, description="Cut-off frequency at rest; 0 leaves poses as they are.")
     per_speed: Annotated[NonNegative, Unit("Hz/(m/s)")] = Field(
@@ -36,10 +36,10 @@ class SmoothingConfig(ConfigModel):
 
 
 class OneEuroPose:
-    """Low-pass filter for poses, whose cut-off frequency grows with the speed. Samples may be unevenly spaced.
+    """Low-pass filter for poses, with a cut-off frequency that grows with speed. Samples may be unevenly spaced.
 
-    Formulas: Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012. The gain of a low-pass filter is here
-    `1 - exp(-2 pi f dt)`, as if the input were constant between samples. Orientations are filtered along the shortest
+    Formulas: Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012. Different from the paper, the gain is
+    `1 - exp(-2 pi f dt)`, which assumes a constant input between samples. Orientations are filtered along the shortest
     rotation.
     """
 
@@ -75,13 +75,16 @@ def _gain(cutoff_hz: float, dt_s: float) -> float:
 
 
 def _between(start: Quaternion, end: Quaternion, share: float) -> Quaternion:
-    """Returns the orientation at a share, 0 to 1, of the shortest rotation from `start` to `end`."""
+    """Returns the orientation at a fraction `share`, 0 to 1, of the shortest rotation from `start` to `end`."""
     turn = quaternion_of(scaled(share, rotation_between(start, end)))
     return normalized(quaternion_product(turn, start))
 
 
 class OutlierConfig(ConfigModel):
-    """Limits of an object's motion: poses beyond them are dropped as outliers, unless they persist."""
+    """Limits of an object's motion. A pose that exceeds a limit is dropped as an outlier.
+
+    After several consecutive outliers that are consistent with each other, the new poses are accepted.
+    """
 
     max_speed: Annotated[Positive, Unit("m/s")] = Field(5.0, description="Fastest motion of the object.")
     max_angular_speed: Annotated[Positive, Unit("rad/s")] = Field(20.0, description="Its fastest rotation.")
@@ -97,15 +100,15 @@ class OutlierConfig(ConfigModel):
 
 
 class OutlierError(ValueError):
-    """A pose is an outlier: the object cannot have moved there."""
+    """A pose is an outlier, since the object cannot have moved to the pose in the given time."""
 
 
 class PoseTracker:
     """Drops outliers from the poses of one object, and smooths the other poses. Time is taken from the stamps.
 
     Args:
-        smoothing: Parameters of the smoothing.
-        outliers: Limits of the object's motion, beyond which a pose is an outlier.
+        smoothing: Parameters of the low-pass filter.
+        outliers: Limits of the object's motion. A pose that exceeds a limit is an outlier.
         timeout_s: Time without a pose after which the filter restarts [s].
     """
 
@@ -120,7 +123,7 @@ class PoseTracker:
     def observe(self, pose: Pose, stamp_s: float) -> Pose | None:
         """Adds a pose with its stamp [s], and returns the smoothed pose.
 
-        Returns None if the stamp is not later than the previous stamp, as in repeated or reordered messages.
+        Returns None if the stamp is not later than the last accepted pose's stamp, for example in repeated messages.
 
         Raises:
             OutlierError: If the object cannot have moved to the pose. The pose is dropped.
@@ -152,7 +155,7 @@ class PoseTracker:
         self._forget()
 
     def _impossible(self, start: Pose, end: Pose, dt_s: float) -> str | None:
-        """Returns why a motion from `start` to `end` within `dt_s` [s] is impossible; None if it is possible."""
+        """Returns the reason why the object cannot move from `start` to `end` within `dt_s` [s]; None if it can."""
         limits = self._outliers
         way = math.dist(start.position, end.position)
         turn = math.hypot(*rotation_between(start.quat_xyzw, end.quat_xyzw))

@@ -1,4 +1,4 @@
-"""`calibrate_wrench_node.py`: subtracts a sensor's zero and a payload's weight from measured wrenches."""
+"""`calibrate_wrench_node.py`: subtracts a sensor's zero offset and a payload's weight from measured wrenches."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ MAX_TF_AGE_S = 0.5
 
 
 class SilentError(ValueError):
-    """No wrench has arrived, or another service is using the sensor."""
+    """No wrench has arrived, or another service call is already computing a mean."""
 
 
 class CalibrateWrenchNode:
-    """Subtracts the zero and the payload's weight from wrenches on `wrench`, and publishes `wrench/calibrated`.
+    """Subtracts zero offset and payload weight from wrenches on `wrench`. Publishes the results on `wrench/calibrated`.
 
     Raises:
-        ConfigError: If parameters are wrong.
+        ConfigError: If a parameter is invalid.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class CalibrateWrenchNode:
         rospy.Service("wrench/payload/clear", Trigger, self._clear)
 
     def run(self) -> None:
-        """Zeroes the sensor as soon as the sensor is at rest. Returns at once if the parameters give the offsets."""
+        """Sets the zero offset as soon as the sensor is at rest. Does nothing if a parameter gives the offset."""
         while self._calibration.offset is None and not rospy.is_shutdown():
             answer = self._zero(None)
             if not answer.success and not rospy.is_shutdown():
@@ -105,7 +105,7 @@ class CalibrateWrenchNode:
         self._calibrated.publish(message)
 
     def _pose(self, header: Header) -> Pose | None:
-        """Returns the sensor's pose in the gravity frame at the time of a wrench; None if TF lacks this pose."""
+        """Returns the sensor's pose in the gravity frame at a wrench's stamp; None if TF lacks this pose."""
         self._frame_id = self._parameters.sensor_frame or header.frame_id.strip("/")
         frames = self._parameters.gravity_frame, self._frame_id
         try:
@@ -129,11 +129,11 @@ class CalibrateWrenchNode:
         return None if pose is None else gravity_in(pose, self._parameters.gravity)
 
     def _rest(self) -> tuple[Array, Pose | None]:
-        """Waits for the next wrenches, and returns their mean and the sensor's pose. The caller must hold the lock.
+        """Waits for `max_samples` wrenches. Returns their mean and the sensor's pose. The caller must hold the lock.
 
         Raises:
-            MovedError: If the sensor moved.
-            SilentError: If no wrenches arrive, or another service is computing a mean.
+            MovedError: If the sensor moved, or the wrench changed by more than the limits.
+            SilentError: If no wrenches arrive, or another service call is already computing a mean.
         """
         if self._mean is not None:
             raise SilentError("another service is reading the sensor; try again")
@@ -149,7 +149,7 @@ class CalibrateWrenchNode:
             self._mean = None
 
     def _zero(self, _: TriggerRequest | None) -> TriggerResponse:
-        """Sets the zero to the present wrench minus the payload's weight.
+        """Service callback that sets the zero offset to the mean wrench minus the payload's weight.
 
         The sensor has to be at rest and without contact.
         """
@@ -168,7 +168,10 @@ class CalibrateWrenchNode:
         return TriggerResponse(True, message)
 
     def _sample(self, _: TriggerRequest) -> TriggerResponse:
-        """Adds the present wrench and gravity to the samples for the identification. The sensor has to be at rest."""
+        """Service callback that adds the mean wrench in the present pose to the samples for the identification.
+
+        The sensor has to be at rest.
+        """
         with self._lock:
             try:
                 mean, pose = self._rest()
@@ -181,7 +184,7 @@ class CalibrateWrenchNode:
             return TriggerResponse(True, f"pose {len(self._samples)}: gravity is {listed(gravity)} m/s^2 in the sensor")
 
     def _identify(self, _: TriggerRequest) -> TriggerResponse:
-        """Identifies payload and offsets from the samples. From then on, the node subtracts the payload's weight."""
+        """Service callback that identifies payload and zero offset from the samples, and applies both from now on."""
         with self._lock:
             try:
                 found = identify_payload(self._samples, self._parameters)
@@ -194,7 +197,7 @@ class CalibrateWrenchNode:
         return TriggerResponse(True, str(found))
 
     def _clear(self, _: TriggerRequest) -> TriggerResponse:
-        """Removes all samples. An identified payload is kept."""
+        """Service callback that removes all samples. An identified payload is kept."""
         with self._lock:
             count = len(self._samples)
             self._samples.clear()

@@ -33,7 +33,7 @@ class MovedError(ValueError):
 
 
 class PayloadConfig(ConfigModel):
-    """A payload, and the wrench that the sensor reports without any load."""
+    """Mass and centre of mass of a payload, and the wrench that the sensor reports without a load."""
 
     mass: Annotated[float, Unit("kg")] = Field(
         description="Mass; negative if the sensor reports the wrench that acts on it, not the one that it exerts."
@@ -43,7 +43,7 @@ class PayloadConfig(ConfigModel):
     torque_offset: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Torque without any load.")
 
     def weight(self, gravity: Vector) -> Array:
-        """Returns force and torque of the payload's weight at the sensor [N, N m], shape (6,).
+        """Returns the force and torque that the payload's weight adds to the sensor's reading [N, N m], shape (6,).
 
         Args:
             gravity: Gravity vector in the sensor's axes [m/s^2].
@@ -53,7 +53,7 @@ class PayloadConfig(ConfigModel):
 
     @property
     def offset(self) -> Array:
-        """Force and torque that the sensor reports without any load [N, N m], shape (6,)."""
+        """Force and torque that the sensor reports without a load [N, N m], shape (6,)."""
         return np.array(self.force_offset + self.torque_offset)
 
 
@@ -77,7 +77,7 @@ class RestingMean:
     """Mean of `max_samples` wrenches of a sensor at rest.
 
     Args:
-        limits: Parameters with the number of wrenches and the largest deviations of wrenches and pose.
+        limits: Parameters with the number of wrenches and the maximum deviations of wrenches and poses.
     """
 
     def __init__(self, limits: CalibrationParameters) -> None:
@@ -132,10 +132,10 @@ class RestingMean:
 
 
 class WrenchCalibration:
-    """Subtracts the zero of a sensor and the weight of a payload from wrenches.
+    """Subtracts a sensor's zero offset and a payload's weight from wrenches.
 
     Attributes:
-        offset: The sensor's zero [N, N m], shape (6,); None before the first zeroing.
+        offset: The sensor's zero offset [N, N m], shape (6,); None until it is set.
         payload: Payload whose weight is subtracted; None without a payload.
     """
 
@@ -144,15 +144,15 @@ class WrenchCalibration:
         self.offset: Array | None = None if payload is None else payload.offset
 
     def zero(self, mean: Array, gravity: Vector | None) -> None:
-        """Sets the zero to the mean wrench of a sensor without contact, minus the payload's weight."""
+        """Sets the zero offset to the mean wrench of a sensor without contact, minus the payload's weight."""
         self.offset = mean - self._weight(gravity)
 
     def use(self, payload: PayloadConfig) -> None:
-        """Sets the payload, and the zero that was identified together with the payload."""
+        """Sets the payload, and the zero offset that was identified together with the payload."""
         self.payload, self.offset = payload, payload.offset
 
     def calibrated(self, wrench: Array, gravity: Vector | None) -> Array:
-        """Returns a wrench minus the zero and the payload's weight [N, N m], shape (6,).
+        """Returns a wrench minus the zero offset and the payload's weight [N, N m], shape (6,).
 
         Args:
             wrench: Measured wrench [N, N m], shape (6,).

@@ -46,10 +46,10 @@ class Identification(NamedTuple):
 
     Attributes:
         payload: The payload, with the sensor's offsets.
-        mass_sd: Standard deviation of the mass [kg]. It is scaled so that the true mass is within two standard
-            deviations in 95 % of cases, even with few poses.
-        centre_sd: Largest standard deviation of the centre's coordinates [m], scaled in the same way. It includes the
-            uncertainty of the mass.
+        mass_sd: Standard deviation of the mass [kg], scaled so that the true mass is within two standard deviations
+            in 95 % of cases, even with few poses.
+        centre_sd: Largest standard deviation of the centre's coordinates [m], scaled in the same way. The uncertainty
+            of the mass is included.
         force_residual: Root mean square of the residual forces [N].
         torque_residual: Root mean square of the residual torques [N m].
         poses: Number of poses used.
@@ -136,8 +136,8 @@ def _fit(factors: Array, values: Array) -> tuple[Array, Array, Array, float]:
 
     Returns:
         x, shape (P,); the standard deviations of x, shape (P,); the offset, shape (3,); the residual's root mean
-        square. Two standard deviations are a 95 % confidence interval by Student's distribution, since the noise is
-        estimated, too.
+        square. The standard deviations are scaled by Student's distribution, so that x plus or minus two of them is a
+        95 % confidence interval.
     """
     count, _, parameters = factors.shape
     A = (factors - factors.mean(axis=0)).reshape(3 * count, parameters)

@@ -36,9 +36,9 @@ MOVED = "font-weight: bold"
 
 
 class JointRow:
-    """Widgets of one joint: a slider, a target field, and a text with the measured position.
+    """Widgets of one joint: a slider, a field with the target, and a text with the measured position.
 
-    The slider follows the measured position until the user moves the slider.
+    Slider and target follow the measured position until the user changes one of them.
 
     Args:
         info: Name, type and limits of the joint.
@@ -75,13 +75,13 @@ class JointRow:
         self.target.valueChanged.connect(self._on_target)
 
     def show_position(self, position: float) -> None:
-        """Shows the joint's measured position [rad or m]."""
+        """Shows a measured position of the joint [rad or m]."""
         self.measured.setText(f"{position:.{self._digits}f} {self._unit}")
         if not self.is_moved and not self.slider.isSliderDown():
             self._set(position)
 
     def release(self) -> None:
-        """Makes the slider follow the measured position again."""
+        """Makes slider and target follow the measured position again."""
         self._mark(False)
 
     def _on_slider(self, step: int) -> None:
@@ -144,7 +144,7 @@ class RobotTab(QWidget):
         layout.addLayout(line)
 
     def refresh(self, snapshot: SimulatorSnapshot, state: JointState | None) -> None:
-        """Shows the measured positions, and enables the buttons whose services exist."""
+        """Shows the measured positions, and enables the buttons whose services the simulator offers."""
         if not self._is_known:
             self._ask_for_joints()
         positions = dict(zip(state.name, state.position)) if state is not None else {}
@@ -156,7 +156,7 @@ class RobotTab(QWidget):
         self._show_moved()
 
     def _show_moved(self) -> None:
-        """Enables or disables Send, Discard and the duration. Each move of a slider calls this method, too."""
+        """Enables or disables the buttons Send and Discard, and the field with the duration."""
         snapshot = self._snapshot
         is_moved = any(row.is_moved for row in self._rows.values())
         moves = snapshot.has(self._service("move_to_joint_state"))
@@ -231,7 +231,7 @@ class JointsPanel(Panel):
     """Sliders for the joints of all robots, with one tab per robot.
 
     Args:
-        first: Name of the robot whose tab is selected initially; None selects the first tab.
+        first: Name of the robot whose tab is initially selected; None for the first tab.
     """
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests, first: str | None) -> None:

@@ -1,4 +1,4 @@
-"""Watches the running simulator for the controls window, by topics and the ROS master. Does not use Qt."""
+"""Watches the running simulator for the controls window, through topics and the ROS master. Does not use Qt."""
 
 import threading
 import time
@@ -36,9 +36,9 @@ class SimulatorSnapshot:
 
     Attributes:
         is_alive: Whether the simulator has published recently and offers its services.
-        is_running: Whether the world is running, not stopped.
-        names: Topics and services in the simulator's namespace, without the namespace, such as `rpbi/step`.
-        topics: Full names of all published topics.
+        is_running: Whether the world is running; False while it is stopped.
+        names: Names of topics and services relative to the simulator's namespace, such as `rpbi/step`.
+        topics: Full names of all published topics, in all namespaces.
         objects: Types of the objects and cameras, keyed by name.
         state: Newest message on `rpbi/state`; None before the first message.
         warning: The simulator's warning on /diagnostics; empty without a warning.
@@ -58,12 +58,12 @@ class SimulatorSnapshot:
 
     @property
     def robots(self) -> list[str]:
-        """Names of all robots."""
+        """Names of all robots in the world."""
         return [name for name in self.objects if self.has(f"rpbi/{name}/robot_info")]
 
     @property
     def cameras(self) -> list[str]:
-        """Names of the cameras as they occur in topics, sorted; for example `camera`."""
+        """Sorted names of the cameras that publish images; a name is the part `NAME` of the topics `rpbi/NAME/...`."""
         if not self.is_alive:
             return []
         return sorted(
@@ -89,7 +89,7 @@ class Newest:
         self._subscriber: rospy.Subscriber | None = None
 
     def follow(self) -> None:
-        """Replaces the subscription if another topic was selected; may block for a while."""
+        """Replaces the subscription if another topic has been selected. This may block for a while."""
         if self._topic == self.wanted:
             return
         if self._subscriber is not None:
@@ -109,8 +109,8 @@ class SimulatorLink:
     """Watches the simulator in this node's namespace. The simulator may start and end at any time.
 
     Attributes:
-        joints: Newest joint state of the robot that the window shows.
-        image: Newest image of the camera that the window shows.
+        joints: Subscription to the joint states of the robot that the window shows.
+        image: Subscription to the images of the camera that the window shows.
     """
 
     def __init__(self) -> None:
@@ -135,7 +135,7 @@ class SimulatorLink:
         self._wake.set()
 
     def follow(self, newest: Newest, topic: str) -> None:
-        """Selects another topic for `newest`, which is `joints` or `image`, and returns at once."""
+        """Selects the topic of `newest`, which is `joints` or `image`, and returns at once."""
         if newest.wanted != topic:
             newest.wanted, newest.message = topic, None
             self._wake.set()

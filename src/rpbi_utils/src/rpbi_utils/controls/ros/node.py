@@ -57,7 +57,7 @@ def _open() -> Opened:
 def _rviz_view(config_file: str, world_frame: str) -> Any:
     """Returns a widget with RViz's 3-D view, or None if RViz's Python bindings are not installed.
 
-    RViz's own panels are hidden. A right click on its tool bar opens a menu to show them.
+    RViz's own panels are hidden. A right click on RViz's tool bar opens a menu that can show these panels.
 
     Args:
         config_file: RViz configuration file with the displays and the view.

@@ -16,7 +16,7 @@ Condition = Callable[[SimulatorSnapshot], bool]
 
 
 class Panel(QGroupBox):
-    """Base class of the panels, each of which has a frame and a title.
+    """Base class of the panels. A panel is a box with a border and a title.
 
     Args:
         title: Title of the panel.
@@ -30,21 +30,24 @@ class Panel(QGroupBox):
         self._needed: dict[QWidget, tuple[str, Condition]] = {}
 
     def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
-        """Runs a function in the background. The window shows the result, and calls `then` with the result."""
+        """Runs a function in the background. The window shows the result and passes it to `then`.
+
+        The result is an error after `limit_s` [s].
+        """
         self._requests.ask(name, function, then, limit_s)
 
     def require(self, service: str, *widgets: QWidget, when: Condition = lambda _: True) -> None:
-        """Disables widgets while a service is missing or the condition `when` is not met."""
+        """Makes `refresh` disable widgets while a service is missing or the condition `when` is not met."""
         self._needed.update(dict.fromkeys(widgets, (service, when)))
 
     def refresh(self, snapshot: SimulatorSnapshot) -> None:
-        """Shows the state of the simulator. The window calls this method ten times a second and after each request."""
+        """Shows the simulator's state. The window calls this method ten times a second and after each request."""
         for widget, (service, is_met) in self._needed.items():
             widget.setEnabled(snapshot.has(service) and is_met(snapshot))
 
 
 class ScrolledDown(QScrollArea):
-    """Scroll area that scrolls vertically only, and always has at least the width of its content.
+    """Scroll area that scrolls vertically only and is always at least as wide as its content.
 
     Args:
         content: Widget to scroll.
@@ -58,7 +61,7 @@ class ScrolledDown(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Adapts the minimum width when the layout of the content changes."""
+        """Adjusts the minimum width when the layout of the content changes."""
         if event.type() == QEvent.Type.LayoutRequest:
             bar = self.verticalScrollBar()
             self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar.width() * bar.isVisible())
@@ -66,7 +69,7 @@ class ScrolledDown(QScrollArea):
 
 
 def named(widget: QWidget, name: str, tip: str = "") -> Any:
-    """Sets a widget's tool tip, and the object name by which programs find the widget; returns the widget."""
+    """Sets a widget's tool tip and its Qt object name, by which tests find the widget. Returns the widget."""
     widget.setObjectName(name)
     widget.setToolTip(plain_tip(tip))
     return widget

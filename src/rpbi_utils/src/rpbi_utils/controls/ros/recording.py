@@ -1,4 +1,4 @@
-"""Panel that records topics into a bag, with labels."""
+"""Panel that records topics and labels into a bag."""
 
 import time
 from pathlib import Path
@@ -19,7 +19,7 @@ LIMIT_S = 60.0
 """Time limit for subscribing to all topics, and for closing the bag [s]."""
 LABEL = "~label"
 ALSO = ("/tf", "/tf_static", "/clock", "/diagnostics")
-"""Topics outside `rpbi/` that are recorded as well."""
+"""Topics that are recorded in addition to those below `rpbi/`."""
 IMAGES = ("/image", "/segmentation", "/pointcloud", "/compressed", "/visualizer_image", "/visualizer_image_int")
 """Endings of the names of topics that are recorded only if the user selects `with images`."""
 

@@ -1,4 +1,4 @@
-"""Panels that start, stop and step the world, and a model predictive controller."""
+"""Panels that start, stop and step the world or a model predictive controller."""
 
 from functools import partial
 from typing import Any
@@ -15,13 +15,13 @@ from .link import SimulatorLink, SimulatorSnapshot
 from .panel import Condition, Panel, named
 
 MAX_STEPS = 1_000_000
-"""Largest number of steps in one request. The simulator refuses more steps."""
+"""Largest number of steps in one request. The simulator refuses a request with more steps."""
 STEPS_LIMIT_S = 3600.0
 DASH = "–"
 
 
 class RunPanel(Panel):
-    """Starts, stops, steps and resets the world, sets its real-time factor, and shows its state."""
+    """Starts, stops, steps and resets the world, sets the real-time factor, and shows the world's state."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Simulation", link, requests)
@@ -145,7 +145,7 @@ BUTTONS = {"Start": "Lets the controller run", "Step": "Runs one cycle", "Stop":
 
 
 class MpcPanel(Panel):
-    """Starts, stops and steps a model predictive controller. Hidden while the service `mpc/step` is missing."""
+    """Starts, stops and steps a model predictive controller. The panel is hidden unless `mpc/step` is offered."""
 
     def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Model predictive control", link, requests)

@@ -37,8 +37,8 @@ class ControlsWindow(QMainWindow):
 
     Args:
         link: Access to the running simulator.
-        signals: Signals that deliver the results of background requests to the window.
-        first: Name of the robot whose joints are shown first; None shows the first robot.
+        signals: Signals that deliver the results of background requests to the window's thread.
+        first: Name of the robot whose joints are initially shown; None for the first robot.
         view: Widget with RViz's 3-D view; None for a window without the view.
     """
 
@@ -104,7 +104,7 @@ class ControlsWindow(QMainWindow):
 
 
 def _column(panels: list[Panel]) -> QWidget:
-    """Returns a column of panels, with a scroll bar if the window is too low."""
+    """Returns a column of panels, with a scroll bar if the window is not high enough."""
     column = QWidget()
     layout = QVBoxLayout(column)
     for panel in panels:
