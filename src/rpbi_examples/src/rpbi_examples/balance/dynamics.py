@@ -104,7 +104,7 @@ class FloatingRobot:
         return ordered
 
     def update(self, state: RobotState) -> None:
-        """Computes the attributes, and the poses and motions of all frames, for a state."""
+        """Computes the attributes and the motion of all frames for a robot state."""
         model, data = self._model, self._data
         turn = pin.Quaternion(np.array(state.base.quat_xyzw)).normalized()
         back = turn.matrix().T

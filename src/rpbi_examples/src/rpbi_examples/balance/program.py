@@ -125,7 +125,7 @@ def wrench_cone(half_length: float, half_width: float, friction: float) -> Array
     """Returns the matrix C for a rectangular sole. The sole neither slides nor tips under a wrench w if C w <= 0.
 
     The wrench is the force [N] and torque [N m] of the floor on the middle of the sole, in the sole's axes: x along the
-    sole, z up. A pyramid inside the friction cone replaces the cone. Source: Caron, Pham and Nakamura, "Stability of
+    sole, z up. An inscribed pyramid approximates the friction cone. Source: Caron, Pham and Nakamura, "Stability of
     surface contacts for humanoid robots", ICRA 2015.
 
     Args:

@@ -137,7 +137,7 @@ def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
 
 
 def rings_of(corners: ArrayLike) -> Array:
-    """Extracts the sleeve's rings from the corners of its triangles.
+    """Extracts a sleeve's rings from the corners of the sleeve's triangles.
 
     Args:
         corners: Coordinates of the triangles' corners, 9 numbers per triangle, as an array of any shape [m].

@@ -89,7 +89,7 @@ class Run(NamedTuple):
         return ShownPush(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
 
     def summary(self) -> dict[str, Any]:
-        """Returns the entry of this run in summary.json."""
+        """Returns the entry for this run in summary.json."""
         return {
             "episode": self.episode,
             "seconds": round(float(self.table.index[-1] - self.table.index[0]), 2),

@@ -53,8 +53,8 @@ def _run() -> None:
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
     """Moves the arm to the pose `target`, a matrix of shape (4, 4), and then starts the tracking of the target.
 
-    The tracking needs the solver and the solver's setup node, which are switched on. If `~target_toggle` is given, the
-    motion of the target is also switched on.
+    Switches on the solver and the solver's setup node. If `~target_toggle` is given, also switches on the motion of
+    the target.
     """
     problem = IKProblem(has_target=True, target=_pose(target), start=_home())
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution

@@ -102,7 +102,7 @@ class Cup(Scene):
         return is_there and stands and self._balls_inside() == len(BALLS)
 
     def fault(self) -> str:
-        """Returns the number of spilled balls in words. Empty if all balls are in the cup."""
+        """Returns a text with the number of spilled balls. Empty if all balls are in the cup."""
         spilled = len(BALLS) - self._balls_inside()
         return f"{spilled} of {len(BALLS)} balls spilled" if spilled else ""
 
@@ -137,7 +137,7 @@ class Cup(Scene):
             yield
 
     def _touching(self) -> set[str]:
-        """Returns the names of the bodies and of the robot's links that touch the cup."""
+        """Returns the names of all bodies that touch the cup; for the robot, the names of the touching links."""
         touches = self.seen.contacts["cup"]
         return {touch.other_link if touch.other == "kinova" else touch.other for touch in touches}
 

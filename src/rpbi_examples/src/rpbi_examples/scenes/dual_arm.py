@@ -99,7 +99,7 @@ class DualArm(Scene):
         return bool(is_there and is_held) and self._tilt_deg < MAX_TILT_DEG
 
     def fault(self) -> str:
-        """Returns the distance of the box from its goal in words. Empty if the box is near its goal."""
+        """Returns a text with the distance of the box from its goal. Empty if the box is near its goal."""
         off_m, _ = self._error()
         return "" if off_m < NEAR_M else f"the box slipped: it is {1e3 * off_m:.0f} mm from its goal"
 

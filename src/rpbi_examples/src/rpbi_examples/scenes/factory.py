@@ -53,7 +53,7 @@ class Factory(Scene):
         self._placed: list[tuple[str, Kind]] = []
 
     def prepare(self) -> None:
-        """Puts the parts on the belt in a random order. The housing hides the parts from the camera."""
+        """Puts the parts on the belt in a random order. At first, a housing hides the parts from the camera."""
         for slot, part in enumerate(self.random.permutation(list(PARTS)).tolist()):
             x, y, yaw = self.random.uniform((-0.03, -0.015, -math.pi), (0.03, 0.015, math.pi)).tolist()
             place = (BELT_X_M + x, 0.53 + 0.12 * slot + y, BELT_Z_M + PARTS[part].height_m / 2.0)

@@ -28,7 +28,7 @@ class Watched(NamedTuple):
     Attributes:
         robots: Robots whose joint positions are observed.
         bodies: Bodies whose poses are observed, at the rate `base_state_hz` in YAML.
-        wrenches: Force-torque sensors, as `ROBOT/JOINT`.
+        wrenches: Names of force-torque sensors, as `ROBOT/JOINT`.
         contacts: Bodies whose contact forces are observed, at the rate `contacts: {hz: ...}` in YAML.
         tags: AprilTag detectors without latency, observed at the rate `hz` in YAML. A detector is named by its `topic`.
     """

@@ -95,7 +95,7 @@ class SceneTask(WorldTask):
             yield ObservationPart("goal", (-FARTHEST,) * count, (FARTHEST,) * count, lambda: self.scene.goal_numbers)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Creates a new scene, and prepares its episode. If the attribute `seed` is set, it replaces `random`."""
+        """Creates a new scene, and prepares its episode. The attribute `seed`, if set, replaces `random`."""
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
         self._beside, self._has_failed = None, False
@@ -106,7 +106,7 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots that the action controls. Lets `Scene.beside` move the others. With None, does nothing."""
+        """Moves the robots that the action controls; `Scene.beside` moves the others. The action None has no effect."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)

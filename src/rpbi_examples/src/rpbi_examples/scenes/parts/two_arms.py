@@ -64,7 +64,8 @@ class TwoArms:
     def send(self, name: str, pose: Pose) -> bool:
         """Sends an arm to a pose in the world, unless the pose is too near to the other arm.
 
-        If the arms are nearer than the minimum distance, poses are accepted that do not decrease the distance.
+        If the arms are already nearer than the minimum distance, a pose that keeps or increases the distance is
+        accepted.
 
         Returns:
             Whether the arm was sent.
@@ -125,7 +126,7 @@ class Gripper:
     Args:
         scene: Scene in which the robot acts.
         robot: Name of the robot in the world.
-        arm: The arm. Its moved link has its origin between the fingers.
+        arm: The arm. The origin of the arm's moved link is between the fingers.
         finger: Joint of a finger, which is 0 when closed. The other finger mimics this joint.
         speed: Largest mean speed of the hand [m/s].
         turn_speed: Largest mean angular speed of the hand [rad/s].
