@@ -1,4 +1,4 @@
-"""Model predictive control in lock-step, in simulation and on hardware. Each cycle senses, solves, acts and steps."""
+"""Model predictive control in simulation and on hardware, with one measurement, plan and command in each cycle."""
 
 from .controller import ControlPlan as ControlPlan
 from .controller import MpcController as MpcController

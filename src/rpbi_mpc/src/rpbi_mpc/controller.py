@@ -1,4 +1,4 @@
-"""Interfaces of controllers and plants. A controller turns the plant's measurements into plans of commands."""
+"""Interfaces of controllers and plants. A controller computes plans of commands from the plant's measurements."""
 
 from __future__ import annotations
 
@@ -59,7 +59,8 @@ class ControlPlan:
 
     Attributes:
         commands: Commands of this and the following cycles, shape (cycles, numbers in a command).
-        states: Predicted states, shape (rows, numbers in a state). The first row is at the start of the first command.
+        states: Predicted states, shape (rows, numbers in a state). The first row is the state at the start of the first
+            command.
         state_step_s: Time between two predicted states [s].
         cost: Cost of the plan.
         converged: Whether the solver found a solution within its limits.
@@ -67,7 +68,7 @@ class ControlPlan:
         iterations: Number of solver iterations.
         wall_s: Wall time that the solver took [s].
         processor_s: Processor time that the solver took [s].
-        extras: Additional numbers for this cycle's row in the table of cycles, indexed by name.
+        extras: Additional numbers for the record of this cycle, indexed by name.
     """
 
     commands: np.ndarray

@@ -1,4 +1,4 @@
-"""The control loop in lock-step: each cycle senses, solves, acts and steps."""
+"""The control loop in lock-step: each cycle measures the plant, plans, applies a command, and lets time pass."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class LoopConfig(ConfigModel):
         hz: Rate of the cycles [Hz].
         delay_s: Time from a measurement until the resulting command acts [s], at most one cycle. In simulation, the
             delay is always exact. On hardware, the delay is exact if the solver takes at most `delay_s`.
-        max_missed: Largest number of successive cycles without a new plan. In these cycles, the last plan is executed;
-            afterwards, plant and loop stop.
+        max_missed: Largest number of successive cycles without a new plan. These cycles execute the last plan. If the
+            next cycle has no new plan either, plant and loop stop.
     """
 
     hz: Hz = Field(25.0, description="Cycles a second.")
@@ -65,7 +65,7 @@ class Cycle:
         status: Outcome of the cycle.
         reason: Reason for the status. Empty if the status is `solved`.
         sensed: The measurement.
-        plan: The new plan, also if the solver failed. None without a measurement, and after a stop.
+        plan: The plan of this cycle, also if the solver failed. None without a measurement, and after a stop.
         command: The applied command. None if the plant was stopped.
     """
 
@@ -79,7 +79,7 @@ class Cycle:
 
 @dataclass
 class _Held:
-    """The last good plan, and its age in cycles."""
+    """The last usable plan, and the number of cycles since this plan was made."""
 
     plan: ControlPlan | None = None
     age: int = 0
@@ -90,7 +90,7 @@ class LockStep:
     """Runs the control loop, one cycle at a time: measures the plant, plans, applies the command, and lets time pass.
 
     The measurement of a cycle determines the command that acts `delay_s` later. A simulated plant waits for the
-    solver, so that the same start leads to the same end on any computer. A timed plant does not wait: late plans are
+    solver, so that results do not depend on the computer's speed. A timed plant does not wait: late plans are
     discarded.
 
     Without a new plan, the last plan is executed for at most `max_missed` cycles; then plant and loop stop. Without a
@@ -131,7 +131,7 @@ class LockStep:
         self.controller.reset()
 
     def run(self, max_s: float = math.inf) -> list[Cycle]:
-        """Runs cycles until the task is done, the loop stops, or `max_s` [s] have passed. Returns their records."""
+        """Runs cycles until the task is done, the loop stops, or `max_s` [s] have passed. Returns the cycle records."""
         first = len(self.cycles)
         while not self.is_over and (len(self.cycles) - first) * self.config.period_s < max_s - 1e-9:
             self.cycle()
@@ -186,7 +186,7 @@ class LockStep:
         return ""
 
     def _without(self, fault: str) -> tuple[Status, str]:
-        """Determines status and reason of a cycle without a new plan. Stops the loop if the last plan is missing or too
+        """Returns status and reason of a cycle without a new plan. Stops the loop if the last plan is missing or too
         old.
 
         Args:

@@ -31,7 +31,7 @@ SAME_S = 1e-9
 
 
 class PlantConfig(ConfigModel):
-    """Names and topics of slider and robot, and rates and limits of the plant."""
+    """Names and topics of slider and robot, and timing and limits of the plant."""
 
     robot: Text = Field("nextage", description="Name of the robot whose targets are set, rpbi/NAME.")
     joint_states: TopicName = Field(
@@ -86,7 +86,7 @@ class PushingNodeConfig(ConfigModel):
 
 
 class SamplingNodeConfig(ConfigModel):
-    """Parameters of the node that commands a robot with the best of several simulated candidates."""
+    """Parameters of the node that plans the commands of a robot by simulating candidate plans."""
 
     loop: LoopConfig = Field(LoopConfig(hz=10.0), description="Times of the loop.")
     sampling: SamplingConfig = Field(SamplingConfig(), description="Candidates, and the choice among them.")
@@ -114,7 +114,7 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 
 def _any_sampler() -> Schema:
-    """Returns the JSON schema of a sampler's options: a sampler of `SAMPLERS`, or a user's own class."""
+    """Returns the JSON schema for the options of any sampler: one of `SAMPLERS`, or a class of the user."""
     own_type = {"type": "object", "properties": {"type": {"pattern": r"^[\w.]+:\w+$"}}, "required": ["type"]}
     known = [
         {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}

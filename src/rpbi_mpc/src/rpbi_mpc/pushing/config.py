@@ -17,7 +17,7 @@ from .program import ProgramConfig
 
 
 class PushingConfig(ConfigModel):
-    """Options of pushing a slider along a path.
+    """Options of the controller that pushes a slider along a path.
 
     Attributes:
         slider: Size, friction and support of the slider.
@@ -26,14 +26,15 @@ class PushingConfig(ConfigModel):
         program: Horizon, cost and solver.
         estimator: Filter of measurements.
         approach: Motion of the pusher to the slider.
-        gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
+        gap_rate: Ratio of the additional speed towards the slider to the gap between pusher and slider while pushing
+            [1/s].
         max_lag: Largest lead of the reference over the slider, along the path [m]. With a larger lead, the reference
             waits.
         max_off: Distance of the slider from the path beyond which the task fails [m].
-        tolerance: Largest errors of a successful push.
-        settle_s: Time for which the end of the path stays the reference before the task is done [s].
+        tolerance: Limits on the errors of a successful push.
+        settle_s: Time for which the reference stays at the end of the path before the task is done [s].
         cycle_s: Duration of a cycle, in which one command acts [s].
-        lag_s: Delay from a command to the motion of the pusher, in addition to the delay of the loop [s].
+        lag_s: Delay from a command to the resulting motion of the pusher, in addition to the delay of the loop [s].
         plan_cycles: Number of commands in a plan, one for each cycle.
         max_command: Largest speed of the pusher [m/s].
     """

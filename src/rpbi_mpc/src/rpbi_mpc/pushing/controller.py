@@ -60,7 +60,7 @@ class PushingController(MpcController):
 
     @property
     def outcome(self) -> PushOutcome:
-        """Errors of the measured slider and misfit of the model, up to the present cycle."""
+        """Errors of the slider's measured poses, and misfit of the model, up to the present cycle."""
         return self._record.outcome
 
     @property
@@ -88,7 +88,7 @@ class PushingController(MpcController):
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
         """Predicts the scene for the time at which the first command acts, and plans commands from this scene.
 
-        If the pusher is not at the slider, the plan is an approach without a solver, and the plan's cost is NaN.
+        If the pusher is not at the slider, the plan moves the pusher to the slider. The cost of such a plan is NaN.
         """
         acts_s = sensed.time_s + delay_s + self.config.lag_s
         self._references.append((acts_s, self.path_time_s))
@@ -109,9 +109,9 @@ class PushingController(MpcController):
         return dataclasses.replace(plan, extras=extras | plan.extras)
 
     def _note(self, sensed: Sensed) -> float:
-        """Records the errors of a measurement, and returns the slider's distance from the reference [m].
+        """Records the errors of a measurement, and returns the measured slider's distance from the reference [m].
 
-        The distance refers to the reference at the time of the measurement.
+        Uses the reference at the time of the measurement.
         """
         assert sensed.values is not None
         measured = PlanarScene.of(sensed.values)

@@ -29,7 +29,7 @@ solver oscillates near singular postures.
 class PlanarHandConfig(ConfigModel):
     """A point on an arm's hand that moves at a constant height and with a constant orientation.
 
-    The hand does not turn, since a turning round tip would rub along the pushed face.
+    The hand does not turn, because the round tip of a turning hand would rub against the pushed face.
 
     Attributes:
         urdf: URDF file of the robot.
@@ -37,8 +37,8 @@ class PlanarHandConfig(ConfigModel):
         joints: Names of the joints that move the point.
         base: Position of the robot's root link in the world [m].
         height: Height of the point in the world [m].
-        yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
-        posture: Joint positions from which the first solution starts [rad]. If empty, all are 0.
+        yaw: Angle about the vertical from the world's x axis to the link's x axis [rad].
+        posture: Joint positions from which the first iteration starts [rad]. If empty, all positions are 0.
     """
 
     urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
@@ -53,7 +53,7 @@ class PlanarHandConfig(ConfigModel):
 
 
 class PlanarHand:
-    """Forward and inverse kinematics of a hand over a table.
+    """Forward and inverse kinematics of the point that `PlanarHandConfig` describes.
 
     Inverse kinematics use damped least squares (C. Wampler, IEEE SMC 16, 1986). The same sequence of positions leads to
     the same joint positions on any computer.
@@ -77,12 +77,12 @@ class PlanarHand:
         self.posture = np.array(posture, dtype=float)
 
     def position(self, joints: np.ndarray) -> np.ndarray:
-        """Returns the position of the point in the world for joint positions [rad], shape (3,) [m]."""
+        """Returns the point's position in the world at given joint positions [rad], shape (3,) [m]."""
         position: np.ndarray = self._pose(joints)[:3, 3] + self._config.base
         return position
 
     def solve(self, start: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Returns joint positions [rad] with which the point is at a position in the plane.
+        """Returns joint positions [rad] that move the point to a position in the plane.
 
         Args:
             start: Joint positions from which the iteration starts [rad].

@@ -14,14 +14,14 @@ from rpbi_mpc.pushing.planar.model import SliderConfig
 
 
 class ToleranceConfig(ConfigModel):
-    """Largest errors of a successful push.
+    """Limits on the errors of a successful push.
 
     Measured errors at the end of the path are averaged over the second half of the settling time.
 
     Attributes:
-        goal: Distance of the slider from the end of the path [m].
-        goal_rad: Angle between the slider and the direction of the path at its end [rad].
-        tracking: Mean distance of the slider from the reference during the whole push [m].
+        goal: Largest distance of the slider from the end of the path [m].
+        goal_rad: Largest angle between the slider and the final direction of the path [rad].
+        tracking: Largest mean distance of the slider from the reference during the whole push [m].
     """
 
     goal: PositiveMetres = Field(0.005, description="Largest distance of the slider from the end of the path.")
@@ -30,15 +30,15 @@ class ToleranceConfig(ConfigModel):
 
 
 class PushOutcome(NamedTuple):
-    """Errors of a push, and the misfit of its model.
+    """Errors of a push, and the misfit of the model.
 
     Attributes:
-        goal_m: Final distance of the slider from the end of the path [m]. NaN before the reference is at the end.
-        goal_rad: Final angle between the slider and the direction of the path at its end [rad]. NaN before the
-            reference is at the end.
+        goal_m: Final distance of the slider from the end of the path [m]. NaN until the reference reaches the end.
+        goal_rad: Final angle between the slider and the final direction of the path [rad]. NaN until the reference
+            reaches the end.
         tracking_m: Mean distance of the slider from the reference [m].
-        misfit: Mean difference between the twists of slider and model during pushing, divided by the speed along the
-            path. Angular velocity is multiplied by the characteristic length.
+        misfit: Mean difference between the slider's twist and the model's twist during pushing, divided by the speed
+            along the path. Angular velocity is multiplied by the characteristic length.
         face_m: Measured minus modelled distance of the pushed face from the middle of the slider [m].
     """
 
@@ -49,7 +49,7 @@ class PushOutcome(NamedTuple):
     face_m: float
 
     def fault(self, tolerance: ToleranceConfig) -> str:
-        """Returns a text with the errors that are too large, and the model's misfit. Empty if all errors are small."""
+        """Returns a text about the errors beyond `tolerance` and the model's misfit. Empty without such errors."""
         faults = []
         if self.goal_m > tolerance.goal:
             faults.append(
@@ -65,7 +65,7 @@ class PushOutcome(NamedTuple):
 
     @property
     def of_model(self) -> str:
-        """Describes the difference between box and model in a clause, from `misfit` and `face_m`."""
+        """Clause that describes how the box differs from the model, according to `misfit` and `face_m`."""
         side = "farther from" if self.face_m > 0.0 else "nearer to"
         return (
             f"unlike the model, the box moves by {100 * self.misfit:.0f} % of its speed, and its pushed face is "
@@ -109,7 +109,7 @@ class PushRecord:
         """Records the misfit of the model in a cycle of pushing.
 
         Args:
-            drift: Difference between the twists of slider and model [m/s, m/s, rad/s].
+            drift: The slider's twist minus the model's twist [m/s, m/s, rad/s].
             gap: Measured distance between pusher and face [m].
         """
         self._pushed.append((float(np.linalg.norm(self._scale * drift)) / self._speed, gap))

@@ -73,8 +73,9 @@ class PushPlanner(ABC):
 class ProgramPlanner(PushPlanner):
     """Solves `PushingProgram` in each cycle, with a warm start from the last solution.
 
-    Each plan has three extras for its first step. `normal` and `tangential` are the components of the force, in units
-    of the speed that the force causes [m/s]. `sliding` is the pusher's speed to the left along the face [m/s].
+    `extras` of each plan has three numbers for the first step. `normal` and `tangential` are the components of the
+    force, expressed as the speed that the force causes [m/s]. `sliding` is the pusher's speed to the left along the
+    face [m/s].
 
     Args:
         config: Slider, pusher, path and cost.

@@ -30,10 +30,10 @@ class WeightsConfig(ConfigModel):
         position: Distance from the path [1/m^2].
         yaw: Difference between yaw and the direction of the path [1/rad^2].
         contact: Distance of the pusher from the middle of the face [1/m^2].
-        force: Tangential force, and difference between the normal force and the force of motion along the path
-            [s^2/m^2].
+        force: Tangential force, and difference between the normal force and the force that moves the slider along the
+            path [s^2/m^2].
         sliding: Speed of sliding along the face [s^2/m^2].
-        change: Difference between the force in the first step and the force before it [s^2/m^2].
+        change: Difference between the force in the first step and the previous force [s^2/m^2].
         final: Factor for the weights of the last state.
         complementarity: Penalty for inputs with which the contact neither sticks nor slides [s^2/m^2].
     """
@@ -99,7 +99,9 @@ class Solved(NamedTuple):
 
 
 class PushingProgram:
-    """Nonlinear program for the optimal inputs of a push over a horizon. Compiled once, and solved in each cycle.
+    """Nonlinear program that computes the optimal inputs of a push over a horizon.
+
+    The constructor compiles the program, and `solve` solves the program in each cycle.
 
     Args:
         slider: The slider.
@@ -114,7 +116,7 @@ class PushingProgram:
     def solve(
         self, state: np.ndarray, reference: np.ndarray, speed: float, force: np.ndarray, guess: np.ndarray
     ) -> Solved:
-        """Solves the program, with one solver after the other until a solver converges.
+        """Solves the program. Tries one solver after the other until a solver converges.
 
         Args:
             state: First state, shape (4,).

@@ -122,7 +122,7 @@ def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], c
 
 
 def _draw_cycles(file: Path, table: pandas.DataFrame, slider: SliderConfig) -> None:
-    """Writes a picture with six plots over time: force, sliding, pusher's position, its velocity, cost, solve time."""
+    """Writes a picture with six plots over time: force, sliding, pusher position, pusher velocity, cost, solve time."""
     figure, axes = _figure(6, 1, (7.0, 10.5))
     time_s = table["time_s"] - table["time_s"].iloc[0]
     if "normal" in table:

@@ -1,4 +1,4 @@
-"""A planner for pushing that simulates candidates in forks of the world, and improves its plan from their costs."""
+"""A planner for pushing that simulates candidate plans in forks of the world, and plans from the candidates' costs."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class PushRollouts(Protocol):
 
 
 class PushSamplingConfig(SamplingConfig):
-    """Options of the controller `sampling`. Except for `yaw`, the weights of the cost are in `pushing.program.weights`.
+    """Options of the planner `sampling`. The weights of the cost are those in `pushing.program.weights`, except `yaw`.
 
     Attributes:
         forward: Largest speed of the pusher towards the face [m/s]. The largest speed away from the face is a fifth.
         across: Largest speed of the pusher along the face [m/s].
         yaw: Weight of the difference between the slider's yaw and the direction of the path [1/rad^2]. The weight must
-            be large: a box turns before it leaves a straight line, but turning hardly changes the distance from the
+            be large: a box that leaves a straight path turns first, but turning hardly changes the distance from the
             path within the horizon.
     """
 
@@ -124,7 +124,7 @@ class _ScoredPushes:
         return costs
 
     def _places(self, scenes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the pusher's distance from the face, and its position along the face [m].
+        """Returns the pusher's distances from the face, and the pusher's positions along the face [m].
 
         Both arrays have the shape (candidates, cycles).
         """

@@ -33,7 +33,7 @@ class PushingWorld(Plant):
         timeout_s: Time without a pose after which the slider counts as hidden [s].
 
     Attributes:
-        truth: True scene after each `advance`: time [s], x, y, yaw of the slider, x, y of the pusher [m, rad].
+        truth: True scenes, one row per `advance`: time [s], x, y, yaw of the slider, x, y of the pusher [m, rad].
     """
 
     def __init__(self, world: World, middle: tuple[float, float] = (0.0, 0.0), timeout_s: float = TIMEOUT_S) -> None:

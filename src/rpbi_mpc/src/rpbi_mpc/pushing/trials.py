@@ -1,4 +1,4 @@
-"""Simulated trials of pushing, with random friction and centre of mass, measurement noise and delay, and shoves."""
+"""Simulated trials of pushing with random friction, random centre of mass, measurement noise, delay, and shoves."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ KEPT = 1000
 
 
 class SeenScene(NamedTuple):
-    """Slider and pusher at the time of the slider's newest pose.
+    """Pose of the slider and position of the pusher at the time of the slider's newest pose.
 
     Attributes:
         stamp_s: Stamp of the slider's pose [s].

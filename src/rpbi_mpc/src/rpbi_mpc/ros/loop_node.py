@@ -33,8 +33,8 @@ Answer = tuple[bool, str]
 class LoopNode:
     """Runs a control loop in the main thread. The services `mpc/start`, `mpc/stop` and `mpc/step` control the loop.
 
-    The node has three private parameters. With `~start_on_init` (default: true), the loop starts at once. `~out` is the
-    folder for the report. With `~end`, the node ends together with the task.
+    The node has three private parameters. If `~start_on_init` is true (default), the loop starts at once. `~out` is the
+    folder for the report. If `~end` is true, the node ends together with the task.
 
     Args:
         plant: The controlled system.
@@ -59,7 +59,7 @@ class LoopNode:
         """Publishes details of a cycle in addition to `mpc/status`. Does nothing by default."""
 
     def on_stop(self) -> None:
-        """Is called after the service `mpc/stop` has stopped the loop. Does nothing by default."""
+        """Reacts to the service `mpc/stop`, after the loop has stopped. Does nothing by default."""
 
     def write_report(self, folder: Path) -> str:
         """Writes the records of all cycles to a folder, and returns a summary in one line.
@@ -71,11 +71,11 @@ class LoopNode:
         return f"{summary['cycles']} cycles"
 
     def run(self) -> None:
-        """Runs the requested cycles until ROS shuts down. With `~end`, also returns when the task is done.
+        """Runs the requested cycles until ROS shuts down. If `~end` is true, also returns when the task is done.
 
         Raises:
-            InterfaceError: If the simulator rejects a step, or joint states do not arrive. With `~end`, also if the
-                loop stops before the task is done.
+            InterfaceError: If the simulator rejects a step, or joint states do not arrive. If `~end` is true, also if
+                the loop stops before the task is done.
         """
         while not rospy.is_shutdown():
             if self._is_due():
@@ -138,7 +138,10 @@ class LoopNode:
             rospy.logwarn_throttle(WARNING_PERIOD_S, f"{text}; end other programs (docs/slow.md)")
 
     def _is_due(self) -> bool:
-        """Returns whether the next cycle is requested. Waits at most 0.1 s for a request if the plant is not timed."""
+        """Returns whether a cycle is due, because the loop runs or a single cycle has been requested.
+
+        If the plant is not timed, waits at most 0.1 s for a request.
+        """
         with self._changed:
             if not self._running and not self._steps and not self._loop.plant.is_timed:
                 self._changed.wait(0.1)

@@ -113,7 +113,7 @@ class HandPlant(Plant):
 
     @abstractmethod
     def _pass(self, step_s: float, target: JointState) -> None:
-        """Sends a joint target, and lets a time pass [s]."""
+        """Sends a joint target, and lets `step_s` [s] pass."""
 
     @abstractmethod
     def _wait_for_joints(self) -> None: ...
@@ -141,7 +141,7 @@ class SteppedPlant(HandPlant):
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
         """Simulates candidates with the service `rpbi/predict`, and returns the scenes; see `PushRollouts`.
 
-        A candidate with a position of the hand that is out of reach is not simulated.
+        A candidate is not simulated if a position of the hand is out of reach.
         """
         robot, slider, cycles = self._config.robot, self._config.slider, velocities.shape[1]
         ticks = RolloutTicks.of(cycles, period_s, delay_s, self._simulator.dt_s)

@@ -1,4 +1,4 @@
-"""`sampling_mpc_node.py`: simulates candidate plans for a robot, whose costs determine the executed plan."""
+"""`sampling_mpc_node.py`: controls a robot with plans that follow from the costs of simulated candidate plans."""
 
 from __future__ import annotations
 

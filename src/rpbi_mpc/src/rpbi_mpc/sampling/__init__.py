@@ -1,5 +1,5 @@
-"""Model predictive control by sampling. Forks of the world simulate candidate plans, whose costs determine the executed
-plan.
+"""Model predictive control by sampling. Forks of the world simulate candidate plans. The costs of these candidates
+determine the executed plan.
 """
 
 from .controller import SamplingConfig as SamplingConfig

@@ -1,4 +1,4 @@
-"""A controller that simulates candidate plans from the present state, and improves its plan from their costs."""
+"""A controller that simulates candidate plans from the present state, and plans from the candidates' costs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Rollouts(Protocol):
 
 
 class SamplingConfig(ConfigModel):
-    """Options of `SamplingController`."""
+    """Horizon, knots and sampler of a controller that simulates candidate plans."""
 
     horizon: Seconds = Field(0.5, description="Horizon.")
     knots: Annotated[int, Field(ge=2)] = Field(
@@ -89,7 +89,7 @@ class SamplingController(MpcController):
         return self.sample(delay_s)
 
     def sample(self, delay_s: float) -> ControlPlan:
-        """Improves the plan by simulations from the present state, and returns the plan.
+        """Improves the plan with simulations from the present state, and returns the improved plan.
 
         Args:
             delay_s: Time until the plan's first command acts [s].
@@ -136,16 +136,19 @@ class SamplingController(MpcController):
         )
 
     def _commands(self, plans: np.ndarray) -> np.ndarray:
-        """Converts plans (knots, as shares of the limits) to commands, shape (plans, cycles, m)."""
+        """Converts plans, shape (plans, k, m), to commands, shape (plans, cycles, m).
+
+        The numbers of a plan are shares of the range between the limits; see `samplers`.
+        """
         times = np.arange(self._cycles) * self._period_s
         shares = np.stack([self._at(plan, times) for plan in plans])
         commands: np.ndarray = self._rollouts.lower + shares * self._span
         return commands
 
     def _at(self, plan: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Interpolates a plan at times since its start [s]. After the end of the plan, repeats the last knot.
+        """Interpolates a plan at times since the start of the plan [s]. Times after the plan's end use the last knot.
 
         Returns:
-            Shares of the limits, shape (times, m).
+            Shares of the range between the limits, shape (times, m).
         """
         return np.stack([np.interp(times, self._times, column) for column in plan.T], axis=1)

@@ -1,7 +1,7 @@
 """Samplers, which draw candidates around a nominal plan and improve the plan from the candidates' costs.
 
 A plan is a matrix of shape (k, m): the m numbers of a command at k equidistant times, the knots. Each number is a share
-of its range, from 0 (lower limit) to 1 (upper limit).
+of the range between the limits, from 0 (lower limit) to 1 (upper limit).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from custom_ros_tools.schema import ConfigModel, KeyedError
 
 
 class SamplerConfig(ConfigModel):
-    """Options that all samplers have."""
+    """Options that all samplers have in common."""
 
     candidates: Annotated[int, Field(ge=2)] = Field(16, description="Plans that are simulated in each iteration.")
     iterations: Annotated[int, Field(ge=1)] = Field(1, description="Number of improvements of the plan in a cycle.")
@@ -89,7 +89,7 @@ class CemConfig(SamplerConfig):
 class CemSampler(Sampler):
     """The cross-entropy method (Rubinstein 1999; Kobilarov 2012): the plan is the mean of the best candidates.
 
-    The deviation of the best candidates is the deviation for the next candidates in the same cycle.
+    In the next iteration of the same cycle, candidates are drawn with the standard deviation of the best candidates.
     """
 
     Config = CemConfig
@@ -110,7 +110,7 @@ class CemSampler(Sampler):
 
 
 class MppiConfig(SamplerConfig):
-    """Options of MPPI."""
+    """Options of model predictive path integral control (MPPI)."""
 
     temperature: Annotated[float, Field(gt=0)] = Field(
         0.1, description="Difference in cost for a weight of 1/e, as a share of the spread of all costs."
@@ -118,10 +118,13 @@ class MppiConfig(SamplerConfig):
 
 
 class MppiSampler(Sampler):
-    """Model predictive path integral control: a mean of all candidates with the weights exp(-cost / temperature).
+    """Model predictive path integral control: the plan is a weighted mean of all candidates.
+
+    The weights are exp(-cost / temperature). The temperature is relative to the spread of the costs, so that the costs
+    may have any unit.
 
     Source of the weights: Williams et al., Information-Theoretic MPC, IEEE T-RO 34 (2018), algorithm 2, here without
-    control costs. The temperature is relative to the spread of the costs, so that the costs may have any unit.
+    control costs.
     """
 
     Config = MppiConfig

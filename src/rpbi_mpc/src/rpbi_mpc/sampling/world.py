@@ -17,7 +17,7 @@ from rpbi_mpc.controller import Plant, Sensed
 
 
 class InputConfig(ConfigModel):
-    """An input of the world that the controller commands, with limits."""
+    """World input that the controller commands, and limits of the commanded numbers."""
 
     input: str = Field(description="NAME/INPUT, such as kuka_lwr/target.")
     names: ListOf[str] = Field(description="Joints, or fields of its value, that are commanded.")
@@ -69,7 +69,7 @@ def whole_ticks(duration_s: float, dt_s: float) -> int:
 
 
 class RolloutTicks(NamedTuple):
-    """Ticks of a prediction in which n commands act one after the other.
+    """Ticks and rows of a prediction in which n commands act one after the other.
 
     Attributes:
         starts: First tick of each command, shape (n,).
@@ -107,8 +107,8 @@ class ForkedWorld(Plant):
     Args:
         world: The world.
         config: Commanded input.
-        cost: Cost of a state, which is summed over all ticks, as `module:name`. The name is a function that takes the
-            `World`, or a class whose objects are such functions.
+        cost: Cost of a state, which is summed over all ticks, as `module:name`. `name` is a function that takes the
+            `World`, or a class whose instances can be called with the `World`.
 
     Raises:
         InterfaceError: If the world cannot be forked, for instance because of a soft body.

@@ -1,4 +1,4 @@
-"""Estimates slider and pusher from late and noisy measurements, and predicts both for the time of the next command."""
+"""Estimates the poses of slider and pusher from late, noisy measurements, and predicts both for the next command."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SceneEstimator:
         radius: Radius of the pusher [m].
 
     Attributes:
-        drift: Filtered difference between the twists of slider and model, in the slider's axes [m/s, m/s, rad/s].
+        drift: The slider's twist minus the model's twist, filtered, in the slider's axes [m/s, m/s, rad/s].
     """
 
     def __init__(self, config: EstimatorConfig, slider: SliderConfig, radius: float) -> None:

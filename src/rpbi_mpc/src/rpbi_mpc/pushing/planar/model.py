@@ -1,9 +1,9 @@
-"""A slider, and its quasi-static motion under the push of one contact, with an ellipsoidal limit surface.
+"""Quasi-static model of a slider that a pusher moves through one contact, with an ellipsoidal limit surface.
 
 Friction with the table and the force of the pusher are in balance. The limit surface is the set of all loads under
 which a body slides. The ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1 approximates the limit surface, with the
 largest force f and the characteristic length c. The twist is normal to the ellipsoid (K. Lynch, H. Maekawa and K.
-Tanie, IROS 1992). Forces are in units of the speed that the force causes. In these units, a load (fx, fy, m) causes the
+Tanie, IROS 1992). A force is expressed as the speed that this force causes [m/s]. A load (fx, fy, m) then causes the
 twist (fx, fy, m / c^2) in the slider's frame.
 
 The contact sticks, or slides to one side of the face at the edge of the friction cone (F. Hogan and A. Rodriguez,
@@ -13,7 +13,7 @@ model predictive control", IJRR 39, 2020).
 All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact). x, y and yaw are the
 pose of the slider in the plane [m, m, rad]. `contact` is the position of the pusher along the face at -x, from the
 middle of the face to the left [m]. The input is (normal, tangential, left, right). The first two numbers are the
-components of the force [m/s]. The others are the speeds at which the pusher slides to the left and to the right [m/s].
+components of the force [m/s]. `left` and `right` are the speeds at which the pusher slides to either side [m/s].
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ class SliderConfig(ConfigModel):
     def characteristic_length(self) -> float:
         """Ratio of the largest friction moment about the middle to the largest friction force [m].
 
-        This length is the mean distance of the supporting points from the middle, weighted with their pressure. It is
-        also the ratio of the half axes of the ellipsoidal limit surface. Sources: S. Goyal, A. Ruina and J.
+        This length is the mean distance of the supporting points from the middle, weighted with the pressure, and the
+        ratio of the half axes of the ellipsoidal limit surface. Sources: S. Goyal, A. Ruina and J.
         Papadopoulos, "Planar sliding with dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie,
         "Manipulation and active sensing by pushing using tactile feedback", IROS 1992.
         """
@@ -124,8 +124,8 @@ def complementarity(control: Vector, slider: SliderConfig) -> Any:
     """Returns the amount by which an input violates the contact modes [m^2/s^2]. 0: the contact sticks or slides.
 
     The contact slides to the left only at the left edge of the friction cone, and to the right only at the right edge.
-    Inside the cone, the violation is never negative. The program penalises the violation instead of constraining it to
-    0, similar to the relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar
+    Inside the cone, the violation is never negative. `PushingProgram` penalises the violation instead of requiring 0,
+    similar to the relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar
     manipulation via trajectory optimization with complementarity constraints", ICRA 2022.
     """
     normal, tangential, left, right = _items(control)

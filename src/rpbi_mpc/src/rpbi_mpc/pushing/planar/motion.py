@@ -53,7 +53,7 @@ def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
 def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
     """Returns the distance between pusher and face, and the pusher's position along the face to the left [m, m].
 
-    The distance is measured to the infinite line through the face. It is negative if the pusher is behind this line.
+    The distance is measured to the infinite line through the face, and is negative on the slider's side of this line.
     """
     x, y = pusher_in_slider(scene)
     return -x - slider.face - radius, y
@@ -62,7 +62,7 @@ def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> 
 def moved(
     scene: PlanarScene, velocity: np.ndarray, duration_s: float, slider: SliderConfig, radius: float, steps: int = 4
 ) -> PlanarScene:
-    """Predicts the scene after a motion of the pusher with constant velocity, with the quasi-static model.
+    """Predicts the scene after the pusher has moved at constant velocity, with the quasi-static model.
 
     Args:
         scene: Scene before the motion.
