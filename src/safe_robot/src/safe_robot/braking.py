@@ -86,7 +86,7 @@ class Braking:
 
     Each joint comes to rest in N periods with the sequence of jerks whose sum of squares is smallest. This sequence is
     a linear function of the joint's velocity and acceleration at the start. The coefficients are precomputed for
-    several numbers N. A braking uses the smallest of these N for which the joint keeps its limits.
+    several numbers N. A braking uses the smallest of these N that keeps the acceleration and jerk limits.
 
     Args:
         max_velocity: Speed limits, shape (n,) [rad/s or m/s]; inf for a joint without a limit.
@@ -128,9 +128,9 @@ class Braking:
         self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
-        """Returns the shortest precomputed braking that keeps the acceleration and jerk limits; None if there is none.
+        """Returns the shortest precomputed braking of each joint that keeps the acceleration and jerk limits.
 
-        Velocities and positions during braking are not checked here.
+        Returns None if a joint has no such braking. Velocities and positions during braking are not checked here.
 
         Args:
             velocity: Velocities at the start, shape (n,) [rad/s or m/s].
@@ -237,7 +237,7 @@ def _jerk_line(length: int) -> np.ndarray:
 
 
 def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
-    """Returns an upper bound of the duration of braking from any state within the limits and `FASTEST` [s].
+    """Returns an upper bound of the braking duration [s], for states within the limits and speeds up to `FASTEST`.
 
     The longest braking starts with a velocity v and an acceleration a of the same sign. In continuous time, the
     least-squares braking of duration D then has its largest jerk, (6 v + 4 a D) / D^2, at the start. The largest

@@ -30,7 +30,7 @@ class FirstTarget:
         file: Source of the configuration, for messages.
 
     Raises:
-        ConfigError: If the reach of links depends on joint limits, but the check `joint_position` is not active.
+        ConfigError: If `RobotModel.reach` depends on joint limits, but the check `joint_position` is not active.
     """
 
     def __init__(self, config: GuardConfig, robot: RobotModel, checks: Sequence[Check], file: str) -> None:

@@ -117,7 +117,7 @@ class Guard:
 
     @property
     def is_braking(self) -> bool:
-        """Whether the robot still moves while the guard is halted or targets are late; `next_braking` then applies."""
+        """Whether `next_braking` has commands: the robot moves, but the guard is halted or targets are late."""
         return (self.is_halted or self._is_late) and self.is_moving
 
     @property
@@ -213,8 +213,8 @@ class Guard:
     def refuse(self, reason: str) -> Decision:
         """Refuses a target that cannot be checked; `reason` becomes the violation.
 
-        With the policy `reject`, and before the first command, the guard halts. Otherwise it commands the next step of
-        the braking.
+        The guard halts with the policy `reject`, or before the first command. Otherwise, it decides on the next command
+        of the braking.
         """
         if self.is_halted:
             return Decision(None, None, True)

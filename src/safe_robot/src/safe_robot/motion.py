@@ -14,7 +14,7 @@ WAYPOINT_SPACING = 0.15
 
 
 class State(NamedTuple):
-    """Commanded positions of n joints, and their velocities and accelerations as backward differences.
+    """Commanded positions of n joints, with velocities and accelerations as backward differences.
 
     Attributes:
         position: Positions, shape (n,) [rad or m].

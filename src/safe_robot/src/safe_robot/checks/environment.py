@@ -86,7 +86,7 @@ class Environment(ProximityCheck):
         """Replaces the obstacles of `CheckContext`, and discards stored distances to obstacles that have changed.
 
         Raises:
-            ValueError: As `check`.
+            ValueError: If an obstacle is invalid; see `check`.
         """
         self._live = None  # marks the poses as outdated until all are updated
         count = len(self._obstacles)

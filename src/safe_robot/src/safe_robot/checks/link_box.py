@@ -46,7 +46,7 @@ class Box(NamedTuple):
     Attributes:
         low: Smallest x, y and z in the frame of the robot's root link, shape (3,) [m].
         high: Largest x, y and z in the same frame, shape (3,) [m].
-        reach: Upper bound of the link origin's displacement per displacement of each joint, shape (n,) [m/rad or 1].
+        reach: Upper bound of the link origin's displacement per unit of motion of each joint, shape (n,) [m/rad or 1].
     """
 
     low: np.ndarray

@@ -57,7 +57,7 @@ class Proximity:
         self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of the pairs' distances there
 
     def forget(self, indices: Sequence[int]) -> None:
-        """Discards the stored bounds of pairs with these indices, because the obstacle of each pair has changed."""
+        """Discards the stored bounds of the pairs with these indices, whose obstacles have moved or changed."""
         self._known_m[:, list(indices)] = -np.inf
         for i in indices:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
@@ -65,9 +65,9 @@ class Proximity:
     def first(self, motion: CommandedMotion) -> TooNear | None:
         """Returns a pair that comes too near in any row of a motion; None if all pairs keep their distance.
 
-        Let d and e be the distances of a pair in two rows, and m the length of its relative motion between the rows.
-        Then the distance between these rows is at least (d + e - m) / 2. Where this bound is too small, every row is
-        checked.
+        Let d and e be a pair's distances in two rows, and m the length of the pair's relative motion from one row to
+        the other. In all rows between, the pair's distance is at least (d + e - m) / 2. If this bound is too small,
+        every row is checked.
         """
         if not len(self._pairs):
             return None
@@ -97,8 +97,8 @@ class Proximity:
     def _first_in_rows(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
         """Returns one of s pairs that comes too near in one of k rows; None if no pair does.
 
-        Measures distances in a few rows first. These usually reveal an unsafe motion, and give lower bounds for most of
-        the other rows.
+        Measures distances in a few rows first. These rows usually reveal an unsafe motion, and give lower bounds for
+        most of the other rows.
 
         Args:
             motion: The motion.
@@ -163,7 +163,7 @@ class Proximity:
         """Returns lower bounds of all pairs' distances [m], shape (..., 2, pairs).
 
         Lower bounds are stored for two configurations: the first and the last row of an earlier motion. Each returned
-        bound is a stored bound minus the largest possible change of the distance between this configuration and `q`.
+        bound is a stored bound minus the largest possible change of distance between the stored configuration and `q`.
 
         Args:
             q: Joint positions for both stored configurations, shape (..., 2, 1, n); or (..., 1, 1, n) if the positions
@@ -189,7 +189,7 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns pair `i` if its distance is smaller than the margin and than at the motion's start; otherwise None.
+        """Returns pair `i` if its distance is below both the margin and the distance at the start; otherwise None.
 
         The caller has moved the robot to the configuration of the row, and has measured `contact` there.
         """

@@ -1,4 +1,4 @@
-"""Base class of checks that measure distances between shapes, and choice of the library that measures."""
+"""Base class of checks that measure distances between shapes, and choice of the library for these measurements."""
 
 import math
 from abc import abstractmethod
@@ -37,7 +37,7 @@ def shapes_of(robot: RobotModel) -> Shapes:
 
 
 def link_distances(robot: RobotModel, geometry: Geometry = "hulls") -> LinkDistances:
-    """Returns an object that measures distances from and between a robot's links, on the shapes of `shapes_of`.
+    """Returns an object that measures distances from and between a robot's links, with the library of `shapes_of`.
 
     Raises:
         ConfigError: If the robot cannot be loaded.

@@ -39,7 +39,7 @@ class EscapeDirection(NamedTuple):
         return self.direction is None
 
     def words(self, joint_names: Sequence[str]) -> str:
-        """Returns a message about the violations, and about the joint motion that reduces them if it was found."""
+        """Returns a message about the violations and, if found, about the joint motion that reduces the violations."""
         each = ", ".join(
             f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)"
             for one in self.inside

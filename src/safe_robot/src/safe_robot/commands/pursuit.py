@@ -1,4 +1,4 @@
-"""Computes commands that move joints to a target as fast as the joint limits allow, and stop the joints there."""
+"""Computes commands that move joints to a target as fast as the limits allow, and stop the joints at the target."""
 
 from typing import NamedTuple
 
@@ -22,8 +22,8 @@ class Pursuit(NamedTuple):
     """Range of the commands that n joints can follow in the next period.
 
     Attributes:
-        wanted: Command at the end of the range that is nearer to the targets, shape (n,) [rad or m].
-        slowest: Command at the other end of the range, with the smallest accelerations towards the targets, shape (n,)
+        wanted: Commanded positions at that end of the range which is nearer to the targets, shape (n,) [rad or m].
+        slowest: Commanded positions at the other end, with the smallest accelerations towards the targets, shape (n,)
             [rad or m].
     """
 

@@ -1,8 +1,8 @@
 """Search for a safe command near an unsafe target.
 
 The safety checks provide linear bounds on positions. The QP solver DAQP finds the command that satisfies these bounds
-and is nearest to the target. The extra `ik` installs DAQP. Without DAQP, the search only tries interpolations between
-braking and the target.
+and is nearest to the target. The extra `ik` installs DAQP. Without DAQP, the search only tries commands on a line
+between braking and the target.
 """
 
 from __future__ import annotations
@@ -58,12 +58,12 @@ class SafeCommandSearch:
     ) -> Safe | None:
         """Tries commands near a target, and returns the first safe one; None if all are unsafe.
 
-        The check that refused the last candidate runs first, since it likely refuses again.
+        The check that refused the last candidate runs first, since this check is likely to refuse the next one, too.
 
         Args:
             target: Target positions, shape (n,) [rad or m].
             state: Present state of the robot.
-            stop: Commands of the braking from this state, shape (k, n), k >= 1 [rad or m]. They have passed the checks.
+            stop: Commands of a braking from this state that has passed the checks, shape (k, n), k >= 1 [rad or m].
             judged: Runs checks, in the given order, on a command of n positions. Returns the safe command, or a
                 violation.
         """
@@ -123,7 +123,7 @@ def can_keep_bounds() -> bool:
 
 
 class StoppingTrajectory:
-    """Linear function of a command that predicts positions of n joints at `MOMENTS` instants of the braking afterwards.
+    """Predicts positions of n joints at `MOMENTS` instants of braking after a command; linear in this command.
 
     Args:
         command: Commanded positions at which the prediction is exact, shape (n,) [rad or m].

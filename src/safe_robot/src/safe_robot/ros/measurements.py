@@ -68,7 +68,7 @@ class Measurements:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...] | None:
-        """Present bodies of the environment; None without a source of bodies, or while they are unknown."""
+        """Present bodies of the environment; None without a source of bodies, or while a body's pose is unknown."""
         return None if self._live_obstacles is None else self._live_obstacles.obstacles
 
     def wait(self, timeout_s: float) -> None:
