@@ -40,7 +40,7 @@ class Connection(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """A block of messages that are compressed together.
+    """A block of messages that are compressed together in the file.
 
     Attributes:
         compression: `none`, `bz2` or `lz4`.
@@ -62,7 +62,7 @@ class BagFile:
         file: The bag, opened in binary mode.
 
     Attributes:
-        connections: Connections, indexed by number.
+        connections: Connections, indexed by connection number.
         chunks: The chunks, in the order of the index.
         counts: Number of messages of each connection, indexed by the connection's number.
 
@@ -197,7 +197,7 @@ class BagFile:
         return count
 
     def _unfold(self, chunk: Chunk) -> bytes:
-        """Returns the uncompressed data of a chunk; raises a ValueError if the header states a smaller size."""
+        """Returns the uncompressed data of a chunk; raises a ValueError if their size exceeds `chunk.size`."""
         self._file.seek(chunk.start)
         data = self._read(chunk.compressed_size)
         if chunk.compression == "none":
@@ -246,7 +246,7 @@ def _uint32(fields: Fields, name: bytes) -> int:
 
 
 def _message(data: bytes, offset: int) -> tuple[int, bytes, int]:
-    """Reads the message at an offset in a chunk, and skips a record of the message's connection in front of it.
+    """Reads the message at an offset in a chunk. If connection records precede the message, skips them.
 
     Returns:
         The connection's number, the serialised message, and the recording time [ns].

@@ -1,4 +1,4 @@
-"""Reads bags as serialised messages or as pandas tables. Error messages explain why a file cannot be read."""
+"""Reads bags as serialised messages or as pandas tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .times import ClockStep, to_seconds
 
 _ACTIVE_SUFFIX = ".active"
 MAX_UNPACKED_BYTES = 2**30
-"""Unpacked size that every bag may have [bytes]; bags that unpack to more are limited by `MAX_COMPRESSION`."""
+"""Unpacked size above which the compression ratio of a bag is limited by `MAX_COMPRESSION` [bytes]."""
 MAX_COMPRESSION = 255
 """Largest compression ratio of bags above `MAX_UNPACKED_BYTES`; LZ4, which recorders use, cannot exceed it."""
 
@@ -51,7 +51,7 @@ class BagReader:
         any_size: Whether the bag may exceed `MAX_UNPACKED_BYTES` and `MAX_COMPRESSION`, and the limits of `Budget`.
 
     Attributes:
-        types: Message types, indexed by topic and sorted by topic; nearly always one type per topic.
+        types: Set of message types, indexed by topic and sorted by topic; nearly always one type per topic.
         md5sums: MD5 sums of the message types, indexed by topic.
         counts: Number of messages, indexed by topic.
         budget: Limits of processor time and table cells.
@@ -88,8 +88,8 @@ class BagReader:
         """Yields the messages of given topics in the order of recording.
 
         Raises:
-            BagError: If the bag is damaged at a message, or reading needs too much processor time. The time that the
-                caller's thread spends between messages counts, too.
+            BagError: If the bag is damaged, or the processor time is used up. The time that the caller's thread spends
+                between messages counts, too.
         """
         chosen = {number: each for number, each in self._types.items() if each[0] in topics}
         left = self._bag.unfolded_bytes
@@ -203,10 +203,10 @@ def bag_to_dataframes(
         path: A `.bag` file with any compression. A ROS master and message packages are not needed.
         topics: Topics to read: names, or one name. By default all topics except those with binary data, like images.
         images: Whether the default includes topics with binary data, which become columns of `bytes`.
-        any_size: Whether the bag may unpack to more than 1 GiB and 255 times its size, and may exceed the limits of
-            time and cells in `rpbi_data.bags.limits`.
+        any_size: Whether the bag may unpack to more than both 1 GiB and 255 times its file size, and may exceed the
+            limits of time and cells in `rpbi_data.bags.limits`.
         progress: Whether to show a progress bar.
-        nanoseconds: Whether the index is int64 [ns] instead, which represents wall time exactly.
+        nanoseconds: Whether the index is int64 [ns] instead of float64 [s]. Only int64 represents wall time exactly.
 
     Returns:
         Tables, indexed by topic and sorted by topic.
@@ -240,8 +240,8 @@ def bag_to_dataframe(
         any_size: See `bag_to_dataframes`.
 
     Returns:
-        A table with columns `TOPIC/FIELD`, such as `/joint_states/position/0`; they are NaN or None in rows of other
-        topics. The index `time` is the recording time [s], ascending. Stamps are in `TOPIC/header/stamp` [s].
+        A table with columns `TOPIC/FIELD`, such as `/joint_states/position/0`, which are NaN or None in rows of
+        other topics. The index `time` is the recording time [s], ascending. Stamps are in `TOPIC/header/stamp` [s].
 
     Raises:
         BagError: See `bag_to_dataframes`.
@@ -259,7 +259,7 @@ def bag_to_dataframe(
 
 
 def _named(bag: BagReader, topics: str | Iterable[str] | None) -> list[str] | None:
-    """Returns the topics that match a regular expression or are in a list; None for None."""
+    """Returns the topics that match a regular expression, or the topics of a list; None if `topics` is None."""
     if topics is None:
         return None
     if not isinstance(topics, str):

@@ -1,7 +1,7 @@
 """Program that writes topics to a bag; `Recorder` starts it as a separate process.
 
-All received messages are kept until they are written. In contrast, `rosbag record` keeps 100 messages per topic, and
-loses messages when it gets no processor time for a while.
+All received messages are kept until they are written. In contrast, `rosbag record` buffers only 100 messages per
+topic, and loses messages when it gets no processor time for a while.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class BagWriter:
             self._write(bag, each, self._now())
 
     def _write(self, bag: rosbag.Bag, arrival: _Arrival, at: genpy.Time) -> None:
-        """Writes a message; in the bag, each pair of publisher and type has a separate connection."""
+        """Writes a message. Each pair of publisher and message type gets a separate connection in the bag."""
         header = arrival.message._connection_header
         key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
         known = bag._topic_connections  # by default, Bag.write has one connection per topic
@@ -132,7 +132,7 @@ class BagWriter:
         self._connections[key] = known[arrival.topic]
 
     def _now(self) -> genpy.Time:
-        """Returns ROS time; with simulated time, it is zero before the first /clock message."""
+        """Returns the ROS time; zero in simulated time before the first /clock message."""
         return self._simulated_time if self._is_time_simulated else rospy.Time.from_sec(time.time())
 
     def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:

@@ -1,4 +1,4 @@
-"""Queries connections between nodes, and their message counts, through the nodes' XML-RPC interfaces."""
+"""Queries connections between nodes, and the connections' message counts, through the nodes' XML-RPC interfaces."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _OUTBOUND = "o"
 
 
 def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
-    """Returns the topics to which a node has not subscribed yet, and the publishers that do not send to the node yet.
+    """Returns the topics to which a node has not subscribed yet, and the publishers that are not connected to the node.
 
     Subscriptions are read from the master. When the node has subscribed to all topics, the publishers are queried: only
-    they know whether a subscriber is connected. A publisher is listed as `"/publisher (/topic)"`, also if it does
-    not answer. A registered publisher whose process has ended is not listed.
+    they know whether a subscriber is connected. A publisher is listed as `"/publisher (/topic)"`. Publishers that
+    do not answer are listed, too, unless their process has ended.
 
     Args:
         node: Full name of the subscribing node.
@@ -83,7 +83,7 @@ def count_received(node: str) -> dict[str, int] | None:
 
 
 def _topics_sent(uri: str, node: str) -> set[str]:
-    """Returns the topics that the node at `uri` sends to `node`; empty if the node at `uri` does not answer."""
+    """Returns the topics on which the node at `uri` sends to `node`; empty if the node at `uri` does not answer."""
     try:
         _, _, connections = _node(uri).getBusInfo(_CALLER)
     except ConnectionRefusedError:
@@ -95,7 +95,7 @@ def _topics_sent(uri: str, node: str) -> set[str]:
 
 
 def _count_sent_by(uri: str, node: str) -> dict[str, int]:
-    """Returns how many messages the node at `uri` has sent to `node`, indexed by topic; empty without an answer."""
+    """Returns how many messages the node at `uri` has sent to `node`, indexed by topic; empty if it does not answer."""
     other_end = _node(uri)
     try:
         connections = other_end.getBusInfo(_CALLER)[2]

@@ -27,11 +27,11 @@ RAW_TYPE, COMPRESSED_TYPE = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 
 
 class _Encoding(NamedTuple):
-    """Layout of a pixel.
+    """Layout of a pixel in a serialised image.
 
     Attributes:
         dtype: NumPy type of a channel.
-        channels: Index, in the message, of each returned channel: red, green, blue (and alpha), or a single channel.
+        channels: Positions in the message of the returned channels: red, green, blue (and alpha), or a single channel.
     """
 
     dtype: str

@@ -1,4 +1,4 @@
-"""Errors about bags, and limits on time and memory for reading a bag, which protect against hostile bags."""
+"""Errors of reading and writing bags, and limits that protect programs against hostile bags."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from custom_ros_tools.errors import InterfaceError, shortened
 
 @dataclass(eq=False)
 class BagError(InterfaceError):
-    """A bag cannot be read, or its content cannot be written as requested; the message includes a remedy."""
+    """A bag cannot be read, or its content cannot be written as requested."""
 
     path: Path
     message: str
@@ -22,7 +22,7 @@ class BagError(InterfaceError):
 
 
 class RecordingError(BagError):
-    """A recording of a bag could not be started, or is not complete."""
+    """A bag could not be recorded, or the recording is not complete."""
 
     def __str__(self) -> str:
         return f"recording {super().__str__()}"
@@ -39,8 +39,7 @@ MAX_CONNECTIONS = 20_000
 MAX_TOPICS = 1_000
 """Largest number of topics with messages; each topic may become a file."""
 MAX_VALUES = 1_000_000
-"""Largest number of values in one message; a point cloud of a 640x480 camera has fewer. Each element of an array
-counts, unless the array is stored as a whole.
+"""Largest number of values in one message. Each element of an array counts, unless the array is stored as a whole.
 """
 MAX_NAME_BYTES = 1_000
 """Largest size of a column's name [bytes]. At 65,535 bytes, fastparquet writes beyond its buffer."""
@@ -49,7 +48,7 @@ MAX_COLUMNS = 20_000
 MAX_CELLS = 200_000_000
 """Largest number of cells in all tables of a bag, enough for 2 h of a 7-axis arm at 1 kHz.
 
-A cell needs 8 bytes, and twice as much while a table is made.
+A cell needs 8 bytes, and 16 bytes while a table is made.
 """
 BASE_TIME_S = 30.0
 """Processor time that is allowed for every bag [s]."""
@@ -62,7 +61,7 @@ class LimitError(ValueError):
 
     @classmethod
     def over(cls, limit: str, got: str) -> LimitError:
-        """Returns an error that names the limit with its unit, such as `1,000 bytes`, and the actual size."""
+        """Returns an error about a limit with its unit, such as `1,000 bytes`, and the actual size."""
         return cls(f"expected at most {limit}, got {got}")
 
 
@@ -86,7 +85,7 @@ class Budget:
         self._all_cells = 0
 
     def check_time(self, topic: str) -> None:
-        """Raises a BagError if the processor time is used up; `topic` is the topic that is being read."""
+        """Raises a BagError, whose message names `topic`, if the processor time is used up."""
         if not self._unlimited and self._clock() > self._end_s:
             self._refuse(topic, f"{self._time_s:.0f} s of processor time", "a bag that needs more")
 

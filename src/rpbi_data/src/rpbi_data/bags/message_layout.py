@@ -39,7 +39,7 @@ class Field(NamedTuple):
     Attributes:
         name: Name of the field.
         type: Name of a primitive type (`float64`, `string`, `time`, ...), or a message type.
-        length: Number of elements of a fixed-length array, or `SCALAR`, or `VARIABLE` for other arrays.
+        length: Number of elements of a fixed-length array; `VARIABLE` for other arrays, `SCALAR` for single values.
     """
 
     name: str
@@ -64,9 +64,10 @@ class MessageType:
 
     @classmethod
     def parse(cls, name: str, definition: str) -> MessageType:
-        """Parses a definition as in bags: the text of the type, then a section `MSG: package/Type` for each type in it.
+        """Parses a message definition from a bag.
 
-        The time is proportional to the length of the text, since each type is parsed once.
+        The definition is the text of the type, then a section `MSG: package/Type` for each type of a nested message.
+        The processing time is proportional to the length of the definition.
 
         Raises:
             LimitError: If the definition is too long, or types are nested too deeply.
@@ -88,7 +89,7 @@ class MessageType:
 
 
 class _Builder:
-    """Builds each type of a definition once.
+    """Builds the message types in a definition, each only once.
 
     Args:
         declared: Name, type name and length of each field, indexed by the name of the message type.
@@ -173,11 +174,11 @@ _SIZES = {name: dtype.itemsize for name, dtype in NUMBER_DTYPES.items()} | {"tim
 
 
 class Leaf(NamedTuple):
-    """One value of a message.
+    """Location of one value in a serialised message.
 
     Attributes:
         kind: A primitive type, or `BYTES` for an array that is kept whole.
-        start: Offset of the value's first byte in the message; of a string, offset of the first character.
+        start: Offset of the value's first byte; for a string, of the first character.
         size: Number of bytes of the value.
     """
 
@@ -196,12 +197,12 @@ class Leaf(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Locations of the values of one message.
+    """Locations of all values in a serialised message.
 
     Attributes:
-        leaves: Values, indexed by path, such as `pose/position/x` or `data/3`.
+        leaves: Location of each value, indexed by path, such as `pose/position/x` or `data/3`.
         counts: Number of elements of each array, indexed by path.
-        fixed: Spans of bytes that contain lengths. The layout is valid for another message with equal bytes there.
+        fixed: Spans of bytes that contain lengths. The layout is valid for all messages with equal bytes there.
     """
 
     leaves: dict[str, Leaf]
@@ -212,8 +213,8 @@ class Layout(NamedTuple):
 def lay_out(message_type: MessageType, raw: bytes) -> Layout:
     """Finds the locations of all values in a serialised message.
 
-    Each element of an array is a value (`K/0`, `K/1`, ...). Variable-length byte arrays, and arrays of more than
-    `MAX_ARRAY_COLUMNS` numbers, are single values of the kind `BYTES`.
+    Each element of an array has a location, with the path `data/0`, `data/1`, ... Variable-length byte arrays, and
+    arrays of more than `MAX_ARRAY_COLUMNS` numbers, have one location of the kind `BYTES`.
 
     Raises:
         LimitError: If the message has too many values, or a value's path is too long.

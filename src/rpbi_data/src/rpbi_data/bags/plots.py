@@ -63,7 +63,7 @@ Lines = Mapping[str, pd.Series]
 
 
 def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
-    """Yields figures of a table: the end of the file name, and the lines of each panel, indexed by y-axis label."""
+    """Yields, for each figure of a table, the end of its file name, and its panels, indexed by y-axis label."""
     if {"link", "other_body", "normal_force"} <= set(table.columns):
         forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
         every = forces.reindex(table.index.unique(), fill_value=0.0)
@@ -93,17 +93,17 @@ def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
 
 
 def _is_twice(body: str, bodies: Iterable[tuple[str, str]]) -> bool:
-    """Returns whether frames of a body occur with more than one parent."""
+    """Returns whether a body occurs with more than one parent frame."""
     return sum(other == body for _, other in bodies) > 1
 
 
 def _by_last_name(table: pd.DataFrame) -> Lines:
-    """Returns the columns with a value other than 0, indexed by joint; this leaves out fixed joints."""
+    """Returns the columns with nonzero values, indexed by joint name. Columns of fixed joints are thus left out."""
     return {name.partition("/")[2]: table[name] for name in table if table[name].fillna(0.0).any()}
 
 
 def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
-    """Returns the columns x, y and z of a vector, with the first prefix that the table has; empty without a vector."""
+    """Returns the columns `PREFIX/x` to `PREFIX/z` for the first prefix in the table; empty if there is none."""
     for prefix in prefixes:
         if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
             return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}

@@ -40,11 +40,12 @@ _log = logging.getLogger(__name__)
 class Recorder:
     """Context manager that records all messages published inside the context to a bag with LZ4 compression.
 
-    A separate process writes the bag. It keeps all messages until they are written, even if it gets no processor time
-    for a while. When the present process is killed, the recording process closes the bag and ends, too.
+    A separate recording process writes the bag. It buffers all messages until they are written, even if it gets no
+    processor time for a while. When this process is killed, the recording process closes the bag and ends, too.
 
-    On entry, the context waits until the recording process has subscribed to every topic, and every existing publisher
-    sends to it. On exit, it stops the recording process and waits until the bag is closed. All waiting is in wall time.
+    On entry, the context waits until the recording process has subscribed to every topic, and is connected to every
+    existing publisher. On exit, the context stops the recording process, and waits until the bag is closed. All waiting
+    times are wall times.
 
         with Recorder("out/run.bag", ["/rpbi/kuka/joint_states", "/tf"]):
             ...
@@ -54,11 +55,10 @@ class Recorder:
         topics: Topics to record; relative names are resolved in the namespace of this process.
         timeout_s: Longest time to wait for the subscriptions, and for the bag to be closed [s].
         min_space_mb: Free disk space below which the recording ends [MB].
-        handles: File handles that the recording process keeps open, too, such as the handle of a lock.
+        handles: File handles that the recording process inherits, such as the handle of a lock.
 
     Attributes:
-        missing: Number of messages that had been sent before the stop but never arrived, because the recording process
-            got no processor time for too long.
+        missing: Number of messages that were sent to the recording process before the stop but never arrived.
     """
 
     def __init__(
@@ -210,10 +210,10 @@ class Recorder:
             turns += _is_asleep(self._process.pid)
 
     def _end(self) -> bool:
-        """Ends the recording process; kills it if it has not ended and the bag stops growing.
+        """Ends the recording process. Kills it if the bag stops growing before the process has ended.
 
         Returns:
-            Whether the process ended by itself with the exit code 0.
+            Whether the process ended with the exit code 0.
         """
         assert self._process is not None and self._process.stdin is not None
         self._process.send_signal(signal.SIGTERM)
@@ -255,7 +255,7 @@ class Recorder:
 
 
 def _is_asleep(process_id: int) -> bool:
-    """Returns whether all threads of a process sleep: no thread runs, is runnable or is stopped."""
+    """Returns whether all threads of a process wait, so that no thread runs, is runnable or is stopped."""
     try:
         threads = [path.read_text() for path in Path(f"/proc/{process_id}/task").glob("*/stat")]
     except OSError:  # a thread has just ended

@@ -1,4 +1,4 @@
-"""Resampling of tables with different rates at common times."""
+"""Resamples tables that have different rates at common times."""
 
 from __future__ import annotations
 
@@ -85,21 +85,21 @@ def resample(
     """Returns the values of a table at other times.
 
     Each column is computed from its own samples; rows in which the column is NaN or None are skipped. If several
-    samples have the same time, the last one is used. Before its first sample, a column has no value with `previous` and
-    `linear`; after its last sample, it has no value with `linear`. Times are compared as integer nanoseconds. Times
-    that floats cannot distinguish count as equal; in wall time, these differ by up to 0.24 us.
+    samples have the same time, the last one is used. With `previous` and `linear`, a column has no value before its
+    first sample; with `linear`, it also has no value after its last sample. Times are compared as integer nanoseconds,
+    and count as equal if floats cannot distinguish them, which means up to 0.24 us in wall time.
 
     Args:
         table: A table with the index `time` [s], ascending.
         times: Times of the new rows, shape (n,), ascending [s].
         method: `nearest`, `previous` or `linear`. With `linear`, columns `PATH/x`, `PATH/y`, `PATH/z`, `PATH/w` are
-            a quaternion, which is interpolated by slerp. Texts and booleans always have the previous value then.
-        max_time_error_s: Largest time between a row and the nearest sample used [s]; beyond this time, the row has no
-            value.
+            a quaternion, which is interpolated by slerp, and texts and booleans take the previous value.
+        max_time_error_s: Largest time between a row and the nearest sample used [s]. Values from samples further away
+            are replaced by NaN or None.
 
     Returns:
-        A table with the same columns, in which numbers are floats, and the last column `time_error` [s]. For each value
-        in a row, there is a time to the nearest sample used; `time_error` is the largest of these times.
+        A table with the same columns, in which numbers are floats, and the last column `time_error` [s]. The time
+        error of a row is the largest time between the row and the nearest sample used for any of its values.
 
     Raises:
         UnknownNameError: If the method does not exist.
@@ -149,7 +149,7 @@ def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
 
 
 def _snapped(times: Array, known: Array, resolution: int) -> Array:
-    """Replaces each time by a known time that differs by at most `resolution`, if there is one; all in [ns]."""
+    """Replaces each time that differs from a known time by at most `resolution` by the known time [ns]."""
     if not len(known):
         return times
     newest = known[np.searchsorted(known, times + resolution, side="right") - 1]
@@ -197,7 +197,7 @@ def _nearest(known: Array, samples: Array, wanted: Array) -> Resampled:
 
 
 def _picked(known: Array, samples: Array, wanted: Array, index: Array) -> Resampled:
-    """Returns the samples with given indices; the index -1 stands for a missing value."""
+    """Returns, for each wanted time, the sample with the given index, or a missing value if the index is -1."""
     is_there = index >= 0
     is_number = samples.dtype.kind in "iuf"
     new = np.full((len(wanted), samples.shape[1]), np.nan if is_number else None, float if is_number else object)
@@ -228,7 +228,8 @@ def _linear(known: Array, samples: Array, wanted: Array) -> Resampled:
 def _slerp(start: Array, end: Array, share: Array) -> Array:
     """Interpolates between unit quaternions, shape (n, 4), along the shortest rotation.
 
-    The sign of each result is chosen such that the result is nearest to `start`.
+    A share of 0 gives `start`, and a share of 1 gives `end`. The sign of each result is chosen such that the result is
+    nearest to `start`.
     """
     first = Rotation.from_quat(start)
     whole = (first.inv() * Rotation.from_quat(end)).as_rotvec()

@@ -16,12 +16,12 @@ _TRANSFORM = (*(f"translation/{axis}" for axis in "xyz"), *(f"rotation/{axis}" f
 
 
 class RowPlan(NamedTuple):
-    """Mapping of messages of one layout to rows.
+    """Mapping from messages with one layout to table rows.
 
     Attributes:
-        rows: Columns of each row that a message becomes; the column `STAMP` is the stamp of the row.
-        fixed: Spans of bytes that must be equal in another message, for this plan to be valid for that message.
-        notes: Messages for the log about content that is not in the table.
+        rows: For each row that a message becomes, the columns of the row. The column `STAMP` is the stamp of the row.
+        fixed: Spans of bytes. The plan is valid for all messages with equal bytes in these spans.
+        notes: Log messages about content that is not in the table.
     """
 
     rows: list[Columns]
@@ -35,7 +35,7 @@ def plan_rows(message_type: MessageType, raw: bytes, is_plain: bool = False) -> 
     Args:
         message_type: Type of the message.
         raw: The serialised message.
-        is_plain: Whether to make one row per message for all message types, without `PLANS`.
+        is_plain: Whether to ignore `PLANS`, and to make one row per message for all message types.
 
     Raises:
         LimitError: If the message has too many values, a row has too many columns, or a column's name is too long.
@@ -67,7 +67,7 @@ Plan = tuple[list[Columns], Iterable[Leaf], list[str]]  # rows, leaves that name
 
 
 def _one_row(layout: Layout, raw: bytes) -> Plan:
-    """Makes one row with all values; long arrays of messages or strings are left out."""
+    """Makes one row with all values, except for long arrays of messages or strings."""
     counts = layout.counts.items()
     long = [path for path, count in counts if count > MAX_ARRAY_COLUMNS and path not in layout.leaves]
     inside = tuple(f"{path}/" for path in long)
@@ -76,7 +76,7 @@ def _one_row(layout: Layout, raw: bytes) -> Plan:
 
 
 def _joint_state(layout: Layout, raw: bytes) -> Plan:
-    """Makes one row with columns for each joint, named by joint; by index if the message has no joint names."""
+    """Makes one row whose column names contain the joint name, or the index if the message has no joint names."""
     leaves, counts, notes = layout.leaves, layout.counts, []
     names = [leaves[f"name/{index}"] for index in range(counts["name"])]
     columns = {path: leaf for path, leaf in leaves.items() if path.startswith("header/")}
@@ -104,9 +104,9 @@ def _transforms(layout: Layout, raw: bytes) -> Plan:
 
 
 def _contacts(layout: Layout, raw: bytes) -> Plan:
-    """Makes one row per contact, which also has the message's stamp and sum of forces.
+    """Makes one row per contact. Each row also contains the message's stamp and sum of forces.
 
-    A message without contacts becomes one row with stamp and sum of forces.
+    A message without contacts becomes one row with only the stamp and the sum of forces.
     """
     message = {path: leaf for path, leaf in layout.leaves.items() if not path.startswith("points/")}
     points: list[Columns] = [{} for _ in range(layout.counts["points"])]

@@ -41,9 +41,9 @@ class _Block(NamedTuple):
     """Messages with the same layout.
 
     Attributes:
-        rows: Columns of each row that one message becomes.
+        rows: For each row that a message becomes, the columns of the row.
         matrix: The n serialised messages, shape (n, size), uint8.
-        indices: Indices of the messages in the batch, ascending, shape (n,).
+        indices: Indices of these messages in the batch, ascending, shape (n,).
     """
 
     rows: list[Columns]
@@ -54,14 +54,14 @@ class _Block(NamedTuple):
 class TableBuilder:
     """Collects the serialised messages of one topic, and converts them to one table.
 
-    Messages are read in batches; messages with the same layout (see `message_layout.py`) are read at once. Strings and
-    numbers are not changed. A value that a message lacks is NaN, or None in columns of text.
+    Messages are read in batches. All messages of a batch with the same layout, see `message_layout.py`, are read at
+    once. Strings and numbers are not changed. A value that a message lacks is NaN, or None in columns of text.
 
     Args:
         topic: Name of the topic, for the log.
         keep_binary: Whether binary arrays become columns of `bytes`; otherwise they are left out.
         budget: Limits of time and cells; None for no limits.
-        is_plain: Whether every message becomes one row, and columns are named only by the path of the field.
+        is_plain: Whether every message becomes one row, and the name of a column is the path of the field.
         in_nanoseconds: Whether the index is int64 [ns] instead of float [s].
     """
 
@@ -106,9 +106,9 @@ class TableBuilder:
     def table(self) -> pd.DataFrame:
         """Returns the table of all messages, sorted by time. Must be called only once, after the last message.
 
-        The index `time` is the stamp of the header [s], or int64 [ns] with `in_nanoseconds`. Without a header, or with
-        the stamp 0, it is the recording time. The first column is `record_time` [s]; the others are grouped by field.
-        A warning is logged if a clock was set back, or if messages have several types.
+        The index `time` is the stamp of the header [s], or int64 [ns] with `in_nanoseconds`. If a message has no
+        header or the stamp 0, `time` is the recording time. The first column is `record_time` [s]. Other columns are
+        grouped by field. A warning is logged if a clock was set back, or if messages have several types.
 
         Raises:
             LimitError, BagError: See `add`.
@@ -305,7 +305,7 @@ def file_stems(topics: Iterable[str]) -> dict[str, str]:
 def write_table(table: pd.DataFrame, path: Path) -> None:
     """Writes a table with its index to a file; the suffix `.parquet`, `.csv` or `.hdf5` determines the format.
 
-    If a column has values of several types, since a topic had two message types, Parquet and HDF5 files contain the
+    If a topic has two message types, a column may have values of several types. Parquet and HDF5 files contain such
     values as text. An HDF5 file has a data set for each column, in groups separated by `/`, and the index as `time`.
 
     Raises:

@@ -40,9 +40,9 @@ def to_nanoseconds(seconds: ArrayLike) -> Array:
 
 
 def resolution_ns(seconds: ArrayLike) -> int:
-    """Returns the distance of neighbouring floats at the largest of given times [ns].
+    """Returns the distance between neighbouring floats at the largest of the given times [ns].
 
-    The result is 0 for times up to 97 days, and 239 for wall times since 2004.
+    The distance is rounded down: 0 for times up to 97 days, and 239 ns for wall times since 2004.
     """
     distance = np.spacing(np.abs(np.asarray(seconds, float)).max(initial=0.0)) * 1e9
     return int(np.ceil(distance)) if distance > 1.0 else 0
@@ -53,7 +53,7 @@ def row_times(start: int, end: int, hz: float) -> Array:
 
     Args:
         start: Time of the first row [ns].
-        end: Largest time, not before the start [ns].
+        end: Upper limit of the times, not before `start` [ns].
         hz: Rows per second.
 
     Returns:
@@ -67,14 +67,14 @@ def row_times(start: int, end: int, hz: float) -> Array:
 
 
 MAX_BACK_S = 1.0
-"""Largest time by which stamps may go back, in the order of recording [s], before the clock counts as set back.
+"""Backward step of stamps, in the order of recording, above which the clock counts as set back [s].
 
-Publishers are never exactly synchronous.
+Smaller steps occur because publishers are never exactly synchronous.
 """
 
 
 class ClockStep(NamedTuple):
-    """The largest backward step of times in the order of recording.
+    """The largest backward step in a sequence of times, in the order of recording.
 
     Attributes:
         time_s: Latest time before the step [s].
@@ -86,7 +86,7 @@ class ClockStep(NamedTuple):
 
     @property
     def is_fault(self) -> bool:
-        """Whether the step exceeds `MAX_BACK_S`: the clock was set back, not just messages out of order."""
+        """Whether the step exceeds `MAX_BACK_S`, so that the clock must have been set back."""
         return self.back_s > MAX_BACK_S
 
     def __str__(self) -> str:
@@ -94,7 +94,7 @@ class ClockStep(NamedTuple):
 
 
 def set_back(times: Array) -> ClockStep:
-    """Returns the largest backward step of times.
+    """Returns the largest backward step in a sequence of times.
 
     Args:
         times: Times in the order of recording, shape (n,) [s].
@@ -110,7 +110,7 @@ def set_back(times: Array) -> ClockStep:
 def clock_of(table: pd.DataFrame) -> ClockStep:
     """Returns the largest backward step of a table's stamps in the order of recording.
 
-    In a table of transforms, only stamps of the same child frame are compared.
+    In a table of transforms, stamps are compared only with stamps of the same child frame.
 
     Args:
         table: A table from `bag_to_dataframes`.

@@ -18,7 +18,7 @@ _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "set_back_s", "
 
 
 class TopicReport(pd.DataFrame):
-    """A table that is always printed completely; tables derived from this table are ordinary DataFrames."""
+    """A DataFrame that is printed with all rows and columns. Tables derived from it are ordinary DataFrames."""
 
     def __repr__(self) -> str:
         return self.to_string()
@@ -27,11 +27,11 @@ class TopicReport(pd.DataFrame):
 def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
     """Measures number, size and rate of the messages of every topic in a bag.
 
-    Times are stamps of headers; for messages without a stamp, such as on `/tf`, they are recording times.
+    The time of a message is the stamp of its header, or the recording time if it has no stamp, as on `/tf`.
 
     Args:
         path: A `.bag` file with any compression.
-        any_size: Whether the bag may unpack to more than 1 GiB and 255 times its size.
+        any_size: Whether the bag may unpack to more than both 1 GiB and 255 times its file size.
 
     Returns:
         A table with one row per topic, whose index is the topic, sorted by name. The columns are:

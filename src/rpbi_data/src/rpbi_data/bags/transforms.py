@@ -53,8 +53,8 @@ def transforms_between(
         parent: Reference frame of the poses, without a leading slash. It need not be above `child` in the tree.
         child: Frame whose poses are returned, without a leading slash.
         times: Times of the rows, ascending, shape (n,) [s]. By default, all times of the transforms between the frames.
-        max_time_error_s: Largest time between a row and the nearest sample of each transform [s]. Other rows are left
-            out.
+        max_time_error_s: Largest time between a row and the nearest sample of each transform [s]. Rows that exceed it
+            are left out.
 
     Returns:
         A table with the columns `translation/x` ... `translation/z` [m], `rotation/x` ... `rotation/w`, and
@@ -127,10 +127,10 @@ def _path_to_root(edges: Mapping[str, _Edge], frame: str) -> list[str]:
 
 
 def _product(way: Iterable[_Edge], times: Array, max_time_error_s: float) -> tuple[Array, Rotation, Array]:
-    """Multiplies the transforms from a frame up to a frame above it.
+    """Multiplies the transforms on the way from a frame up to one of its ancestors in the tree.
 
     Args:
-        way: The transforms, starting at the lower frame.
+        way: The transforms, starting at the lowest frame.
         times: Times of the poses, shape (n,) [s].
         max_time_error_s: See `transforms_between`.
 

@@ -1,4 +1,4 @@
-"""Actions of a data set's rows: the command, or the end effector's pose, that belongs to each row."""
+"""Computes the actions of a data set: for each row, a command or a pose of the end effector."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ ROTATION_VECTOR = ("rx", "ry", "rz")
 def derive_actions(
     tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions, pose: Sequence[Column]
 ) -> list[Signal]:
-    """Returns a list with the feature `action`; empty if there are no commands.
+    """Returns a list that contains the feature `action`, or an empty list if the recording has no commands.
 
     Args:
         tables: Tables of a recording; the table of TF is split by frame, see `by_frame`.
         types: Message types, indexed by topic.
         fixed: Names of joints that cannot move, which are left out.
-        row_options: Topics and meaning of actions.
+        row_options: The user's choice of topics, and whether actions are poses or changes.
         pose: Columns of the end effector's pose; empty without an end effector.
 
     Raises:
         UnknownNameError: If a joint of the gripper is not in the targets.
-        ValueError: If actions are to be changes of values, but commands are not joint positions.
+        ValueError: If the user requests changes as actions, but the commands are not joint positions.
     """
     found = _commands(tables, types, fixed, row_options)
     arm = [each for each in found if joint_of(each[0]) not in row_options.gripper]
@@ -78,9 +78,9 @@ def derive_actions(
 def _commands(
     tables: Tables, types: Mapping[str, str], fixed: Collection[str], row_options: RowOptions
 ) -> list[tuple[Column, Column]]:
-    """Returns the columns of commands, each with the column of the same joint's measured position.
+    """Returns pairs of columns: the column of a command, and the column of the same joint's measured position.
 
-    For a command without a measured position, the table of the second column is empty.
+    If the position is not measured, the second column has an empty table name.
     """
     topics = list(row_options.action or ())
     if row_options.action is None:
@@ -103,16 +103,16 @@ def _commands(
 
 
 def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array) -> tuple[Array, Array]:
-    """Returns the actions of rows, and the time error of each row: the time between row and command.
+    """Returns the actions of rows, and the time between each row and the command that was used.
 
     Args:
         signal: The feature `action`.
         tables: Tables of the recording, see `derive_actions`.
         rows: Times of the rows, int64, shape (n,) [ns].
-        next_rows: Time of the row after each of these rows, int64, shape (n,) [ns].
+        next_rows: Time of the next row for each of these rows, int64, shape (n,) [ns].
 
     Returns:
-        Actions, shape (n, numbers), and time errors, shape (n,) [s].
+        Actions, shape (n, columns), and times between row and command, shape (n,) [s].
     """
     resampled: dict[str, pd.DataFrame] = {}
     errors = np.zeros(len(rows))
@@ -137,9 +137,9 @@ def action_values(signal: Signal, tables: Tables, rows: Array, next_rows: Array)
 
 
 def _differences(signal: Signal, matrix: Array, tables: Tables, rows: Array) -> Array:
-    """Replaces the first `signal.deltas` numbers of actions by their changes from the measured values.
+    """Replaces the first `signal.deltas` columns of actions by the differences from the measured values.
 
-    The change of a pose is a translation along, and a rotation vector about, the axes of the world.
+    The difference of two poses is a translation and a rotation vector, both in the world frame.
     """
     count, (table, _) = signal.deltas, signal.columns[0]
     if not _is_pose(table):

@@ -1,4 +1,4 @@
-"""Checks that all data set formats share: of numbers, of the metadata in `rpbi/`, and of the source recordings."""
+"""Checks for all data set formats: checks of numbers, of metadata in `rpbi/`, and of the source recordings."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ def _quaternion_faults(quats: Array) -> Iterator[str]:
 
 
 def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
-    """Yields the messages of a check. If unexpected content makes the check fail, yields a message about the error.
+    """Yields the messages of a check. If the check raises an error, yields a message about the error instead.
 
     Args:
-        part: The checked part of the data set, for the message.
+        part: Name of the checked part of the data set, for the message about an error.
         faults: Messages of the check.
     """
     try:
@@ -95,9 +95,9 @@ class Facts:
                 self.faults.append(str(error))
 
     def episode(self, index: int) -> dict[str, Any]:
-        """Returns the metadata of an episode; empty if its file cannot be read.
+        """Returns the metadata of an episode; empty if the metadata cannot be read.
 
-        For a data set with a folder `rpbi/`, a file that cannot be read is added to `faults`.
+        If the data set has a folder `rpbi/` and the metadata cannot be read, adds a message to `faults`.
         """
         if not self.is_there:
             return {}

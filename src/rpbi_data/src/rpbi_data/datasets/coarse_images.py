@@ -1,4 +1,4 @@
-"""Coarse images, which the export stores with videos, and checks that compare videos with these images."""
+"""Coarse images, which the export stores in addition to videos, and checks of videos."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COARSE = 8
 _BRIGHTNESS = np.array((0.299, 0.587, 0.114))
 """Weights of red, green and blue in the brightness, as in video codecs, which preserve it better than colours."""
 _STRIDE = 2
-"""Every pixel row and column with this spacing is used for a coarse image."""
+"""Spacing of the pixel rows and columns that are used for a coarse image."""
 
 MAX_IMAGE_DIFFERENCE = 12.0
 """A frame that differs by more than this from its exported image is reported [RMS over 8 x 8 parts, of 255]."""
@@ -35,7 +35,7 @@ MIN_COLOUR_DIFFERENCE = 4.0
 FROZEN_FRAMES = 10
 """Number of successive frames that are frozen if they hardly change while the exported images change."""
 MIN_FROZEN_MOTION = 1.0
-"""Smallest change of the exported images within `FROZEN_FRAMES` frames that counts [RMS over the parts, of 255]."""
+"""Change of the exported images within `FROZEN_FRAMES` frames that counts as motion [RMS over the parts, of 255]."""
 MAX_FROZEN_SHARE = 0.1
 """Frames are frozen if they change by less than this share of the change of the exported images."""
 STILL_FRAMES = 15
@@ -43,13 +43,13 @@ STILL_FRAMES = 15
 MAX_STILL_CHANGE = 0.02
 """Largest change from one frozen frame to the next, in data sets of other tools [RMS, of 255]."""
 MIN_SEEN_FRAMES = 30
-"""Smallest number of other frames with moving joints from which is decided whether the camera sees the joints."""
+"""Frozen frames are reported only if at least this number of other frames was taken while joints moved."""
 MIN_SEEN_SHARE = 0.98
-"""The camera sees the joints if at least this share of the other frames with moving joints changes."""
+"""Frozen frames are reported only if at least this share of the other frames changes while joints move."""
 
 
 def coarse(pixels: Array) -> Array:
-    """Returns a coarse image: the mean colours of 8 x 8 parts of an image.
+    """Divides an image into 8 x 8 parts, and returns the mean colour of each part.
 
     Args:
         pixels: Pixels of the image, shape (height, width, 3), uint8.
@@ -72,7 +72,7 @@ def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterato
     Args:
         key: Key of the camera.
         found: Coarse images of the video's n frames, shape (n, 8, 8, 3).
-        stored: Coarse images of the exported images, indexed by camera, shape (n, 8, 8, 3). Older exports contain only
+        stored: Coarse images that the export stored, indexed by camera, shape (n, 8, 8, 3). Older exports contain only
             the brightness, shape (n, 8, 8).
     """
     colours = found.astype(float)
@@ -113,8 +113,8 @@ def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterato
 def frozen_faults(images: Array, states: Array) -> Iterator[str]:
     """Yields a message if frames of a camera do not change while the joints move.
 
-    This check is for data sets of other tools, for which exported images are unknown. The camera may not always see the
-    moving joints. Frozen frames are therefore reported only if nearly all other frames with moving joints change.
+    This check is for data sets of other tools, which lack stored coarse images. The camera may not always see the
+    moving joints. So frozen frames are reported only if nearly all other frames change while the joints move.
 
     Args:
         images: Coarse images of the frames, shape (n, 8, 8, 3).
@@ -136,7 +136,7 @@ def _brightness(images: Array) -> Array:
 
 
 def _order_of_colours(found: Array, exported: Array) -> list[str]:
-    """Returns the exported colours that appear as red, green and blue in the frames; empty if colours are unchanged."""
+    """Returns the exported colours that the frames show as red, green and blue; empty if no colours are swapped."""
     rest = _mean_square(found - exported)
     if rest < MIN_COLOUR_DIFFERENCE:
         return []
@@ -146,7 +146,7 @@ def _order_of_colours(found: Array, exported: Array) -> list[str]:
 
 
 def _frozen(found: Array, own: Array) -> Array:
-    """Returns the indices of the frames that do not change although the exported images do.
+    """Returns the indices of the frames that hardly change while the exported images change.
 
     Args:
         found: Brightness of the frames, shape (n, 8, 8).
@@ -165,7 +165,7 @@ def _frozen(found: Array, own: Array) -> Array:
 
 
 def _long_runs(is_so: Array, least: int) -> Array:
-    """Returns a mask of the runs of true values that have at least the length `least`."""
+    """Returns a mask of the runs of at least `least` successive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_so, [False]]).astype(int)))
     found = np.zeros(len(is_so), bool)
     for start, stop in edges.reshape(-1, 2):

@@ -1,8 +1,8 @@
-"""Safe reading of data sets from unknown sources.
+"""Reads data sets from unknown sources safely.
 
-First, the entries of the folder are checked. Then a child process with limits reads the files: the libraries that read
-Parquet, HDF5, videos and SQLite were not made for hostile files. If a library crashes the child process, the crash is
-reported.
+First, the files and folders of the data set are listed and checked. Then a child process reads the files, with limits
+of time and memory, since the libraries for Parquet, HDF5, videos and SQLite were not made for hostile files. A crash of
+the child process is reported.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ ANY_SIZE = "--any-size, if you know who made it"
 
 
 class Tree(NamedTuple):
-    """Result of the check of a folder's entries.
+    """Result of `look_at`.
 
     Attributes:
-        faults: Messages about entries that must not be read: links, pipes, sockets, devices, too many or too deep ones.
+        faults: Messages about links, pipes, sockets and devices, and about too many files or too deeply nested folders.
         size: Total size of all files [bytes].
     """
 
@@ -60,7 +60,7 @@ FAULT, SUMMARY, ERROR = "fault", "summary", "error"
 
 
 def look_at(folder: Path) -> Tree:
-    """Checks all files and folders of a data set, without opening a file."""
+    """Checks the number, kind and depth of all files and folders in a data set, without opening a file."""
     faults: list[str] = []
     size = count = 0
     waiting = [(folder, 0)]
@@ -90,11 +90,11 @@ def confined(task: Callable[[], Iterable[CheckLine]], size: int, any_size: bool 
 
     Args:
         task: Reads files from an unknown source, and yields lines.
-        size: Total size of these files, from which the limits are computed [bytes].
+        size: Total size of the files, from which the limits are computed [bytes].
         any_size: Whether processor time and memory are unlimited.
 
     Yields:
-        The lines of the task. If the task exceeds a limit or a signal ends the process, a last line of the kind
+        The lines of the task. If the task exceeds a limit or a signal ends the process, the last line has the kind
         `ERROR`.
     """
     time_s = BASE_TIME_S + TIME_PER_MB_S * size // 1_000_000

@@ -1,4 +1,4 @@
-"""Export of a folder of episodes as a data set."""
+"""Exports a folder of episodes as a data set."""
 
 from __future__ import annotations
 
@@ -30,20 +30,21 @@ from .signals import RowOptions, Signal
 from .source import SourceEpisode
 
 MAX_KEPT_BYTES = 1_000_000_000
-"""Memory of tables that stay loaded between planning and writing [bytes]; further tables are read twice."""
+"""Maximum memory of tables that are kept between planning and writing [bytes]. Further tables are read twice."""
 
 
 class ExportOptions(NamedTuple):
-    """Options of an export, which the user chooses.
+    """The user's options of an export.
 
     Attributes:
         fps: Number of rows per second.
         task: Description of the task in words.
         labels: Labels of the episodes to export; empty for all.
-        row_options: Content of rows.
-        disk_reserve_mb: Free space of the disk that is never used [MB].
+        row_options: The user's choice of the content of rows.
+        disk_reserve_mb: Free disk space below which no further episode is exported [MB].
         any_size: Whether bags may exceed the limits of `BagReader`.
-        max_time_error_s: Largest time between a row and the nearest message of an observation [s].
+        max_time_error_s: Largest time between a row and the nearest message of an observation [s]. Episodes that exceed
+            it are not exported.
     """
 
     fps: int
@@ -69,11 +70,11 @@ class Result:
 
 
 class _Plan(NamedTuple):
-    """Episodes to export, and the content of their rows.
+    """Episodes to export, and the content of the data set's rows.
 
     Attributes:
         sources: The episodes.
-        signals: Features and the topics from which they are derived; empty for a format without rows.
+        signals: Features, with the table columns from which they are computed; empty for a format without rows.
         schema: Content of the rows; None for a format without rows.
     """
 
@@ -92,21 +93,21 @@ def export_folder(
 ) -> Result:
     """Exports the episodes of a folder as a data set.
 
-    Episodes that cannot be exported are left out. The data set is written to a temporary folder, which is renamed to
-    `target` when the data set is complete. After an error, no data set is left.
+    Episodes that cannot be exported are skipped. The data set is written to a temporary folder, which is renamed to
+    `target` when the data set is complete. After an error, the temporary folder is removed.
 
     Args:
         folder: The episodes.
         target: Folder of the data set; must not exist.
-        name: Name of the format.
-        format_: Writes the data set.
+        name: Name of the format, which is stored with the data set.
+        format_: The format, which writes the data set.
         options: Options of the export.
-        report: Called with a message for each exported episode.
+        report: Function that is called with a message for each exported episode.
 
     Raises:
         EpisodeError: If the folder of episodes does not exist, the target exists, no episode can be exported, or the
             data set cannot be completed.
-        OSError: If writing the data set cannot start.
+        OSError: If the temporary folder or the first files cannot be written.
     """
     if target.exists():
         raise DatasetError(target, "exists already: name a folder that does not")
@@ -132,7 +133,7 @@ def export_folder(
 
 
 def _plan(folder: EpisodeFolder, format_: DatasetFormat, options: ExportOptions, result: Result) -> _Plan:
-    """Returns the episodes to export, and the set of features that occurs in most of these episodes.
+    """Returns the episodes to export, and the most frequent set of features and cameras of these episodes.
 
     Adds a message to `result.faults` for each episode that cannot be exported.
     """
@@ -236,7 +237,7 @@ def _not_exported(sources: Sequence[SourceEpisode]) -> list[str]:
 
 
 def _complete(part: Path, format_: DatasetFormat, result: Result, facts: Callable[[], dict[str, object]]) -> None:
-    """Completes the data set; if the disk is full, removes the last episode to free space, and tries again."""
+    """Completes the data set. If the disk is full, removes the last episode to free space, and tries once again."""
     try:
         write_export(part, facts())
         format_.close()
@@ -250,7 +251,7 @@ def _complete(part: Path, format_: DatasetFormat, result: Result, facts: Callabl
 
 
 def _take_back(part: Path, format_: DatasetFormat, index: int) -> None:
-    """Removes the episode that was added last."""
+    """Removes the episode that was added last, which has the given index, from the data set."""
     format_.take_back(index)
     remove_episode(part, index)
 

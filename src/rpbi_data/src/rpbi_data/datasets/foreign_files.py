@@ -1,4 +1,4 @@
-"""Reading of untrusted Parquet, HDF5 and JSON files within limits, and file names from untrusted templates."""
+"""Reads untrusted Parquet, HDF5 and JSON files within limits, and forms file names from untrusted templates."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ MAX_JSON_BYTES = 256_000_000
 """Largest size of a JSON file [bytes]; state hashes of hours can be this large."""
 MAX_JSON_VALUES = 20_000_000
 MAX_VALUES = 20_000_000
-"""Number of values that every Parquet or HDF5 file may have; a larger file may have one value for each byte."""
+"""Number of values that a Parquet or HDF5 file may always have. A larger file may have one value for each byte."""
 MAX_ROW_BYTES = 100_000_000
 """Largest size of one image in an HDF5 file [bytes]."""
 MAX_UNFOLDED_BYTES = 2**30
-"""Unpacked size that all images of every HDF5 file together may have [bytes].
+"""Total unpacked size that the images of an HDF5 file may always have [bytes].
 
 In a large file, images may unpack to `MAX_COMPRESSION` times the size of the file.
 """
@@ -51,8 +51,8 @@ def file_name(template: Any, place: Mapping[str, Any]) -> str:
         place: Values of the placeholders, indexed by name: texts, or integers from 0 to `MAX_PLACE`.
 
     Raises:
-        ValueError: If the template has an unknown placeholder, a value is neither a text nor such an integer, or the
-            file would be outside of the data set.
+        ValueError: If the template has an unknown placeholder, a value is not allowed, or the file would be outside of
+            the data set.
     """
     for key, value in place.items():
         is_number = isinstance(value, int) and 0 <= value <= MAX_PLACE
@@ -76,7 +76,7 @@ def file_name(template: Any, place: Mapping[str, Any]) -> str:
 
 
 def read_parquet(path: Path) -> Any:
-    """Returns the table of a Parquet file; the number of values is first checked in the file's metadata.
+    """Checks the number of values in a Parquet file's metadata, and returns the table in the file.
 
     Raises:
         ValueError: If the file cannot be read, or has too many values.
@@ -100,8 +100,8 @@ def read_parquet(path: Path) -> Any:
 def hdf5_faults(file: Any, size: int) -> Iterator[str]:
     """Yields a message for each object of an HDF5 file that must not be read.
 
-    Refused are soft and external links, objects with two names, data in other files, data that are neither numbers nor
-    texts, and data that unpack to too many values or bytes.
+    Such objects are soft and external links, objects with two names, data in other files, data that are neither
+    numbers nor texts, and data that unpack to too many values or bytes.
 
     Args:
         file: The open file.

@@ -1,4 +1,4 @@
-"""Base class of data set formats, and the data that formats receive: schema and episodes."""
+"""Base class of data set formats, and the classes of the data that a format writes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class DatasetError(EpisodeError):
 
 
 def stamps_of(times: Array) -> Array:
-    """Returns times [ns], shape (n,), as seconds and nanoseconds, shape (n, 2), int64."""
+    """Splits times [ns], shape (n,), into seconds and nanoseconds, and returns both, shape (n, 2), int64."""
     return np.stack(np.divmod(times, PER_SECOND), axis=1)
 
 
@@ -45,7 +45,7 @@ class Feature(NamedTuple):
 
     Attributes:
         key: Name of the feature in the data set, such as `observation.state`.
-        names: Names of the numbers, such as joint names.
+        names: Name of each number, such as a joint name.
         dtype: NumPy type of the numbers.
     """
 
@@ -59,8 +59,8 @@ class CameraFeature(NamedTuple):
 
     Attributes:
         key: Name of the feature in the data set, such as `observation.images.camera`.
-        height: Rows of pixels, an even number.
-        width: Columns of pixels, an even number.
+        height: Number of pixel rows, which is even.
+        width: Number of pixel columns, which is even.
     """
 
     key: str
@@ -83,7 +83,7 @@ class Schema(NamedTuple):
 
 
 class ImageFrame(NamedTuple):
-    """The image of a camera in a row.
+    """The image of a camera in a row of the data set.
 
     Attributes:
         pixels: Red, green and blue, shape (height, width, 3), uint8.
@@ -114,7 +114,10 @@ class ExportedEpisode(ABC):
 
     @abstractmethod
     def frames(self, key: str) -> Iterator[ImageFrame]:
-        """Yields an image of a camera for each of the n rows: the newest image at the time of the row.
+        """Yields, for each of the n rows, the newest image of a camera at the time of the row.
+
+        Args:
+            key: Key of the camera.
 
         Raises:
             InterfaceError: If an image cannot be read.
@@ -125,21 +128,21 @@ class ExportedEpisode(ABC):
         """Returns the numbers of all features, indexed by key, each of shape (n, number of names).
 
         Args:
-            image_stamps: Times of the images of each camera, int64, shape (n,) [ns].
+            image_stamps: Times of the images in the rows, indexed by camera key, int64, shape (n,) [ns].
         """
 
 
 def require_room(folder: Path, size: int) -> None:
     """Raises an OSError if the disk of a folder has less free space than `size` [bytes].
 
-    The space is reserved for a moment with a temporary file.
+    To check the space, a temporary file of this size is created and removed.
     """
     with tempfile.TemporaryFile(dir=folder) as file:
         os.posix_fallocate(file.fileno(), 0, size)
 
 
 class DatasetFormat(ABC):
-    """Base class of data set formats: a format writes episodes into a folder, recognises its folders and checks them.
+    """Base class of data set formats. A format writes data sets, recognises data sets of its kind, and checks them.
 
     The export calls `open`, then `add` for each episode, then `close`. Added episodes stay complete if a later `add`
     fails. If `close` fails because the disk is full, the export calls `take_back` and `close` again.
@@ -150,9 +153,9 @@ class DatasetFormat(ABC):
 
     Config: ClassVar[type[ConfigModel]] = ConfigModel
     has_rows: ClassVar[bool] = True
-    """Whether the format writes rows at a constant rate. Otherwise it only reads the bags, and the schema is None."""
+    """Whether the format writes rows at a constant rate. If False, the format converts bags, and the schema is None."""
     content: ClassVar[str] = "files of another format"
-    """Content that identifies the format, in words: for the error message about a folder of unknown format."""
+    """Description of the files that identify the format, for the error message about a folder of unknown format."""
 
     def __init__(self, config: Any) -> None:
         self.config = config
@@ -183,12 +186,12 @@ class DatasetFormat(ABC):
         """
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last.
+        """Removes the episode that was added last, which has the given index.
 
         Called at most once after each `add`, possibly after `close` has failed.
 
         Raises:
-            OSError: If the format cannot remove episodes, as in this base class; the export then fails.
+            OSError: If the format cannot remove episodes, as in this base class. The export then fails.
         """
         raise OSError(errno.ENOSPC, f"no room to complete episode {index}")
 
@@ -203,7 +206,7 @@ class DatasetFormat(ABC):
     @classmethod
     @abstractmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder contains a data set of this format, no matter which tool wrote it."""
+        """Returns whether a folder contains a data set of this format, which any tool may have written."""
 
     @classmethod
     @abstractmethod
@@ -213,4 +216,4 @@ class DatasetFormat(ABC):
     @classmethod
     @abstractmethod
     def summary(cls, folder: Path) -> str:
-        """Returns name and size of a data set without faults, such as `LeRobot v3.0: 2 episodes, 128 frames`."""
+        """Returns format and size of a data set without faults, such as `LeRobot v3.0: 2 episodes, 128 frames`."""

@@ -1,9 +1,9 @@
-"""Metadata that the export stores in a data set's folder `rpbi/`, from which later checks detect changes.
+"""Metadata that the export stores in a data set's folder `rpbi/`, so that later checks can detect changes.
 
 - `rpbi/export.json` describes the data set.
 - `rpbi/episode_000000.json` describes an episode: its source, its chain of state hashes, and checksums of its values.
   The checksums reveal values that were changed, swapped or shifted.
-- `rpbi/episode_000000.npz` contains coarse images, with which the frames of videos are compared.
+- `rpbi/episode_000000.npz` contains coarse images, with which checks compare the frames of videos.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ def file_digest(path: Path) -> str:
 
 
 def hash_chain(states: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Returns copies of states with the additional key `link`: the SHA-256 of the previous link and of the state.
+    """Returns copies of states with the additional key `link`: the SHA-256 of the previous link and the state.
 
     Args:
-        states: States in order, each with the keys `stamp` [s], `resets`, `tick`, `commands` and `hash`.
+        states: States in the order of recording, with the keys `stamp` [s], `resets`, `tick`, `commands` and `hash`.
     """
     chain: list[dict[str, Any]] = []
     link = ""
@@ -61,7 +61,7 @@ def chain_faults(chain: Sequence[Mapping[str, Any]], last: str) -> Iterator[str]
 
     Args:
         chain: States with links, from `hash_chain`.
-        last: Last link of the chain, stored separately; empty for an empty chain.
+        last: Last link of the chain, which is stored separately; empty for an empty chain.
     """
     link = ""
     for state in chain:
@@ -82,7 +82,7 @@ def _link(before: str, state: Mapping[str, Any]) -> str:
 
 
 def checksums(values: Array) -> list[list[int]]:
-    """Returns three CRC-32 checksums of each column: of all rows, without the last row, and without the first row.
+    """Returns three CRC-32 checksums of each column: of all rows, of all but the last, and of all but the first row.
 
     Args:
         values: Values of a feature, shape (n, columns).
@@ -96,7 +96,7 @@ def changes(names: Sequence[str], values: Array, stored: Sequence[Sequence[int]]
     Args:
         names: Names of the columns.
         values: Values to check, shape (n, columns), of the same data type as the exported values.
-        stored: Checksums of n exported rows, from `checksums`.
+        stored: Checksums that `checksums` returned for the n exported rows.
     """
     by_whole = {whole: name for name, (whole, _, _) in zip(names, stored)}
     for name, column, (whole, without_last, without_first) in zip(names, values.T, stored):
@@ -179,7 +179,7 @@ def _write(path: Path, facts: Mapping[str, Any]) -> None:
 
 
 def is_exported(folder: Path) -> bool:
-    """Returns whether a data set has a folder `rpbi/`: then it was exported by this project."""
+    """Returns whether a data set has a folder `rpbi/`, which means that this project exported the data set."""
     return (folder / FOLDER).is_dir()
 
 
@@ -189,12 +189,12 @@ def read_export(folder: Path) -> dict[str, Any]:
 
 
 def read_episode(folder: Path, index: int) -> dict[str, Any]:
-    """Returns the metadata of an episode; raises a ValueError if its file cannot be read."""
+    """Returns the metadata of an episode; raises a ValueError if the metadata cannot be read."""
     return _read(episode_file(folder, index))
 
 
 def read_images(folder: Path, index: int) -> dict[str, Array]:
-    """Returns the coarse images of an episode, indexed by camera; raises a ValueError if they cannot be read."""
+    """Returns the coarse images of an episode, indexed by camera; raises a ValueError if the file cannot be read."""
     path = episode_file(folder, index).with_suffix(".npz")
     try:
         with np.load(path) as data:

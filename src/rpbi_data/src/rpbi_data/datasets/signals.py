@@ -42,7 +42,7 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 class Column(NamedTuple):
-    """A column of a table, from which a number of a feature is computed.
+    """A column of a table.
 
     Attributes:
         table: Name of the table, see `Tables`.
@@ -59,10 +59,10 @@ class Signal(NamedTuple):
     Attributes:
         feature: The feature.
         columns: Column of each number of the feature.
-        method: Method of resampling, see `rpbi_utils.resample`; NEXT or PREVIOUS for actions.
-        held: For actions: column of the measured position that belongs to each number. The table is empty for commands
-            without a measured position.
-        deltas: For actions: how many of the first numbers are changes from the value measured at the row.
+        method: Method of resampling, see `rpbi_data.resample`. For actions: NEXT or PREVIOUS.
+        held: For actions: column of the joint's measured position for each number. The table name is empty if the position
+            is not measured.
+        deltas: For actions: number of leading columns that are changes from the values measured at the row.
     """
 
     feature: Feature
@@ -73,7 +73,7 @@ class Signal(NamedTuple):
 
     @property
     def begins_at_once(self) -> bool:
-        """Whether rows start only at the first message of this feature; False for actions, which may start later."""
+        """Whether rows start only when this feature has a message; False for actions."""
         return self.method not in (NEXT, PREVIOUS)
 
 
@@ -81,13 +81,13 @@ class RowOptions(NamedTuple):
     """The user's choice of the content of rows.
 
     Attributes:
-        state: Topics of `observation.state`. None: derived from names and types of the recorded topics.
-        action: Topics of `action`. None: derived in the same way.
-        images: Topics of images. None: derived in the same way.
-        features: Wildcard patterns of the other observations' names, without `observation.`; None for all.
+        state: Topics of `observation.state`; None to derive them from the names and types of the recorded topics.
+        action: Topics of `action`; None to derive them.
+        images: Topics of images; None for all images.
+        features: Wildcard patterns for the names of further observations, without `observation.`; None for all.
         end_effector: Frame of the end effector, such as `arm/tool`; empty for none.
         gripper: Names of the gripper's joints. They are a separate observation, and come last in actions.
-        timing: NEXT: the action is the newest command before the next row. PREVIOUS: the newest command at the row.
+        timing: NEXT or PREVIOUS: the action is the newest command before the next row, or at the time of the row.
         is_pose: Whether actions are the end effector's pose at the next row instead of commands.
         is_delta: Whether actions, except those of the gripper, are changes from the values measured at the row.
     """
@@ -104,14 +104,14 @@ class RowOptions(NamedTuple):
 
 
 def wanted_topics(types: Mapping[str, str], row_options: RowOptions) -> list[str]:
-    """Returns the topics whose tables are needed.
+    """Returns the topics whose tables are needed to compute features.
 
     Args:
         types: Message types, indexed by topic.
         row_options: Topics that the user chooses.
 
     Raises:
-        UnknownNameError: If a named topic does not exist.
+        UnknownNameError: If a topic that the user chooses is not recorded.
     """
     named = {*(row_options.state or ()), *(row_options.action or ()), *(row_options.images or ())}
     for topic in sorted(named - types.keys()):
@@ -129,7 +129,7 @@ def _has_features(topic: str, kind: str) -> bool:
 
 
 def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool:
-    """Returns whether messages of a topic, which may have several types, would be used for a feature."""
+    """Returns whether a topic is used for a feature. `kinds` are the message types of the topic."""
     named = {*(row_options.state or ()), *(row_options.action or ()), *(row_options.images or ())}
     return topic in named or any(
         _has_features(topic, kind) or (is_image(kind) and row_options.images is None) for kind in kinds
@@ -137,12 +137,12 @@ def is_used(topic: str, kinds: Collection[str], row_options: RowOptions) -> bool
 
 
 def is_image(kind: str) -> bool:
-    """Returns whether a message type is an image."""
+    """Returns whether a message type is the type of raw or compressed images."""
     return kind in (RAW_TYPE, COMPRESSED_TYPE)
 
 
 def image_topics(types: Mapping[str, str], row_options: RowOptions) -> dict[str, str]:
-    """Returns the topics of images, indexed by the feature's key; a raw topic is preferred to its compressed topic."""
+    """Returns image topics, indexed by feature key. If a raw topic is recorded, its compressed topic is left out."""
     topics = row_options.images
     if topics is None:
         found = {topic for topic, kind in types.items() if is_image(kind)}
@@ -151,7 +151,7 @@ def image_topics(types: Mapping[str, str], row_options: RowOptions) -> dict[str,
 
 
 def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
-    """Returns the tables, with the table of TF split into a table for each pair of parent and child frame."""
+    """Splits the table of TF into a table for each pair of parent and child frame, and returns all tables."""
     found = {name: table for name, table in tables.items() if name != topic}
     if topic in tables:
         frames = tables[topic].groupby(["parent", "child"], sort=True)
@@ -165,7 +165,7 @@ def derive(
     """Returns the observations that can be computed from a recording.
 
     Args:
-        tables: Tables of the recording; the table of TF is split by `by_frame`.
+        tables: Tables of the recording, as returned by `by_frame`.
         types: Message types, indexed by topic.
         namespace: Namespace of the simulator.
         fixed: Names of joints that cannot move, which are left out.
@@ -196,9 +196,9 @@ def derive(
 
 
 def label(topic: str) -> str:
-    """Converts a topic to a part of a feature's key.
+    """Converts the name of a topic to a part of a feature's key.
 
-    The name `rpbi` is removed, and characters other than letters and digits become `_`.
+    The part `rpbi` of the name is removed, and characters other than letters and digits become `_`.
     """
     return re.sub(r"\W+", "_", "/".join(part for part in topic.split("/") if part != "rpbi")).strip("_")
 
@@ -242,7 +242,7 @@ def _contacts(tables: Tables, types: Mapping[str, str]) -> Iterator[Signal]:
 
 
 def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
-    """Yields the poses of all frames below the world whose names have no slash: the frames of bodies."""
+    """Yields the poses of all bodies, whose frames are children of the world frame and have no slash in their name."""
     for name, table in _frames(tables, namespace).items():
         if "/" not in name:
             yield Signal(
@@ -252,10 +252,10 @@ def _poses(tables: Tables, namespace: str) -> Iterator[Signal]:
 
 
 def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Column, ...]:
-    """Returns the columns of the pose of a frame in the world frame.
+    """Returns the columns of a frame's pose in the world frame.
 
     Raises:
-        UnknownNameError: If the frame is not on TF.
+        UnknownNameError: If TF has no transform from the world frame to the frame.
     """
     frames = _frames(tables, namespace)
     name = frame.rpartition("rpbi/")[2]
@@ -265,7 +265,7 @@ def end_effector_columns(tables: Tables, namespace: str, frame: str) -> tuple[Co
 
 
 def _frames(tables: Tables, namespace: str) -> dict[str, str]:
-    """Returns the names of the tables of frames below the world, indexed by frame without prefix, like `arm/tool`."""
+    """Returns table names of the world frame's children, indexed by frame name without prefix, such as `arm/tool`."""
     prefix = f"{namespace.strip('/')}/rpbi/".lstrip("/")
     found = {}
     for table in tables:
@@ -287,7 +287,7 @@ def _generic(key: str, tables: Tables, topics: Sequence[str]) -> Signal:
 
 
 def numbers_of(table: pd.DataFrame) -> list[str]:
-    """Returns the names of a table's numeric columns, without the header and the recording time."""
+    """Returns the names of a table's numeric columns, except for header fields and the recording time."""
     return [
         name
         for name in table.columns
@@ -301,15 +301,15 @@ def joint_of(column: Column) -> str:
 
 
 def joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> list[str]:
-    """Returns the names of the columns of a kind, such as `position`, that have values; without fixed joints."""
+    """Returns the names of a kind's columns, such as `position`, except for fixed joints and columns without values."""
     names = [name for name in table.columns if name.startswith(f"{kind}/")]
     return [name for name in names if name.partition("/")[2] not in fixed and table[name].notna().any()]
 
 
 def names_of(columns: Iterable[Column]) -> tuple[str, ...]:
-    """Returns a name for each column: the joint name, or else the path of the message field.
+    """Returns a name for each column: the joint name, or the path of the field if the column is not of joint states.
 
-    If these names are not unique, all names are preceded by the robot or topic.
+    If the names are not unique, each name is prefixed with the robot or topic.
     """
     columns = list(columns)
     short = [

@@ -1,4 +1,4 @@
-"""Computes rows at a constant rate from the bag of an episode."""
+"""Computes the rows of a data set, at a constant rate, from the bag of an episode."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from .signals import RowOptions, Signal, by_frame, derive, end_effector_columns,
 
 
 class Cut(NamedTuple):
-    """Start of the rows in an episode whose world was reset.
+    """Start of the rows in an episode in which the world was reset.
 
     Attributes:
         resets: Number of resets within the episode.
@@ -58,13 +58,13 @@ class SourceEpisode(ExportedEpisode):
     """A recorded episode, resampled at the rate of a schema.
 
     Args:
-        folder: Folder of the episode.
-        episode: The episode.
-        row_options: Content of rows that the user chooses.
+        folder: Folder that contains the episode.
+        episode: Description of the episode.
+        row_options: The user's choice of the content of rows.
         task: Description of the task in words.
         any_size: Whether the bag may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s].
-        has_rows: Whether rows are exported; otherwise only the simulator's states are read.
+        has_rows: Whether rows are exported. If False, only the simulator's states are read.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class SourceEpisode(ExportedEpisode):
         return sum(int(table.memory_usage().sum()) for table in tables.values())
 
     def release(self) -> None:
-        """Releases the memory of the tables, which are read again on the next use."""
+        """Releases the memory of the tables. The next use reads them again."""
         for name in ("_recorded", "_tables", "times"):
             self.__dict__.pop(name, None)
 
@@ -107,7 +107,7 @@ class SourceEpisode(ExportedEpisode):
         Raises:
             BagError: If the bag cannot be read.
             UnknownNameError: If a topic, feature, frame or joint that the user chose is not in the recording.
-            ValueError: If actions are to be changes of values, but commands are not joint positions.
+            ValueError: If the user requests changes as actions, but the commands are not joint positions.
         """
         row_options, namespace, fixed = self._row_options, self.episode.namespace, self._fixed_joints()
         pose = end_effector_columns(self._tables, namespace, row_options.end_effector) if row_options.is_pose else ()
@@ -116,7 +116,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def cut(self) -> Cut | None:
-        """The last reset of the world within the episode, after which rows begin; None without a reset."""
+        """The last reset of the world, after which rows begin; None if the world was not reset within the episode."""
         states = self._recorded.get(self._state_topic)
         if states is None:
             return None
@@ -127,15 +127,15 @@ class SourceEpisode(ExportedEpisode):
 
     @property
     def cameras(self) -> tuple[CameraFeature, ...]:
-        """The cameras of the recorded topics with 8-bit pixels.
+        """The recorded cameras with 8 bits per channel.
 
-        Other cameras are left out. If the user chose such a camera, a DatasetError is raised.
+        Cameras with other images are left out. If the user chose such a camera, a DatasetError is raised.
         """
         return tuple(camera for camera, _ in self._cameras.values())
 
     @cached_property
     def _cameras(self) -> dict[str, tuple[CameraFeature, int]]:
-        """Cameras and the stamps of their first images [ns], indexed by key."""
+        """Pairs of a camera and the stamp of its first image [ns], indexed by the camera's key."""
         found = {}
         for key, topic in self._image_topics.items():
             first = next(self._images(topic), None)
@@ -155,10 +155,10 @@ class SourceEpisode(ExportedEpisode):
 
         Args:
             schema: Rate and features of the rows.
-            signals: The features of the schema that are computed from topics.
+            signals: The features of the schema that consist of numbers, with the columns from which they are computed.
 
         Raises:
-            DatasetError: If the recording lacks a feature or a camera, or has it with other names or another size.
+            DatasetError: If the recording lacks a feature or a camera, or if names or image sizes differ.
         """
         here = {signal.feature.key: signal for signal in self.signals}
         for signal in signals:
@@ -175,7 +175,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def times(self) -> Array:
-        """Times of the rows, at which all features except actions have values, int64, shape (n,) [ns].
+        """Times of the rows, int64, shape (n,) [ns]. All features except actions have values at these times.
 
         Raises:
             DatasetError: If there are fewer than two rows.
@@ -191,7 +191,7 @@ class SourceEpisode(ExportedEpisode):
         return times
 
     def frames(self, key: str) -> Iterator[ImageFrame]:
-        """Yields the newest image of a camera at the time of each row."""
+        """Yields, for each row, the newest image of a camera at the time of the row."""
         (camera,) = (each for each in self._schema.cameras if each.key == key)
         topic = self._image_topics[key]
         images = self._images(topic)
@@ -215,7 +215,7 @@ class SourceEpisode(ExportedEpisode):
             yield shown
 
     def values(self, image_stamps: Mapping[str, Array]) -> dict[str, Array]:
-        """Returns the numbers of all features at the times of the rows."""
+        """Returns the values of all numeric features at the times of the rows, indexed by feature key."""
         values: dict[str, Array] = {}
         errors: dict[str, Array] = {}
         for signal in self._signals:
@@ -277,13 +277,13 @@ class SourceEpisode(ExportedEpisode):
         return matrix.astype(signal.feature.dtype), error.astype(np.float32)
 
     def _continuous_tables(self) -> list[str]:
-        """Returns the names of the tables that determine the first and the last row."""
+        """Returns the names of the tables whose common time range determines the first and the last row."""
         signals = [signal for signal in self._signals if signal.begins_at_once] or self._signals
         return sorted({table for signal in signals for table, _ in signal.columns})
 
     @cached_property
     def _recorded(self) -> dict[str, pd.DataFrame]:
-        """Tables of all topics that are needed; the bag is read once for all of them."""
+        """Tables of all needed topics, indexed by topic. The bag is read only once."""
         topics = {*self._feature_topics, *({self._state_topic} & self._types.keys())}
         return bag_to_dataframes(self.bag, topics, any_size=self._any_size, nanoseconds=True) if topics else {}
 
@@ -293,7 +293,7 @@ class SourceEpisode(ExportedEpisode):
 
     @cached_property
     def _tables(self) -> dict[str, pd.DataFrame]:
-        """Tables of the features' topics, from the last reset on; the table of TF is split by frame."""
+        """Tables from which features are computed, as returned by `by_frame`, without rows before the last reset."""
         tables = {topic: self._recorded[topic] for topic in self._feature_topics}
         for topic, table in tables.items():
             self._require_steady(topic, clock_of(table.set_axis(to_seconds(table.index))))
@@ -306,7 +306,7 @@ class SourceEpisode(ExportedEpisode):
         """Message types, indexed by topic.
 
         Raises:
-            DatasetError: If a topic that is used for a feature has several types, or its clock was set back.
+            DatasetError: If a topic that is used for a feature has several types, or the topic's clock was set back.
         """
         found = {}
         with BagReader(self.bag, any_size=self._any_size) as bag:
@@ -329,7 +329,7 @@ class SourceEpisode(ExportedEpisode):
         return image_topics(self._types, self._row_options)
 
     def _images(self, topic: str) -> Iterator[tuple[Callable[[], Array], int]]:
-        """Yields, for each image in the order of stamps, a function that decodes the pixels, and the stamp [ns]."""
+        """Yields a function that decodes the pixels, and the stamp [ns], for each image in the order of stamps."""
         waiting: list[tuple[int, int, BagMessage]] = []
         with BagReader(self.bag, any_size=self._any_size) as bag:
             latest = 0
@@ -388,7 +388,7 @@ def _rgb(pixels: Array) -> Array:
 
 
 def _make_continuous(values: Array, feature: Feature) -> None:
-    """Flips the signs of quaternions in place: each is nearest to its predecessor, and the first has w >= 0."""
+    """Flips signs of quaternions in place, so that successive ones have similar components and the first has w >= 0."""
     names = feature.names
     for first in range(len(names) - 3):
         if names[first : first + 4] == QUATERNION:

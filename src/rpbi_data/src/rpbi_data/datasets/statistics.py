@@ -13,13 +13,13 @@ QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 MAX_SAMPLED_FRAMES = 100
 """Largest number of images of an episode from which statistics are computed."""
 LEVELS = 256
-"""Levels of brightness of a channel."""
+"""Number of values of a channel."""
 MAX_SAMPLED_PIXELS = 20_000
 """Approximate number of pixels of each image from which statistics are computed, evenly spaced over the image."""
 
 
 def statistics(values: Array) -> dict[str, list[Any]]:
-    """Returns minimum, maximum, mean, standard deviation, count and quantiles of each column.
+    """Returns minimum, maximum, mean, standard deviation and quantiles of each column, and the number of rows.
 
     Args:
         values: Values of a feature, shape (n, columns).
@@ -33,7 +33,7 @@ def statistics(values: Array) -> dict[str, list[Any]]:
 
 
 class ImageStatistics:
-    """Statistics of an episode's images, from the brightness histogram of each channel in a sample of pixels.
+    """Computes statistics of an episode's images: of each colour channel, in a sample of images and pixels.
 
     Args:
         frames: Expected number of images.
@@ -46,7 +46,7 @@ class ImageStatistics:
         self._counts = np.zeros((3, LEVELS), int)
 
     def add(self, pixels: Array) -> None:
-        """Counts an image, shape (height, width, 3), uint8; only every k-th image is sampled."""
+        """Adds an image, shape (height, width, 3), uint8, of which the statistics use at most every k-th."""
         if self._seen % self._every == 0:
             step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
             for channel, counts in enumerate(self._counts):
@@ -55,7 +55,7 @@ class ImageStatistics:
         self._seen += 1
 
     def result(self) -> dict[str, list[Any]]:
-        """Returns the statistics of brightness, from 0 to 1, each as a nested list of the shape (3, 1, 1)."""
+        """Returns the statistics of channel values, scaled to [0, 1], each as a nested list of the shape (3, 1, 1)."""
         levels = np.arange(LEVELS) / (LEVELS - 1)
         found: dict[str, list[Any]] = {}
         for counts in self._counts:

@@ -33,10 +33,10 @@ class VideoWriter:
     Args:
         path: The video file.
         fps: Frames per second.
-        height: Rows of pixels.
-        width: Columns of pixels.
+        height: Number of pixel rows.
+        width: Number of pixel columns.
         preset: Preset of the encoder, such as `ultrafast`.
-        crf: Quantisation; a lower number means better images and a larger file.
+        crf: Constant rate factor of x264. Lower values give better images and a larger file.
 
     Raises:
         OSError: If the file cannot be written. All methods may raise this error.
@@ -68,7 +68,7 @@ class VideoWriter:
 
 
 class VideoFacts:
-    """Frame rate, size and codec of a video file.
+    """Reads frame rate `fps`, size and codec of a video file.
 
     Args:
         path: The video file, an MP4.
@@ -89,7 +89,7 @@ def read_video(path: Path) -> Iterator[tuple[float, Array]]:
     """Yields the time [s] and the pixels, shape (height, width, 3), uint8, of each frame of a video.
 
     Raises:
-        ValueError: If the file cannot be read. The frames before a damaged frame are yielded first.
+        ValueError: If the file cannot be read. Frames before a damaged frame are yielded before the error is raised.
     """
     count = 0
     with _opened(path) as container:

@@ -1,4 +1,4 @@
-"""Table of the data set formats. To add a format, write its class in a new file, and add a line to the table."""
+"""Table of the data set formats. To add a format, write a class in a new file, and add a line to the table."""
 
 from pathlib import Path
 
@@ -23,11 +23,11 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
 
     Args:
         folder: The data set.
-        others: Formats of other packages, as `module:Class`.
+        others: Further formats, as `module:Class`, which are tried after the formats of the table.
 
     Raises:
-        DatasetError: If the folder does not exist, or no format recognises it. The message lists the folder's content.
-        MissingDependency: If no installed format recognises the folder, and the library of another one is missing.
+        DatasetError: If the folder does not exist, or no format recognises the data set.
+        MissingDependency: If no installed format recognises the data set, and the library of another format is missing.
     """
     if not folder.is_dir():
         raise DatasetError(folder, "expected a folder with a data set, there is none")

@@ -40,7 +40,7 @@ except ImportError:
     raise MissingDependency("pyarrow", "./rpbi setup data") from None
 
 MAX_DATA_BYTES = 100_000_000
-"""When the rows in memory exceed this size, they are written to a data file [bytes]."""
+"""Size of the rows in memory above which they are written to a data file [bytes]."""
 ROOM_BYTES = 200_000
 """Disk space that is reserved for metadata, in addition to the space for rows [bytes]."""
 Preset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"]
@@ -55,7 +55,7 @@ class LeRobotConfig(ConfigModel):
 
 
 class LeRobot(DatasetFormat):
-    """A LeRobot data set, version 3.0: Parquet files with a row group for each episode, and MP4 videos."""
+    """Format LeRobot 3.0: Parquet files with a row group per episode, and an MP4 video per episode and camera."""
 
     Config = LeRobotConfig
     content = "meta/info.json (LeRobot)"
@@ -72,7 +72,7 @@ class LeRobot(DatasetFormat):
         self._data_file = 0
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Writes the videos of an episode and keeps its rows until a data file is full."""
+        """Writes the videos of an episode. The rows are kept in memory until they fill a data file."""
         if sum(each.nbytes for each in self._pending) > MAX_DATA_BYTES:
             self._write_rows()
             self._pending = []
@@ -94,7 +94,7 @@ class LeRobot(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "images": images}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last; the episode's rows are still in memory."""
+        """Removes the episode that was added last, whose rows are still in memory."""
         self._frames -= len(self._pending.pop())
         self._episodes.pop()
         for key, found in self._image_statistics.items():
@@ -134,7 +134,7 @@ class LeRobot(DatasetFormat):
         _json(meta / "info.json", info)
 
     def _write_videos(self, index: int, episode: ExportedEpisode) -> tuple[dict[str, _Film], dict[str, Array]]:
-        """Writes the videos of an episode; returns data on each video, and the values of the episode's features."""
+        """Writes the videos of an episode. Returns data on the videos, by camera key, and the values of all features."""
         paths = {each.key: self._folder / video_file(each.key, index) for each in self._schema.cameras}
         with ExitStack() as undo:
             for path in paths.values():
@@ -147,7 +147,7 @@ class LeRobot(DatasetFormat):
         return films, values
 
     def _episode(self, index: int, task: str, rows: pa.Table, films: Mapping[str, _Film]) -> dict[str, Any]:
-        """Returns the row of an episode in `meta/episodes`."""
+        """Returns the row that describes an episode in `meta/episodes`."""
         count = len(rows)
         facts: dict[str, Any] = {"episode_index": index, "tasks": [task], "length": count}
         facts |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + count}
@@ -212,7 +212,7 @@ class LeRobot(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder has `meta/info.json`, or the folders `meta` and `data` of a damaged data set."""
+        """Returns whether a folder contains `meta/info.json`, or at least the folders `meta` and `data`."""
         return (folder / "meta").is_dir() and ((folder / "meta/info.json").exists() or (folder / "data").is_dir())
 
     @classmethod
@@ -228,7 +228,7 @@ class LeRobot(DatasetFormat):
 
 
 class _Film:
-    """Data on the images of one camera in one episode: stamps, statistics and coarse images."""
+    """Collects stamps, statistics and coarse images of one camera's images in one episode."""
 
     def __init__(self, frames: int) -> None:
         self._statistics = ImageStatistics(frames)

@@ -32,7 +32,7 @@ ROW_COLUMNS = {
     "index": "int64",
     "task_index": "int64",
 }
-"""Columns that every data set has, and their types."""
+"""Types of the columns that every data set has, indexed by column."""
 NO_NUMBERS = ("image", "string", "audio")
 """Types of columns whose values are not checked; they occur in data sets of other tools."""
 MAX_TIME_ERROR_S = 1e-4
@@ -52,7 +52,7 @@ REQUIRED = (
 
 
 def place(number: int) -> dict[str, int]:
-    """Returns the number of the folder of a file, and the number of the file within the folder."""
+    """Returns the folder index and the file index of the data or video file with the given number."""
     return {"chunk_index": number // CHUNK, "file_index": number % CHUNK}
 
 
@@ -103,7 +103,7 @@ def lerobot_faults(folder: Path) -> Iterator[str]:
 
 
 class _Check:
-    """Check of a data set; methods are called in the order of definition, since later ones use data of earlier ones."""
+    """Checks a data set. The methods use data of previous methods, so they must be called in the order of definition."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -118,7 +118,7 @@ class _Check:
     # --- meta/info.json
 
     def info_faults(self) -> Iterator[str]:
-        """Checks the description of the data set."""
+        """Checks `meta/info.json`, which describes the data set."""
         path = "meta/info.json"
         try:
             info = read_json(self._folder, path)
@@ -331,7 +331,7 @@ class _Check:
     # --- meta/stats.json
 
     def statistics_faults(self) -> Iterator[str]:
-        """Compares the statistics with the values."""
+        """Compares the stored statistics of all features with the values."""
         path = "meta/stats.json"
         try:
             stats = read_json(self._folder, path)
@@ -418,7 +418,14 @@ class _Check:
         yield from self._frame_faults(key, rows, np.array(times), np.array(images))
 
     def _frame_faults(self, key: str, rows: list[dict[str, Any]], times: Array, images: Array) -> Iterator[str]:
-        """Finds the frames of each episode by time, as readers do, and compares them with the exported images."""
+        """Finds the frames of each episode by time, as LeRobot's reader does, and checks the frames.
+
+        Args:
+            key: Key of the camera.
+            rows: Rows of `meta/episodes` of the episodes in the video.
+            times: Times of the frames, shape (n,) [s].
+            images: Coarse images of the frames, shape (n, 8, 8, 3).
+        """
         fps = self._info["fps"]
         for row in rows:
             where = f"episode {row['episode_index']}"
@@ -441,7 +448,7 @@ class _Check:
             yield from (f"{where}: {fault}" for fault in image_faults(key, found, stored))
 
     def _states(self, row: Mapping[str, Any]) -> Array:
-        """Returns `observation.state` of an episode, shape (length, columns); an empty array without this feature."""
+        """Returns `observation.state` of an episode, shape (length, columns); empty if the feature is missing."""
         parts = self._values.get(STATE, [])
         if not parts or len({part.shape[1] for part in parts}) != 1:
             return np.empty((0, 0))
@@ -486,7 +493,7 @@ def _statistic_faults(stored: Mapping[str, Any], values: Array) -> Iterator[str]
 
 
 def _nearest(times: Array, wanted: Array) -> Array:
-    """Returns, for each wanted time, the index of the nearest time in `times`, which is ascending and not empty."""
+    """Returns, for each wanted time, the index of the nearest time. `times` must be ascending and not empty."""
     right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     right = np.minimum(right, len(times) - 1)
     left = np.maximum(right - 1, 0)

@@ -1,4 +1,4 @@
-"""Data set format of rosbag2 recordings in MCAP files, which contain all messages as recorded."""
+"""Data set format that consists of rosbag2 recordings in MCAP files, with all recorded messages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROSBAG2_VERSION = 9
 
 
 class McapConfig(ConfigModel):
-    """Options of rosbag2 recordings."""
+    """Options of the format `mcap`."""
 
     distribution: Literal["humble", "jazzy", "kilted"] = Field(
         "jazzy", description="Distribution of ROS 2 whose messages are used."
@@ -37,7 +37,7 @@ class McapConfig(ConfigModel):
 
 
 class Mcap(DatasetFormat):
-    """A folder of rosbag2 recordings in MCAP files, one for each episode, with all topics."""
+    """Format `mcap`: for each episode, a rosbag2 recording in an MCAP file, with all topics."""
 
     Config = McapConfig
     has_rows: ClassVar[bool] = False
@@ -49,7 +49,7 @@ class Mcap(DatasetFormat):
         self._types = get_typestore(Stores[f"ROS2_{self.config.distribution.upper()}"])
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Converts the bag of an episode."""
+        """Converts the bag of an episode to a rosbag2 recording."""
         target = self._folder / f"episode_{index:06d}"
         try:
             _convert(episode.bag, target, self._types)
@@ -69,7 +69,7 @@ class Mcap(DatasetFormat):
         shutil.rmtree(self._folder / f"episode_{index:06d}")
 
     def close(self) -> None:
-        """Does nothing: a recording is complete after `add`."""
+        """Does nothing, since a recording is complete after `add`."""
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
@@ -89,7 +89,7 @@ class Mcap(DatasetFormat):
 
 
 def _convert(bag: Path, target: Path, types: Any) -> None:
-    """Converts all topics of a ROS 1 bag, with the message definitions in the bag."""
+    """Converts all topics of a ROS 1 bag to a rosbag2 recording, with the message definitions in the bag."""
     choices = ("exclude_topics", "include_topics", "exclude_msgtypes", "include_msgtypes")
     everything: dict[str, Any] = dict.fromkeys(choices, ())
     plain: dict[str, Any] = {"compress": None, "compress_mode": "message"}
@@ -103,7 +103,7 @@ def _count(recording: Path) -> int:
 
 
 def _topics_of(recording: Path) -> dict[str, dict[str, Any]]:
-    """Returns the type, the number of messages, and the SHA-256 of stamps and content, for each topic of a recording.
+    """Returns message type, number of messages, and SHA-256 of stamps and content, indexed by topic.
 
     Raises:
         ReaderError: If the recording cannot be read.

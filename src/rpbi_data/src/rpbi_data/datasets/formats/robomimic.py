@@ -1,4 +1,4 @@
-"""Data set format robomimic, which is one HDF5 file."""
+"""Data set format robomimic, which consists of one HDF5 file."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class RobomimicConfig(ConfigModel):
 
 
 class Robomimic(DatasetFormat):
-    """A robomimic data set: one HDF5 file with actions scaled to [-1, 1]."""
+    """Format robomimic: one HDF5 file with actions scaled to [-1, 1]."""
 
     Config = RobomimicConfig
     content = "an HDF5 file (robomimic)"
@@ -103,7 +103,7 @@ class Robomimic(DatasetFormat):
         return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def take_back(self, index: int) -> None:
-        """Removes the episode that was added last, to free space; not possible after `close` has started to scale."""
+        """Removes the episode that was added last; raises an OSError if `close` has begun to scale actions."""
         if self._is_closing:
             super().take_back(index)
         name = f"demo_{index}"
@@ -151,7 +151,7 @@ class Robomimic(DatasetFormat):
         demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
 
     def _write_split(self, names: list[str]) -> None:
-        """Writes the filters `train` and `valid`, a random but reproducible split of the episodes."""
+        """Splits the episodes randomly but reproducibly, and writes the filters `train` and `valid`."""
         count = max(1, round(self.config.valid * len(names))) if self.config.valid and len(names) > 1 else 0
         chosen = {names[i] for i in np.random.default_rng(0).permutation(len(names))[:count]}
         for name, of_filter in (("train", sorted({*names} - chosen)), ("valid", sorted(chosen))):
@@ -168,7 +168,7 @@ class Robomimic(DatasetFormat):
 
     @classmethod
     def recognises(cls, folder: Path) -> bool:
-        """Returns whether a folder has an HDF5 file, even a broken one."""
+        """Returns whether a folder contains an HDF5 file, which may be damaged."""
         return bool(list(folder.glob("*.hdf5")))
 
     @classmethod
@@ -194,12 +194,12 @@ def _put_observation(demo: h5py.Group, key: str, values: Array) -> None:
 
 
 def observation_key(key: str) -> str:
-    """Returns the name of a feature in the HDF5 groups `obs` and `next_obs`."""
+    """Converts the key of a feature to its name in the HDF5 groups `obs` and `next_obs`."""
     return key.removeprefix(_OBSERVATION).replace(".", "_")
 
 
 def scaled(actions: Array, low: Array, high: Array) -> Array:
-    """Returns actions scaled to [-1, 1]; a column in which all actions are equal becomes 0.
+    """Scales actions to [-1, 1], and returns the result. Columns without different values become 0.
 
     Args:
         actions: Actions, shape (n, columns).
@@ -273,7 +273,7 @@ def _demo_faults(
     Args:
         demo: HDF5 group of the episode.
         stored: Metadata of the episode from the folder `rpbi/`; empty without metadata.
-        shapes: Shapes of rows in previous episodes, indexed by observation; new observations are added.
+        shapes: Shape of one row in previous episodes, indexed by observation. New observations are added.
         names: Column names of each observation, indexed by observation.
     """
     if ACTIONS not in demo:
