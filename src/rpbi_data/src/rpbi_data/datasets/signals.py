@@ -60,8 +60,8 @@ class Signal(NamedTuple):
         feature: The feature.
         columns: Column of each number of the feature.
         method: Method of resampling, see `rpbi_data.resample`. For actions: NEXT or PREVIOUS.
-        held: For actions: column of the joint's measured position for each number. The table name is empty if the position
-            is not measured.
+        held: For actions: column of the joint's measured position for each number. The table name is empty if the
+            position is not measured.
         deltas: For actions: number of leading columns that are changes from the values measured at the row.
     """
 

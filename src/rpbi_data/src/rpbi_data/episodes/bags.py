@@ -1,4 +1,4 @@
-"""Bags of episodes: report on topics, tables of several episodes, and repair after a recorder was killed."""
+"""Measures topics in bags of episodes, reads episodes into tables, and repairs bags after a recorder was killed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .folder import BAG, FACTS, FARM, SEAL, SET_BACK, UNREADABLE, Episode, Episo
 REINDEX_BYTES = 2**31
 """Largest address space of the process that indexes a bag [bytes]."""
 MAX_CLOSE_S = 2.0
-"""After a recorder was killed, longest time to wait until its writing process has closed the bag [s]."""
+"""Longest time to wait for the writing process of a killed recorder to close the bag [s]."""
 
 EPISODE = "episode"
 """Name of the first index level in tables of several episodes."""
@@ -43,8 +43,8 @@ def measure_topics(bag: Path, *, any_size: bool = True) -> dict[str, dict[str, A
         any_size: Whether the bag may exceed the limits of `BagReader`.
 
     Returns:
-        Properties of each topic, indexed by topic: `type`, number of `messages`, mean rate `rate_hz` [Hz] (0 if it is
-        unknown), longest gap `max_gap_s` [s], and `sha256`, see `seals_of`. A topic whose clock was set back by more
+        Properties of each topic, indexed by topic: `type`, number of `messages`, mean rate `rate_hz` [Hz] (0 if unknown),
+        longest gap `max_gap_s` [s], and `sha256`, see `seals_of`. A topic whose clock was set back by more
         than 1 s also has `set_back_s` [s].
 
     Raises:
@@ -92,15 +92,15 @@ def episodes_to_dataframes(
         path: The folder of episodes.
         topics: Topics to read: names, or one name. By default all topics without binary data.
         images: Whether the default includes topics with binary data.
-        any_size: See `rpbi_utils.bag_to_dataframes`.
+        any_size: See `rpbi_data.bag_to_dataframes`.
 
     Returns:
-        Tables as from `bag_to_dataframes`, but with the index (`episode`, `time`). If an episode lacks a topic, the
+        Tables as returned by `bag_to_dataframes`, but with the index levels `episode` and `time`. If an episode lacks a topic, the
         topic's table has no rows of this episode. Episodes that cannot be read are left out, with a warning.
 
     Raises:
         EpisodeError: If the folder does not exist, or no episode can be read.
-        UnknownNameError: If a given topic is in no episode.
+        UnknownNameError: If none of the episodes has a given topic.
     """
     folder = EpisodeFolder(path)
     wanted = None if topics is None else {topics} if isinstance(topics, str) else set(topics)
@@ -138,7 +138,7 @@ def repair_all(folder: EpisodeFolder) -> Iterator[str]:
     Episodes that another process is recording are skipped.
 
     Raises:
-        EpisodeError: If the folder belongs to a farm, which makes missing episodes again itself.
+        EpisodeError: If the folder belongs to a farm. Farms do not repair episodes, but make them again.
     """
     if os.path.lexists(folder.path / FARM):
         message = "expected episodes of a recorder, these are of a farm: it makes them again itself"
@@ -232,7 +232,7 @@ except Exception as error:
 
 
 def _reindex(bag: Path) -> None:
-    """Writes the index of a bag. A separate process with limits does so, since rosbag trusts the sizes in a broken bag.
+    """Writes the index of a bag, in a separate process with limits, since rosbag trusts the sizes in a damaged bag.
 
     Raises:
         BagError: If the bag cannot be indexed, or indexing needs too much memory or time.

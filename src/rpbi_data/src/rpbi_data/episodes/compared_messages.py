@@ -35,10 +35,10 @@ class TopicDifference(NamedTuple):
     Attributes:
         topic: The topic.
         stamp_ns: Stamp of the message [ns].
-        place: Path of the different value in the message.
+        place: Path of the differing value in the message.
         expected: The value in the replay.
         recorded: The value in the bag.
-        is_certain: Whether the message depends only on the state of the world. If so, the bag must have been changed.
+        is_certain: Whether the message depends only on the state of the world, so that the bag must have been changed.
     """
 
     topic: str
@@ -55,12 +55,12 @@ class TopicDifference(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """Result of a comparison.
+    """Result of comparing recorded messages with a replay.
 
     Attributes:
         differences: The first difference of each topic, indexed by topic.
-        different: Number of messages or transforms that differ, indexed by topic.
-        compared: Number of messages or transforms that were compared, indexed by topic.
+        different: Number of differing messages (on TF: transforms), indexed by topic.
+        compared: Number of compared messages (on TF: transforms), indexed by topic.
     """
 
     differences: dict[str, TopicDifference]
@@ -79,8 +79,8 @@ class Compared(NamedTuple):
 class Comparison:
     """Compares the messages of an episode with the samples of a replay. Used as a context manager that closes the bag.
 
-    Messages with the same topic and stamp are compared, and transforms with the same frame. Messages without a header,
-    images, and messages whose stamp does not occur in the replay are not compared.
+    Messages are compared if topic and stamp are the same, and transforms if child frame and stamp are the same. Not
+    compared are images, messages without a header, and messages whose stamp does not occur in the replay.
 
     Args:
         bag: Path of the recorded bag.
@@ -118,7 +118,7 @@ class Comparison:
 
         Args:
             world: The world of the replay.
-            resets: Number of resets in the recording before this tick.
+            resets: Number of resets between the start of the world and this tick.
             samples: Samples of the tick.
         """
         if self._samples is None or self._stamps is None:
@@ -154,7 +154,7 @@ class Comparison:
                 self.result.differences[full] = TopicDifference(full, stamp_ns, place, ours, theirs, is_certain)
 
     def _read_until(self, time_ns: int) -> None:
-        """Reads the messages recorded up to a time [ns], and drops messages whose stamps are too old."""
+        """Reads the messages that were recorded up to a time [ns], and drops messages with much older stamps."""
         oldest = time_ns - 5 * WINDOW_NS
         while self._coming is not None and self._coming.record_time_ns <= time_ns:
             if self._coming.record_time_ns > oldest:  # older messages are not needed: a replay may begin at a keyframe
@@ -184,7 +184,7 @@ _NOT_COMPARED = {"sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msg
 
 
 class _Stamps:
-    """Finds the stamp of each tick in a recording.
+    """Computes the stamps of ticks from recorded states.
 
     Args:
         states: The recorded states.
@@ -201,7 +201,7 @@ class _Stamps:
             self._by_tick.setdefault((each.resets, each.tick), set()).add(stamp_ns)
 
     def of(self, resets: int, tick: int) -> int | None:
-        """Returns the stamp of a tick [ns]; None if it is unknown, for instance if the world stood still in wall time.
+        """Returns the stamp of a tick [ns]; None if unknown, for instance if a world in wall time was paused at the tick.
 
         Args:
             resets: Number of resets before the tick.
@@ -232,7 +232,7 @@ def _as_sent(message: Any) -> Any:
 
 
 def _difference(expected: Any, recorded: Any, place: str) -> tuple[str, Any, Any] | None:
-    """Returns the path of the first different value, and both values; None without a difference. Ignores `seq`."""
+    """Returns the path of the first differing value, and both values; None if all values except `seq` are equal."""
     if isinstance(expected, genpy.Message):
         names = [name for name in expected.__slots__ if name != "seq"]
         parts = [(getattr(expected, name), getattr(recorded, name), f"{place}.{name}".lstrip(".")) for name in names]

@@ -1,4 +1,4 @@
-"""Errors of episodes."""
+"""Errors that concern episodes."""
 
 import errno
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @dataclass(eq=False)
 class EpisodeError(InterfaceError):
-    """An episode, or a folder of episodes, is invalid."""
+    """An episode or a folder of episodes is invalid, or cannot be read or written."""
 
     path: Path
     message: str

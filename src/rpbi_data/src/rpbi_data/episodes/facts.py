@@ -1,4 +1,4 @@
-"""Validation of an untrusted `episode.yaml`: types, limits, and texts that are safe to print on a terminal."""
+"""Validates untrusted `episode.yaml` files: types, limits, and texts that are safe to print on a terminal."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Digest = Annotated[str, Field(pattern="^([0-9a-f]{64})?$"), Expects("64 hex digi
 
 
 def _path(text: str) -> str:
-    """Returns an absolute path with `..` resolved; raises a ValueError if the path is relative or leaves its root."""
+    """Resolves `..` in a path, and returns the path; raises a ValueError unless the path is absolute and below `/`."""
     parts: list[str] = []
     for part in text.split("/"):
         if part == ".." and not parts:
@@ -46,11 +46,11 @@ def _path(text: str) -> str:
 
 
 Path = Annotated[Text, AfterValidator(_path)]
-"""Absolute path of a file on the recording machine; readers place the file below a folder, see `path_below`."""
+"""Absolute path of a file on the recording machine. Readers map the path into a folder, see `path_below`."""
 
 
 class TopicFacts(ConfigModel):
-    """A topic in the bag, see `Episode.topics`."""
+    """Properties of a topic in the bag, see `Episode.topics`."""
 
     type: Line
     messages: Count
@@ -61,7 +61,7 @@ class TopicFacts(ConfigModel):
 
 
 class FileFacts(ConfigModel):
-    """A file that the world names, see `rpbi_data.episodes.files.store_files`."""
+    """Data on a file that the world names, as returned by `rpbi_data.episodes.files.store_files`."""
 
     path: Path
     sha256: Digest
@@ -69,7 +69,7 @@ class FileFacts(ConfigModel):
 
 
 class EpisodeFacts(ConfigModel):
-    """The attributes of `Episode`."""
+    """Validated attributes of an `Episode`."""
 
     number: Annotated[int, Field(ge=0, le=MAX_NUMBER)]
     state: Literal["recording", "complete", "incomplete", "recovered"] = "recording"
@@ -87,21 +87,21 @@ class EpisodeFacts(ConfigModel):
 
 
 def facts_in(text: str, file: str) -> dict[str, Any]:
-    """Returns the attributes of an `Episode` from a YAML text.
+    """Parses the attributes of an `Episode` from a YAML text.
 
     Args:
         text: The YAML text.
-        file: Name of the text's file, for error messages.
+        file: Name of the file that contains the text, for error messages.
 
     Raises:
-        ConfigError: If the text is not YAML, or a value has the wrong type or is outside of its limits.
+        ConfigError: If the text is not YAML, or a value has a wrong type or exceeds a limit.
     """
     facts = EpisodeFacts.parse(load_configs(text, file, MAX_BYTES), file)
     return facts.model_dump(exclude_unset=True)
 
 
 def checked_label(label: str) -> str:
-    """Returns a label of an episode unchanged, if the label is valid.
+    """Checks a label of an episode, and returns the unchanged label.
 
     Raises:
         InterfaceError: If the label is too long, or has control characters.

@@ -1,4 +1,4 @@
-"""Stores copies of the files that a world names, and makes worlds that read these copies."""
+"""Stores copies of the files that a world names, and changes the world's description to use these copies."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MAX_FILE_BYTES = 2**29
 MAX_ALL_BYTES = 2**31
 """Largest total size of the files of an episode [bytes]."""
 _NAMED = 5
-"""Largest number of files that a note about missing copies names; further files are only counted."""
+"""Largest number of files that a message about missing copies names. Further files are only counted."""
 
 
 def store_files(
@@ -42,14 +42,14 @@ def store_files(
 
     Args:
         description: The world's description as JSON, as on the topic `rpbi/world_description`.
-        store: The folder, in which a copy is called `HASH.EXTENSION`. Existing copies are kept.
-        is_own: Decides from a file's path, with symbolic links resolved, if the file may be copied; see
-            `files_of_world`.
+        store: The folder. The name of a copy is `HASH.EXTENSION`. Existing copies are kept.
+        is_own: Function of a file's path, with symbolic links resolved, that returns whether the file may be copied;
+            see `files_of_world`.
 
     Returns:
-        A dictionary for each file, and messages. A dictionary has the file's `path` and `sha256`; for a URDF, `meshes`
-        maps mesh names in the URDF to paths. Messages are about files that cannot be read, are not copied, or have
-        changed since the world was loaded.
+        A dictionary for each file, and messages. A dictionary has the keys `path` and `sha256`, and for a URDF also
+        `meshes`, which maps mesh names in the URDF to paths. The messages are about files that cannot be read, are not
+        copied, or have changed since the world was loaded.
 
     Raises:
         ConfigError: If `description` is not the description of a world.
@@ -75,8 +75,8 @@ def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[
     """Returns a function that decides whether a file may belong to a world with an untrusted description.
 
     Allowed are files in ROS packages, in installed robot data, in the folder of the world's main file, and in further
-    folders. The main file counts only if its keys are those of a main file. Hidden files and files in hidden folders
-    are only allowed in further folders.
+    folders. The folder of the main file is only included if the file has the keys of a main file. Hidden files and
+    files in hidden folders are only allowed in further folders.
 
     Args:
         description: The world's description as JSON.
@@ -99,7 +99,7 @@ def files_of_world(description: str, further: Iterable[Path] = ()) -> Callable[[
 
 
 class _Copies:
-    """Copies of the files of one world, see `store_files`."""
+    """Copies the files of one world, and collects the results of `store_files`."""
 
     def __init__(self, store: Path, is_own: Callable[[Path], bool]) -> None:
         self.stored: dict[str, dict[str, Any]] = {}
@@ -118,7 +118,7 @@ class _Copies:
         return [*self.faults, f"not copied, since they are in no folder of the world or of copy_from: {names}{more}"]
 
     def add(self, path: str) -> str:
-        """Copies a file, and returns its SHA-256; empty if the file cannot be read or must not be copied."""
+        """Copies a file, and returns the file's SHA-256; empty if the file cannot be read or must not be copied."""
         if path in self.stored:
             return str(self.stored[path]["sha256"])
         if not _is_plain(path) or not self._is_own(Path(os.path.realpath(path))):
@@ -145,7 +145,7 @@ class _Copies:
         """Copies the meshes of a URDF.
 
         Args:
-            urdf: Path of the URDF in the world's description, relative to which meshes are found.
+            urdf: Path of the URDF in the world's description. Relative mesh names are relative to its folder.
             source: Path of the file from which the URDF is read.
         """
         meshes: dict[str, str] = {}
@@ -172,7 +172,7 @@ def _is_plain(path: str) -> bool:
 
 
 def _described(description: str) -> dict[str, Any]:
-    """Parses a world's description; raises a ConfigError if files or configurations have other types than expected."""
+    """Parses a world's description; raises a ConfigError if the types of files or configurations are wrong."""
     data = load_foreign_json(description, "rpbi/world_description")
     try:
         texts = [*data["files"].items(), *data["descriptions"].items()]
@@ -196,7 +196,7 @@ def _package_folders() -> tuple[Path, ...]:
 
 
 def _is_main_file(path: str) -> bool:
-    """Returns whether a file is the main file of a world: all keys are keys of a main file, and one defines objects."""
+    """Returns whether a file is a world's main file: all its keys are allowed there, and at least one defines objects."""
     from rpbi.config.world import main_file_model  # loads the simulator, which readers of episodes do not need
     from rpbi.world.objects import object_sections
 
@@ -222,7 +222,7 @@ def stored_path(store: Path, path: str, digest: str) -> Path:
 
 
 def changed_files(files: Iterable[Mapping[str, Any]], store: Path) -> Iterator[str]:
-    """Yields a message for each copy in `store` that is missing, or was changed since it was stored."""
+    """Yields a message for each copy in `store` that is missing, or was changed after it was stored."""
     known: dict[str, str] = {}
     for each in files:
         if not each["sha256"]:
@@ -264,7 +264,7 @@ def with_stored_files(description: str, files: Iterable[Mapping[str, Any]], stor
         description: The world's description as JSON, as on the topic `rpbi/world_description`.
         files: The files, as returned by `store_files`.
         store: Folder of the copies.
-        folder: An empty folder, in which files get their original paths. URDFs there name the meshes in this folder.
+        folder: An empty folder, below which files get their original paths. URDFs are changed to use the meshes there.
 
     Raises:
         ConfigError: If `description` is not the description of a world, or a path would be outside of the folder.
@@ -304,7 +304,7 @@ _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 
 
 def _with_meshes(urdf: str, meshes: Mapping[str, str]) -> str:
-    """Returns a URDF in which mesh file names are replaced; `meshes` maps names in the URDF to new paths."""
+    """Replaces mesh file names in a URDF, and returns the URDF. `meshes` maps names in the URDF to new paths."""
 
     def renamed(match: re.Match[str]) -> str:
         path = meshes.get(unescape(match[3], _QUOTES))

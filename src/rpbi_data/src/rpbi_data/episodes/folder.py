@@ -1,4 +1,4 @@
-"""A folder of episodes: its layout, and the data stored with each episode."""
+"""The layout of a folder of episodes, and the description that is stored with each episode."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .errors import EpisodeError
 from .facts import MAX_BYTES, MAX_LABEL, MAX_NOTE, MAX_NUMBER, checked_label, facts_in
 
 BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
-"""Files of an episode: bag, description, and early commands that the topic does not send to late subscribers."""
+"""Files of an episode: bag, description, and commands that were sent too early for the recorder to receive."""
 FARM = "farm.yaml"
 """File in a folder of episodes that contains the job of the farm that makes the episodes."""
 FILES, DISCARDED = "files", "discarded"
@@ -47,20 +47,20 @@ _PARTIAL = re.compile(r"\.episode_([0-9]{6}|[1-9][0-9]{6,11})\.part")
 
 @dataclass
 class Episode:
-    """Description of an episode, as in its `episode.yaml`.
+    """Description of an episode, which is stored in the file `episode.yaml`.
 
     Attributes:
         number: Number of the episode in its folder.
-        state: `recording`, `complete`, `incomplete` (ended by a fault, which `note` names), `recovered` (after the
-            recorder was killed), or `UNREADABLE`.
+        state: `recording`, `complete`, `incomplete` (ended early or not recovered, see `note`), `recovered` (repaired
+            after the recorder was killed), or `UNREADABLE`.
         label: The user's label for the outcome, such as `success`.
-        note: Reason of a state other than `complete`, and further messages for the user.
+        note: Reason for a state other than `complete`, and further messages for the user.
         started: Wall time of the start, ISO 8601.
         seconds: Duration in wall time, or in the world's time if a farm made the episode [s].
         namespace: Namespace of the simulator.
         seeds: Text about random seeds, from the recorder's parameter `seeds` or from the farm.
         versions: Versions of this workspace, PyBullet, Python and numpy, indexed by name.
-        git: Commit of the workspace, followed by ` changed` if files differ from the commit; empty without git.
+        git: Commit of the workspace, followed by ` changed` if files differ from the commit; empty if unknown.
         files: Files that the world names, see `rpbi_data.episodes.files`.
         published: Number of messages that publishers sent to the recorder, indexed by topic.
         topics: Properties of the topics in the bag, indexed by topic; see `rpbi_data.episodes.bags.measure_topics`.
@@ -102,12 +102,12 @@ class Episode:
 
     @property
     def set_back_s(self) -> float:
-        """Largest time by which the clock of a topic was set back [s]; 0 if this never happened."""
+        """Largest time by which the clock of a topic was set back [s]; 0 if no clock was set back."""
         return max((float(each.get(SET_BACK, 0.0)) for each in self.topics.values()), default=0.0)
 
     @property
     def simulated_s(self) -> float | None:
-        """Duration according to the stamps of topics in `STAMPED` [s]; None if no such topic has a known rate."""
+        """Simulated duration, from the stamps of topics in `STAMPED` [s]; None if the rate of these topics is unknown."""
         spans = [
             (each["messages"] - 1) / each["rate_hz"]
             for topic, each in self.topics.items()
@@ -157,7 +157,7 @@ class EpisodeFolder:
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
-        """Yields all finished episodes; one whose description cannot be read has the state `UNREADABLE` and a note."""
+        """Yields all finished episodes. An episode with an unreadable description has the state `UNREADABLE` and a note."""
         for number in self.numbers():
             try:
                 yield read_facts(self.folder_of(number))
@@ -187,7 +187,7 @@ class EpisodeFolder:
         """Creates the temporary folder of a new episode.
 
         Args:
-            number: Number of the episode; by default, the next number. Numbers of discarded episodes are not reused.
+            number: Number of the episode; by default, the next number after all used and discarded numbers.
             facts: Further attributes of the episode.
 
         Returns:
@@ -195,7 +195,7 @@ class EpisodeFolder:
 
         Raises:
             EpisodeError: If the number is in use, or is too large.
-            OSError: If the description cannot be written; no folder is left then.
+            OSError: If the description cannot be written. The temporary folder is then removed.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         while True:
@@ -250,7 +250,7 @@ class EpisodeFolder:
         return episode
 
     def free_mb(self) -> float:
-        """Returns the free space of the disk on which the folder is or will be [MB]."""
+        """Returns the free space of the disk that contains the folder, or will contain it [MB]."""
         folder = next(each for each in (self.path.absolute(), *self.path.absolute().parents) if each.is_dir())
         return shutil.disk_usage(folder).free / 1e6
 
@@ -287,7 +287,7 @@ def read_part(part: Path) -> Episode:
 
 
 def write_facts(folder: Path, episode: Episode) -> None:
-    """Writes the description of an episode into its folder; replaces an existing description atomically."""
+    """Writes the description of an episode into a folder. An existing description is replaced atomically."""
     episode.note = printable(episode.note, MAX_NOTE)
     with atomic_file(folder / FACTS) as part:
         part.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
@@ -325,7 +325,7 @@ def hold(part: Path, wait_s: float = 0.0) -> int:
         wait_s: Longest time to wait until another process releases the lock [s].
 
     Returns:
-        A file handle. The lock ends when this process, and all child processes that inherited the handle, close it.
+        A file handle. The lock ends when all processes that have the handle, including child processes, have closed it.
 
     Raises:
         BlockingIOError: If another process holds the lock.
@@ -344,7 +344,7 @@ def hold(part: Path, wait_s: float = 0.0) -> int:
 
 
 def is_held(part: Path) -> bool:
-    """Returns whether a process holds the lock of a temporary folder, and thus is recording."""
+    """Returns whether a process holds the lock of a temporary folder, which means that it records the episode."""
     try:
         os.close(hold(part))
     except BlockingIOError:
@@ -371,7 +371,7 @@ def versions() -> dict[str, str]:
 
 
 def git_state(folder: Path | None = None) -> str:
-    """Returns the commit of a workspace, followed by ` changed` if files differ from the commit; empty without git."""
+    """Returns the commit of a workspace, with ` changed` appended if files differ from the commit; empty if unknown."""
 
     def git(*words: str) -> str:
         done = subprocess.run(

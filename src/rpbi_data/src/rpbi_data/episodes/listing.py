@@ -35,12 +35,12 @@ def _row(episode: Episode) -> tuple[str, ...]:
 
 
 def _simulated(episode: Episode) -> str:
-    """Returns the simulated duration of an episode as text [s]."""
+    """Returns the simulated duration of an episode as text [s], or `-` if unknown."""
     return "-" if episode.simulated_s is None else f"{episode.simulated_s:.1f}"
 
 
 def clock_note(set_back_s: float) -> str:
-    """Returns the end of a message about a clock that was set back by `set_back_s` [s]; empty for 0."""
+    """Returns a text, to append to a message, about a clock that was set back by `set_back_s` [s]; empty for 0."""
     return f", a clock was set back by {set_back_s:.3g} s" if set_back_s else ""
 
 

@@ -1,4 +1,4 @@
-"""The node `record_node.py`, which records episodes; services, keys and buttons control the node."""
+"""The node `record_node.py`, which records episodes. Services, keys and joystick buttons control the node."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from .folder import BAG, EARLIER, Episode, EpisodeFolder, git_state, hold, versi
 from .listing import clock_note
 
 CHECK_HZ = 1.0
-"""Rate at which disk and recorder are checked, and the status is published [Hz]."""
+"""Rate at which the disk and the recorder are checked, and the status is published [Hz]."""
 MAX_HASH_WAIT_S = 1.5
 """Longest time to wait for a state hash at the end of an episode [s]."""
 MAX_LOCK_WAIT_S = 1.0
@@ -51,9 +51,9 @@ MAX_RESET_WAIT_S = 10.0
 """Longest time to wait for the state after a reset [s]."""
 POLL_S = 0.01
 KEPT_COMMANDS = 4_000
-"""Number of commands since a reset above which they are also stored in a file.
+"""Number of commands since a reset above which all of them are also stored in a file.
 
-A late subscriber gets at most 5,000 earlier commands.
+The simulator resends at most 5,000 earlier commands to a new subscriber.
 """
 
 _Trigger = TypeVar("_Trigger", str, int)
@@ -61,7 +61,7 @@ _log = logging.getLogger(__name__)
 
 
 class _Simulator:
-    """Receives the simulator's data that a replay needs, from the start of the node."""
+    """Receives the simulator's description, states and commands, which a replay of an episode needs."""
 
     def __init__(self, namespace: str) -> None:
         self._prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
@@ -77,7 +77,7 @@ class _Simulator:
 
     @property
     def commands_topic(self) -> str:
-        """Full name of the topic of commands."""
+        """Full name of the topic `rpbi/commands`."""
         return f"{self._prefix}rpbi/commands"
 
     def reset(self) -> None:
@@ -106,10 +106,10 @@ class _Simulator:
             time.sleep(POLL_S)
 
     def write_commands(self, path: Path) -> str:
-        """Writes the commands since the world was built or reset to a bag, if a late subscriber may miss some.
+        """Writes all commands since the world was built or reset to a bag, if they are too many for the topic to resend.
 
         Returns:
-            A message if the first commands are missing; otherwise an empty text.
+            A message if this node did not receive the first commands; otherwise an empty text.
         """
         with self._lock:
             messages = [self._commands[first] for first in sorted(self._commands)]
@@ -140,7 +140,7 @@ class _Simulator:
 
 
 class RecordNode:
-    """Records episodes into a folder, as the node's parameters require; see `RecordParameters`.
+    """Records episodes into a folder. The node's parameters are described in `RecordParameters`.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -171,7 +171,7 @@ class RecordNode:
         self._publish_status()
 
     def start(self) -> str:
-        """Starts an episode; returns a message for the user, or raises an InterfaceError if this is impossible."""
+        """Starts an episode, and returns a message for the user; raises an InterfaceError if it cannot be started."""
         with self._lock:
             if self._recorder is not None:
                 raise EpisodeError(self._folder.path, f"episode {self._episode.number} is being recorded")
@@ -185,14 +185,14 @@ class RecordNode:
             return f"episode {self._episode.number} is being recorded: {len(topics)} topics"
 
     def stop(self) -> str:
-        """Ends the current episode; returns a message, or raises an InterfaceError if no episode is being recorded."""
+        """Ends the current episode, and returns a message for the user; raises an InterfaceError if there is none."""
         with self._lock:
             self._require_recording()
             self._simulator.wait_for_hash()
             return self._end("complete", "")
 
     def discard(self) -> str:
-        """Discards the current episode, or else the last one; returns a message for the user."""
+        """Discards the current episode, or the last episode if none is being recorded; returns a message for the user."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "discarded while it was recorded")
@@ -201,7 +201,7 @@ class RecordNode:
             return f"episode {self._episode.number} is in {self._folder.discard(self._episode.number)}"
 
     def label(self, label: str) -> str:
-        """Labels the current episode, or else the last one; returns a message for the user."""
+        """Labels the current episode, or the last episode if none is being recorded; returns a message for the user."""
         with self._lock:
             if self._episode.number < 0:
                 raise EpisodeError(self._folder.path, "nothing to label: this node has not recorded an episode")
@@ -213,7 +213,7 @@ class RecordNode:
             return f"episode {self._episode.number}: {label}"
 
     def end(self) -> None:
-        """Ends the current episode, if there is one, when the node shuts down."""
+        """Ends an episode that is being recorded as incomplete. Called when the node shuts down."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "the node was ended while it was recorded")
@@ -288,7 +288,7 @@ class RecordNode:
         return text
 
     def _repair(self, fault: BagError) -> str:
-        """Repairs the episode from the files that the recorder has left; returns a message for the user."""
+        """Repairs the current episode from the files that the recorder wrote; returns a message for the user."""
         try:
             write_facts(self._part, self._episode)
             self._episode = repaired = repair(self._folder, self._part)
@@ -298,13 +298,13 @@ class RecordNode:
         return f"episode {repaired.number} is {repaired.state}: {repaired.note}"
 
     def _leave(self, fault: OSError) -> str:
-        """Leaves the episode in its temporary folder for a later repair; returns a message for the user."""
+        """Logs that the episode stays in its temporary folder until a later repair; returns a message for the user."""
         text = f"episode {self._episode.number} stays in {self._part} until it is repaired: {fault}"
         rospy.logerr("%s", text)
         return text
 
     def _check(self) -> None:
-        """Ends the current episode if the recorder has ended or the disk is nearly full; publishes the status."""
+        """Ends the current episode if the recorder has ended or the disk is nearly full. Also publishes the status."""
         with self._lock:
             if self._recorder is not None:
                 self._episode.published = self._recorder.published() or self._episode.published
@@ -359,7 +359,7 @@ class RecordNode:
     def _actions(
         self, start: _Trigger | None, discard: _Trigger | None, labels: Mapping[_Trigger, str]
     ) -> dict[_Trigger, Callable[[], None]]:
-        """Returns the actions, indexed by key or button; an action whose key or button is None is left out."""
+        """Returns the actions, indexed by key or button. Actions whose key or button is None are left out."""
         actions = [(start, self._toggle), (discard, self.discard)]
         actions += [(each, partial(self.label, label)) for each, label in labels.items()]
         return {each: partial(_do, action) for each, action in actions if each is not None}

@@ -15,21 +15,21 @@ from rpbi.world import World
 
 
 class SampleMessages:
-    """Converts samples to messages, except samples of cameras, whose images the renderer draws.
+    """Converts samples of sensors to messages. Samples of cameras are skipped, since the renderer draws their images.
 
     Args:
         world: The world.
-        is_wanted: Decides from a topic's name, without namespace, if messages of the topic are needed.
+        is_wanted: Function that returns, for a topic's name without namespace, whether the topic's messages are needed.
     """
 
     def __init__(self, world: World, is_wanted: Callable[[str], bool]) -> None:
         self._world, self._is_wanted = world, is_wanted
         self._routes: dict[SampleKey, Topic | None] = {}
-        """The topics of sensors that are wanted."""
+        """Topic of each sensor, indexed by sample type and sensor name; None if its messages are not needed."""
         self._transforms = TransformCollector()
 
     def of(self, samples: Iterable[Any], stamp_ns: int) -> Iterator[tuple[str, Any]]:
-        """Yields topic and message for samples with a stamp [ns]. All link poses form one message, which comes last."""
+        """Yields topics and messages for samples with a given stamp [ns]. The last message contains all link poses."""
         for sample in samples:
             if isinstance(sample, LinkPoseSample):
                 self._transforms.collect(sample, stamp_ns)
@@ -39,7 +39,7 @@ class SampleMessages:
             yield TF.name, transforms
 
     def keeps_state(self, topic: str) -> bool:
-        """Returns whether a topic's sensor has an internal state, such as a zero offset or a moving average."""
+        """Returns whether the sensor of a topic has an internal state, such as a zero offset or a moving average."""
         return any(each.keeps_state for each in self._sensors() if self._name(each, sample_topic(each)) == topic)
 
     def _message(self, sample: Any, stamp_ns: int) -> Iterator[tuple[str, Any]]:
@@ -52,7 +52,7 @@ class SampleMessages:
                 self._transforms.collect(*topic.on_tf(sample, stamp_ns))
 
     def _topic(self, sample: Any) -> Topic | None:
-        """Returns the topic of a sample's sensor; None if there is no such topic, or the topic is not needed."""
+        """Returns the topic of a sample's sensor; None if the sensor has no topic, or the topic is not needed."""
         key = type(sample), sample.name
         if key not in self._routes:
             for sensor in self._sensors():

@@ -51,9 +51,9 @@ def read_recording(
         path: Path of the bag, in which the simulator was not restarted.
         namespace: Namespace of the simulator; other simulators in the bag are ignored.
         any_size: Whether the bag may exceed the limits of `BagReader`.
-        earlier: Bag with the `rpbi/commands` before the recording; None if it does not exist.
-        relocate: Replaces the file names in the world's description.
-        names: New names of files in keyframes, indexed by recorded name.
+        earlier: Bag with `rpbi/commands` from before the recording; None if there is no such bag.
+        relocate: Function that returns the world's description with other file names.
+        names: New names of the files that keyframes name, indexed by recorded name.
         needs_states: Whether the bag must contain state hashes to compare, as for a replay.
 
     Raises:
@@ -99,14 +99,15 @@ def recorded_episode(
 ) -> Iterator[tuple[Path, Recording]]:
     """Context manager that yields the bag of an episode, and the session in the bag.
 
-    The session's world reads copies of its files in a temporary folder, which exists until the end of the context.
+    The description of the session's world names copies of files in a temporary folder, which exists until the end of
+    the context.
 
     Args:
         folder: The folder of episodes.
         episode: The episode.
         any_size: See `read_recording`.
-        is_replayed: Whether the session is simulated again: the bag must contain state hashes then, and keyframes name
-            the copies, too.
+        is_replayed: Whether the session will be simulated again. If so, the bag must contain state hashes, and keyframes
+            are changed to name the copies, too.
 
     Raises:
         EpisodeError: If the episode has no bag, or a stored file cannot be read.
@@ -138,7 +139,7 @@ def _rename(commands: _Commands, names: Mapping[str, str]) -> None:
 
 
 def require_few_ticks(path: Path, recording: Recording, max_ticks: int) -> int:
-    """Checks the number of ticks of a recording, summed over all resets, and returns this number.
+    """Checks the number of ticks in a recording, including the ticks before resets, and returns this number.
 
     Args:
         path: Path of the bag, for the error message.
@@ -174,7 +175,7 @@ def _add_commands(message: WorldCommands, commands: _Commands) -> None:
 
 
 def _check(bag: BagReader, topics: dict[str, Any], prefix: str, needs_states: bool) -> None:
-    """Raises a BagError if the bag lacks a required topic, or a topic's message definition is of another version."""
+    """Raises a BagError if the bag lacks a required topic, or a message definition differs from this version's."""
     needed = [f"{prefix}rpbi/world_description", *([f"{prefix}rpbi/state"] if needs_states else ())]
     missing = [topic for topic in needed if not bag.counts.get(topic)]
     if missing:

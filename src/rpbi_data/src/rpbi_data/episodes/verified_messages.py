@@ -57,7 +57,7 @@ class Verdict(NamedTuple):
         is_same: Whether all states and messages agree, and the stored files are unchanged.
         text: Result of the comparison in words.
         label: Label of the episode; empty if the episode cannot be read.
-        notes: Messages about changed original files, and about differences that do not count.
+        notes: Messages about changed original files, and about differences that are not faults.
     """
 
     number: int
@@ -76,7 +76,7 @@ def verify_all(
         folder: The folder of episodes.
         numbers: Numbers of the episodes.
         jobs: Largest number of simultaneous processes.
-        trust: Python packages that the episodes may import, for user-defined types.
+        trust: Python packages from which classes that episodes name may be imported.
         limits: Limits on each episode.
     """
     each = max(1, jobs // max(1, len(numbers)))  # processes per episode, for episodes with keyframes
@@ -103,7 +103,7 @@ def main(words: Sequence[str]) -> None:
     """Verifies one episode and prints the result as JSON.
 
     Args:
-        words: Folder, number of the episode, limits as JSON, number of processes, and trusted packages.
+        words: Command-line arguments: folder, number of the episode, limits as JSON, number of processes, trusted packages.
     """
     path, number, limits, jobs, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
@@ -114,7 +114,7 @@ def main(words: Sequence[str]) -> None:
 
 
 def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMITS, jobs: int = 1) -> Verdict:
-    """Simulates an episode again with its stored files, and compares the result with the recording.
+    """Simulates an episode again with its stored files, and compares states and messages with the recording.
 
     Args:
         folder: The folder of episodes.
@@ -140,7 +140,7 @@ def verify(folder: EpisodeFolder, number: int, limits: ReplayLimits = USUAL_LIMI
 
 
 def _replay(folder: EpisodeFolder, episode: Episode, limits: ReplayLimits, jobs: int) -> tuple[bool, str, list[str]]:
-    """Simulates an episode; returns whether it equals the recording, the result in words, and notes."""
+    """Simulates an episode. Returns whether the result equals the recording, a text about the result, and notes."""
     with recorded_episode(folder, episode, limits.any_size) as (bag, recording):
         require_few_ticks(bag, recording, limits.max_ticks)
         compare = partial(_compare, bag, episode.namespace, recording)
@@ -160,7 +160,7 @@ def _compare(
 
 
 def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
-    """Returns messages about changed topics, and notes about topics that only differ in the replay.
+    """Returns messages about topics that were changed, and notes about topics that only the replay changes.
 
     A sensor may have an internal state, such as a zero offset set by a service. The sensor's messages may then differ
     in the replay. Such a difference is a fault only if the topic's messages do not match a stored SHA-256.
