@@ -43,9 +43,9 @@ def measure_topics(bag: Path, *, any_size: bool = True) -> dict[str, dict[str, A
         any_size: Whether the bag may exceed the limits of `BagReader`.
 
     Returns:
-        Properties of each topic, indexed by topic: `type`, number of `messages`, mean rate `rate_hz` [Hz] (0 if unknown),
-        longest gap `max_gap_s` [s], and `sha256`, see `seals_of`. A topic whose clock was set back by more
-        than 1 s also has `set_back_s` [s].
+        Properties of each topic, indexed by topic: `type`, number of `messages`, mean rate `rate_hz` [Hz], longest gap
+        `max_gap_s` [s], and `sha256`, see `seals_of`. A rate of 0 means that the rate is unknown. If the
+        clock of a topic was set back by more than 1 s, the topic also has `set_back_s` [s].
 
     Raises:
         BagError: If the bag cannot be read.
@@ -95,8 +95,8 @@ def episodes_to_dataframes(
         any_size: See `rpbi_data.bag_to_dataframes`.
 
     Returns:
-        Tables as returned by `bag_to_dataframes`, but with the index levels `episode` and `time`. If an episode lacks a topic, the
-        topic's table has no rows of this episode. Episodes that cannot be read are left out, with a warning.
+        Tables as returned by `bag_to_dataframes`, but with the index levels `episode` and `time`. If an episode lacks a
+        topic, the topic's table has no rows of this episode. Episodes that cannot be read are left out, with a warning.
 
     Raises:
         EpisodeError: If the folder does not exist, or no episode can be read.

@@ -201,7 +201,7 @@ class _Stamps:
             self._by_tick.setdefault((each.resets, each.tick), set()).add(stamp_ns)
 
     def of(self, resets: int, tick: int) -> int | None:
-        """Returns the stamp of a tick [ns]; None if unknown, for instance if a world in wall time was paused at the tick.
+        """Returns the stamp of a tick [ns]; None if unknown, for instance while a world in wall time was paused.
 
         Args:
             resets: Number of resets before the tick.

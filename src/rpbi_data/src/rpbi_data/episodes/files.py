@@ -196,7 +196,7 @@ def _package_folders() -> tuple[Path, ...]:
 
 
 def _is_main_file(path: str) -> bool:
-    """Returns whether a file is a world's main file: all its keys are allowed there, and at least one defines objects."""
+    """Returns whether a file is a world's main file: all keys are allowed, and at least one key defines objects."""
     from rpbi.config.world import main_file_model  # loads the simulator, which readers of episodes do not need
     from rpbi.world.objects import object_sections
 

@@ -107,7 +107,7 @@ class Episode:
 
     @property
     def simulated_s(self) -> float | None:
-        """Simulated duration, from the stamps of topics in `STAMPED` [s]; None if the rate of these topics is unknown."""
+        """Simulated duration from the stamps of topics in `STAMPED` [s]; None if the topics' rates are unknown."""
         spans = [
             (each["messages"] - 1) / each["rate_hz"]
             for topic, each in self.topics.items()
@@ -157,7 +157,7 @@ class EpisodeFolder:
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
-        """Yields all finished episodes. An episode with an unreadable description has the state `UNREADABLE` and a note."""
+        """Yields all finished episodes. If a description cannot be read, the state is `UNREADABLE`, with a note."""
         for number in self.numbers():
             try:
                 yield read_facts(self.folder_of(number))

@@ -106,7 +106,7 @@ class _Simulator:
             time.sleep(POLL_S)
 
     def write_commands(self, path: Path) -> str:
-        """Writes all commands since the world was built or reset to a bag, if they are too many for the topic to resend.
+        """Writes all commands since the world was built or reset to a bag, if there are at least `KEPT_COMMANDS`.
 
         Returns:
             A message if this node did not receive the first commands; otherwise an empty text.
@@ -192,7 +192,7 @@ class RecordNode:
             return self._end("complete", "")
 
     def discard(self) -> str:
-        """Discards the current episode, or the last episode if none is being recorded; returns a message for the user."""
+        """Discards the current episode, or the last one if none is being recorded; returns a message for the user."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "discarded while it was recorded")

@@ -106,8 +106,8 @@ def recorded_episode(
         folder: The folder of episodes.
         episode: The episode.
         any_size: See `read_recording`.
-        is_replayed: Whether the session will be simulated again. If so, the bag must contain state hashes, and keyframes
-            are changed to name the copies, too.
+        is_replayed: Whether the session will be simulated again. If so, the bag must contain state hashes, and
+            keyframes are changed to name the copies, too.
 
     Raises:
         EpisodeError: If the episode has no bag, or a stored file cannot be read.

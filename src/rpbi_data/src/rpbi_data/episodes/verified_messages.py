@@ -103,7 +103,8 @@ def main(words: Sequence[str]) -> None:
     """Verifies one episode and prints the result as JSON.
 
     Args:
-        words: Command-line arguments: folder, number of the episode, limits as JSON, number of processes, trusted packages.
+        words: Command-line arguments: folder, number of the episode, limits as JSON, number of processes, and trusted
+            packages.
     """
     path, number, limits, jobs, *trust = words
     trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
@@ -160,7 +161,7 @@ def _compare(
 
 
 def _message_faults(bag: Path, episode: Episode, comparison: Compared, any_size: bool) -> tuple[list[str], list[str]]:
-    """Returns messages about topics that were changed, and notes about topics that only the replay changes.
+    """Returns messages about changed topics, and notes about unchanged topics that differ in the replay.
 
     A sensor may have an internal state, such as a zero offset set by a service. The sensor's messages may then differ
     in the replay. Such a difference is a fault only if the topic's messages do not match a stored SHA-256.

@@ -103,7 +103,7 @@ def lerobot_faults(folder: Path) -> Iterator[str]:
 
 
 class _Check:
-    """Checks a data set. Each method uses data of previous methods, so the order of calls is the order of definition."""
+    """Checks a data set. The methods must be called in the order of definition, since each uses results of others."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
