@@ -1,4 +1,4 @@
-"""Tests for pytest that every device must pass. To test your own device, derive a class from `DeviceConformance`."""
+"""Pytest tests that every input device must pass. To test your own device, derive a class from `DeviceConformance`."""
 
 import contextlib
 import random
@@ -54,7 +54,7 @@ class Reader:
         return self.last.axes[[*self.device.axes].index(name)]
 
     def is_free(self, axis: str) -> bool:
-        """Returns whether an axis has been at rest since the device was opened."""
+        """Returns whether an axis has been at rest at least once since the device was opened."""
         return [*self.device.axes].index(axis) in self.feed.free_axes
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
@@ -69,8 +69,8 @@ class DeviceConformance:
     """Base class with the tests that every device must pass.
 
     A subclass names the device and implements how to move it. The motion must come from the real hardware or from an
-    emulator of the hardware, not from the device's Python object. A subclass does not override what its device cannot
-    do, such as `moves`, `presses` or `garbage`.
+    emulator of the hardware, not from the device's Python object. For abilities that the device lacks, the subclass
+    keeps the defaults, for example of `moves`, `presses` or `garbage`.
 
     Attributes:
         device_name: Name of a device in the table `DEVICES`, or `"their_package.module:Class"`.
@@ -79,7 +79,7 @@ class DeviceConformance:
         presses: Names of buttons that can be pressed.
         can_be_unplugged: Whether `unplug` and `plug` are implemented.
         pieces_of_garbage: Number of invalid inputs that the test sends.
-        shows_what_is_held: Whether the device reports an axis that is held while the device is plugged in.
+        shows_what_is_held: Whether the device, when it is plugged in, reports an axis that is already held.
     """
 
     device_name: ClassVar[str]
@@ -97,7 +97,7 @@ class DeviceConformance:
         return DEVICES.make(self.device_name, self.options)
 
     def move(self, axis: str, share: float) -> None:
-        """Moves an axis to a share of its full range, in [-1, 1], and holds it there. All other axes are at rest."""
+        """Moves an axis to the value `share` in [-1, 1] and holds the axis there. All other axes are at rest."""
         raise NotImplementedError
 
     def press(self, button: str, is_down: bool) -> None:

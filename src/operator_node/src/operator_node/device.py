@@ -29,7 +29,7 @@ class Reading(NamedTuple):
 
     Attributes:
         axes: A number in [-1, 1] for each axis of the device.
-        buttons: 1 for each button that is held, 0 for the others.
+        buttons: For each button of the device, 1 while the button is held, otherwise 0.
         events: Device-specific events since the last reading, in order, for the topics of `Device.ros_topics`.
         refused: Reason for each invalid input that was refused since the last reading.
     """
@@ -41,7 +41,7 @@ class Reading(NamedTuple):
 
 
 class Device(ABC):
-    """Base class of the input devices. The same thread, the main thread, opens, reads and closes a device.
+    """Base class of the input devices. The main thread opens, reads and closes a device.
 
     The constructor of a device has one argument, the options of type `Config`, which come from YAML or from the
     parameters of the device's node. A device only reports the state of its hardware. `DeviceFeed` does the rest: it
@@ -89,7 +89,7 @@ class Device(ABC):
         """Releases the device; may be called at any time, and repeatedly."""
 
     def at_rest(self) -> Reading:
-        """Returns the reading of an untouched device. All values are 0, unless the hardware differs.
+        """Returns the reading of an untouched device. All values are 0 unless the hardware has other values at rest.
 
         This reading is published last when the device disconnects or is closed. Its events report the release of all
         held keys.
@@ -100,5 +100,5 @@ class Device(ABC):
         """Renders a force as well as the device can, for example by rumbling.
 
         Args:
-            force: Components x, y, z, each in [-1, 1], as shares of the device's largest force.
+            force: Components x, y, z, each in [-1, 1], as fractions of the device's maximum force.
         """

@@ -1,4 +1,4 @@
-"""Stamps for user input, and subscriptions that detect when their input ceases."""
+"""Stamps for user input, and subscriptions that detect when the input ceases."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def stamp() -> rospy.Time:
 def has_begun() -> bool:
     """Returns whether ROS time has started.
 
-    Transforms must not be sent before: their stamps in wall time would be newer than the stamps of later transforms.
+    Transforms must not be sent earlier: with wall-time stamps, they would look newer than all later transforms.
     """
     return not rospy.Time.now().is_zero()
 

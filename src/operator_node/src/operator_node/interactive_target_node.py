@@ -21,7 +21,7 @@ AXES = {"x": (HALF_TURN, 0.0, 0.0), "y": (0.0, 0.0, HALF_TURN), "z": (0.0, HALF_
 
 
 class InteractiveTargetConfig(ConfigModel):
-    """A TF frame that is dragged in RViz."""
+    """Names, initial pose and handles of a TF frame that the user drags in RViz."""
 
     parent_frame_id: FrameId = Field(description="Parent frame.")
     child_frame_id: FrameId = Field(description="Its name.")
@@ -57,7 +57,7 @@ class InteractiveTarget:
 
 
 def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
-    """Returns an interactive marker with handles that translate the frame along its axes and rotate it about them."""
+    """Returns an interactive marker with handles for translations along, and rotations about, the frame's axes."""
     marker = InteractiveMarker(name=config.child_frame_id, scale=config.size_m)
     marker.header.frame_id = config.parent_frame_id
     marker.pose = as_pose(transform_message(config.position, config.quat_xyzw))

@@ -57,7 +57,7 @@ def reconstruct_interface_log_msg(msg: Any, Nd: int) -> tuple[NDArray[np.float64
     """Returns the times and signals of a message of `operator_node/window`.
 
     Args:
-        msg: Message whose `data` hold the records: for each record a time followed by `Nd` values.
+        msg: Message whose `data` contain the records. Each record is a time [s] followed by `Nd` values.
         Nd: Number of values in each signal.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Moves a frame within a box by velocity signals of a user."""
+"""Moves a frame within a box-shaped workspace, as commanded by a user's velocity signals."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class TeleopConfig(ConfigModel):
 
     @property
     def box(self) -> tuple[tuple[float, float], ...]:
-        """Limits of x, y, z [m]."""
+        """Lower and upper limits of x, y and z [m]."""
         return self.xlim, self.ylim, self.zlim
 
 
@@ -71,14 +71,14 @@ class TeleopPose(NamedTuple):
 
 
 class Teleop:
-    """Moves a frame by a velocity signal. Only `reset` changes the frame's pose at once.
+    """Moves a frame by a velocity signal. Only `reset` makes the frame's pose jump.
 
-    A step never counts more than `LATE_PERIODS` periods. The frame therefore never moves by more than
-    `max_speed * LATE_PERIODS / hz` [m] in one step. Times are seconds of a clock that never goes back.
+    A late step covers at most `LATE_PERIODS` periods of `1/hz`. The frame therefore never moves by more than
+    `max_speed * LATE_PERIODS / hz` [m] in one step. All times are on a clock that never goes backwards.
 
     Args:
         config: Names of the frame and its parent, and the limits of the motion.
-        timeout_s: Time after which a signal ends if no other signal follows [s]; 0 means never.
+        timeout_s: Time after which a signal expires if no other signal follows [s]. With 0, signals never expire.
 
     Attributes:
         pose: Pose of the frame in its parent.
@@ -91,7 +91,7 @@ class Teleop:
         self._commanded_s = self._stepped_s = -math.inf
 
     def command(self, signal: Sequence[float], now_s: float) -> bool:
-        """Sets the velocity until the next signal. Returns whether the velocity was reduced to the limits.
+        """Sets the frame's velocity until the next signal. Returns whether the velocity was reduced to the limits.
 
         Args:
             signal: Velocity along x, y, z of the parent [m/s], optionally followed by the rates of roll, pitch and yaw

@@ -1,4 +1,4 @@
-"""`teleop_tf_node.py`: moves and broadcasts a TF frame by the velocity signals of a user."""
+"""`teleop_tf_node.py`: broadcasts a TF frame that a user moves by velocity signals."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ NAME = "teleop_tf_node"
 
 
 class TeleopParameters(StartParameters):
-    """Time after which a teleoperated frame stops without a signal."""
+    """Private parameters of `teleop_tf_node.py`: initial state of the teleoperation, and time-out of the signals."""
 
     input_timeout_s: SecondsOrOff = Field(
         0.5,
@@ -39,7 +39,7 @@ class TeleopParameters(StartParameters):
 class TeleopTf:
     """Moves a frame by `operator_node/signal`, and broadcasts the frame, while the teleoperation is switched on.
 
-    A reset broadcasts the frame in any case.
+    While it is switched off, the frame is broadcast after each reset, or always if `broadcast_always` is set.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.
@@ -104,7 +104,7 @@ class TeleopTf:
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
-        """Broadcasts the frame unless ROS time is paused. TF warns about a second transform with the same stamp."""
+        """Broadcasts the frame, unless it was already broadcast with the present stamp, which TF would warn about."""
         if rospy.Time.now() != self._broadcast_at:
             self._broadcast()
 

@@ -57,7 +57,7 @@ class Retargeting:
 
     Args:
         offsets: Origin of each segment of the avatar in its parent's frame (23 x 3) [m].
-        place: Place of the avatar at the first frame; None: the place of the person.
+        place: Initial place of the avatar, at the first frame; None: the place of the person.
     """
 
     def __init__(self, offsets: Array, place: AvatarPlace | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Table of the input devices; a new device needs a class in a file of its own and a line in this table."""
+"""Table of the input devices. A new device needs a class in a file of its own and a line in this table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from operator_node.device import Device

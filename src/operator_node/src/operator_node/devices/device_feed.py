@@ -1,4 +1,4 @@
-"""Keeps a device open, checks its readings, and publishes the valid ones."""
+"""Keeps a device open, checks the device's readings, and publishes the valid readings."""
 
 import logging
 import math
@@ -47,12 +47,12 @@ class FeedConfig(ConfigModel):
 
 
 class DeviceFeed:
-    """Keeps a device open, checks its readings, and publishes them.
+    """Keeps a device open, checks the device's readings, and publishes the valid readings.
 
-    The feed tries to open an absent device once a second. The first published reading after opening is at rest. Each
-    axis and button is published as at rest until the device has reported it at rest. An axis that is held while the
-    device is plugged in therefore does not cause a motion. `held` names such axes and buttons. When the device
-    disconnects or is closed, a last reading at rest is published.
+    The feed tries to open an absent device once a second. The first published reading after opening is at rest. After
+    opening, each axis and button is published as at rest until the device has reported it at rest once. An axis that
+    is held while the device is plugged in therefore does not cause a motion. `held` names such axes and buttons. When
+    the device disconnects or is closed, a last reading at rest is published.
 
     Invalid readings are counted and dropped, and the last valid reading remains in effect. The feed catches exceptions
     of the device, except those documented for `step`.
@@ -68,9 +68,9 @@ class DeviceFeed:
     Attributes:
         problem: Reason why the device is not open; None while it is open.
         published: Number of published readings.
-        refused: Number of refusals for each reason.
-        free_axes: Indices of the axes that have been at rest since the device was opened.
-        held: Axes and buttons that have not been at rest since the device was opened, such as "axis 'x'".
+        refused: Number of refusals, keyed by reason.
+        free_axes: Indices of the axes that have been at rest at least once since the device was opened.
+        held: Axes and buttons that have not yet been at rest since the device was opened, such as "axis 'x'".
     """
 
     def __init__(self, name: str, device: Device, config: FeedConfig, publish: Callable[[Reading], None]) -> None:
@@ -96,7 +96,7 @@ class DeviceFeed:
 
         Args:
             is_over: Function that is called before each step. The loop ends when it returns True.
-            period_s: Longest time that one step waits [s]. A posted action waits for at most this time.
+            period_s: Longest time that one step waits [s]. Posted actions are delayed by at most this time.
 
         Raises:
             MissingDependency: If the device needs a library that is not installed.
@@ -213,8 +213,8 @@ class DeviceFeed:
     def _next(self, timeout_s: float) -> Reading | None:
         """Returns the next reading, merged with the readings that follow within `coalesce_interval`.
 
-        Merging ends early at a reading with other buttons, with events or with refusals. Returns None if there is no
-        reading within the timeout.
+        Merging ends early at a reading with changed buttons, events or refusals. Returns None if no reading arrives
+        within the timeout.
         """
         first = self._read(timeout_s)
         if first is None or first.buttons != self._buttons:
@@ -256,9 +256,9 @@ class DeviceFeed:
             self._emit(reading)
 
     def _from_rest(self, reading: Reading) -> Reading:
-        """Returns the reading with axes and buttons at rest that have not been at rest since the device was opened.
+        """Sets axes and buttons to rest that have not yet been at rest since the device was opened.
 
-        Also updates `free_axes` and `held`.
+        Also updates `free_axes` and `held`. Returns the changed reading.
         """
         resting = self._resting().axes
         for index, (value, rest) in enumerate(zip(reading.axes, resting)):
@@ -301,12 +301,12 @@ class DeviceFeed:
 
 
 def held_text(held: Sequence[str]) -> str:
-    """Returns a warning text about axes and buttons that have not been at rest since the device was opened."""
+    """Returns a warning text about axes and buttons that have not yet been at rest since the device was opened."""
     return f"{', '.join(held)} not at rest since it was opened; release it: until then it counts as at rest"
 
 
 def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) -> str | None:
-    """Returns why a reading is invalid, or None if it is valid.
+    """Returns the reason why a reading is invalid; None if the reading is valid.
 
     The reasons do not contain measured values, so that equal faults can be counted together.
 

@@ -31,13 +31,13 @@ SENDING_S = 0.1
 
 
 class DeviceParameters(ConfigModel):
-    """Selection of the device."""
+    """Selection of the input device that the node reads."""
 
     device: Text = Field(description="A name of the table, or `their_package.module:Class`.")
 
 
 class CueConfig(ConfigModel):
-    """Scaling of force cues."""
+    """Scaling of forces that an input device renders, for example by rumbling."""
 
     cue_full_scale: Positive = Field(
         20.0, description="Force that is rendered with the full strength of the device [N]."
@@ -82,9 +82,7 @@ class DeviceNode:
         rospy.signal_shutdown("its device was closed")
 
     def _end(self) -> None:
-        """Ends the loop that reads the device, and waits until the last reading is sent, before ROS closes the
-        topics.
-        """
+        """Ends the loop that reads the device. Waits until the last reading is sent, before ROS closes the topics."""
         self._is_ending.set()
         if self._has_ended.wait(LAST_READING_S):
             threading.Event().wait(SENDING_S)

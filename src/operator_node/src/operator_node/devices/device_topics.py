@@ -30,7 +30,7 @@ class DeviceTopics:
     """Base class that publishes a device's events and subscribes to the device's inputs, on topics other than `joy`.
 
     Args:
-        device: The device, which may only be changed through `post`.
+        device: The device. Its state may be changed only by actions passed to `post`.
         post: Function that schedules an action in the thread that reads the device.
     """
 
@@ -42,7 +42,7 @@ class DeviceTopics:
 
 
 class JoystickTopics(DeviceTopics):
-    """Lets messages on `joy/set_feedback` rumble the joystick, and messages on `joy/virtual` move a virtual gamepad."""
+    """Rumbles the joystick as `joy/set_feedback` requests, and moves a virtual gamepad by messages on `joy/virtual`."""
 
     device: Joystick
 

@@ -29,7 +29,7 @@ def _numbered(path: str) -> str:
 
 
 class JoystickConfig(ConfigModel):
-    """Selection and reading of a joystick.
+    """Selection of a joystick, and treatment of its axes and buttons.
 
     `dev`, `dev_name`, `deadzone` and `sticky_buttons` are named as in ROS's `joy_node`.
     """
@@ -209,8 +209,8 @@ def axis_of(raw: int, deadzone: float) -> float:
 
     Args:
         raw: Raw value of the axis.
-        deadzone: Share of the range to either side within which the axis is 0; beyond it, the magnitude rises linearly
-            to 1 at the end of the range.
+        deadzone: Fraction of the range on either side within which the axis is 0. From the edge of the dead zone to
+            the end of the range, the magnitude rises linearly from 0 to 1.
     """
     beyond = max(0.0, abs(raw) - FULL * deadzone)
     return -math.copysign(min(1.0, beyond / (FULL * (1.0 - deadzone))), raw) if beyond else 0.0

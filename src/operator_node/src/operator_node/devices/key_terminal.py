@@ -53,7 +53,7 @@ class KeyTerminal:
     about half a second, so `hold_s` should be longer.
 
     Args:
-        keys: Receives the keys.
+        keys: Object that is informed of each key that goes down or up.
         hold_s: Time for which a key counts as held after the terminal sent it [s].
 
     Raises:

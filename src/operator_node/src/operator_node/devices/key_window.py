@@ -85,7 +85,7 @@ NAME_OF_CODE = {code: name for name, code in KEY_CODES.items()}
 
 
 def code_of(name: str, number: int) -> int:
-    """Returns the key code for the name and the number of an X symbol; 0 if the symbol has no key code."""
+    """Returns the key code for the X keysym with a name and a number; 0 if the keysym has no key code."""
     if name in NAMES:
         return KEY_CODES[NAMES[name]]
     code = ord(chr(number).lower()) if ord("A") <= number <= ord("Z") else number
@@ -93,7 +93,7 @@ def code_of(name: str, number: int) -> int:
 
 
 class PendingRelease(NamedTuple):
-    """A key that X reported as going up; the key counts as still held if X reports a press with the same time stamp.
+    """A key that X reported as released. The key is still held if X then reports a press with the same time stamp.
 
     Attributes:
         keycode: X's number for the position of the key on the keyboard.
@@ -109,10 +109,10 @@ class PendingRelease(NamedTuple):
 
 
 class KeyWindow:
-    """A window that records the keys that are pressed while it has the focus, and shows which keys are held.
+    """A window that shows which keys are held. It records the keys that are pressed while the window has the focus.
 
     Args:
-        keys: Receives the keys.
+        keys: Object that is informed of each key that goes down or up.
         explanation: Lines of text that the window shows below the held keys.
 
     Raises:
@@ -153,7 +153,7 @@ class KeyWindow:
         self._window.close()
 
     def _is_due(self) -> bool:
-        """Returns whether a key that X reported as going up counts as released."""
+        """Returns whether the pending release is due, so that the key counts as released."""
         return self._pending is not None and time.monotonic() >= self._pending.due_s
 
     def _press(self, event: "Event[Misc]") -> None:

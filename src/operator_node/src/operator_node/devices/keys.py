@@ -148,7 +148,7 @@ class KeyAxes:
         self._buttons = [KEY_CODES[name] for name in buttons]
 
     def reading(self, held: Collection[int]) -> Reading:
-        """Returns the axes and buttons for the codes of the held keys."""
+        """Returns the axes and buttons that result from the codes of the held keys."""
         axes = tuple(float((positive in held) - (negative in held)) for negative, positive in self._axes)
         return Reading(axes, tuple(int(code in held) for code in self._buttons))
 

@@ -23,7 +23,7 @@ HELP = "drag: x, y    wheel: z    release: stop"
 
 
 class MouseConfig(ConfigModel):
-    """Scaling of the wheel."""
+    """Step width and return time of the wheel's axis."""
 
     wheel_step: Fraction = Field(0.25, description="Distance that one notch of the wheel moves its axis.")
     wheel_return_s: Seconds = Field(0.3, description="Time after the last notch at which that axis returns to 0.")
@@ -34,7 +34,7 @@ class Mouse(Device):
 
     The axes `x` (to the right) and `y` (up) are the displacement from the point where the left button went down,
     divided by half the width and half the height of the window. Both axes are 0 while the left button is not held. The
-    axis `wheel` is positive away from the user. It returns to 0 at the time `wheel_return_s` after the last notch.
+    axis `wheel` is positive away from the user, and returns to 0 `wheel_return_s` after the last notch.
     """
 
     Config = MouseConfig
@@ -122,7 +122,7 @@ class Mouse(Device):
         return max(canvas.winfo_width(), 2) / 2, max(canvas.winfo_height(), 2) / 2
 
     def _draw(self) -> None:
-        """Draws the displacement as an arrow from the center, the wheel's axis as a bar, and the instructions."""
+        """Draws the displacement as an arrow from the centre, the wheel's axis as a bar, and instructions as text."""
         if self._window is None:
             return
         canvas = self._window.canvas

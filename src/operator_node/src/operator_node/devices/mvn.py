@@ -23,7 +23,7 @@ logger = logging.getLogger(__name__)
 class HandAxes:
     """Computes the displacements of both hands, forward, left and up, since the frame in which they were engaged.
 
-    The displacements are relative to the pelvis and its heading. Their unit is the arm's length.
+    The displacements are relative to the pelvis and its heading, and are divided by the arm's length.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class HandAxes:
         self._engaged = None
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
-        """Returns the values of `AXES`, each in [-1, 1]. Disengaged hands are engaged, and their values are 0."""
+        """Returns the values of `AXES`, each in [-1, 1]. If the hands are disengaged, engages them and returns 0."""
         places = _places(frame)
         if self._engaged is None:
             lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)
@@ -51,13 +51,13 @@ def _places(frame: SegmentFrame) -> Array:
 
 
 class Mvn(Device):
-    """People whose motion MVN streams.
+    """Hands of a person, whose motion is captured and streamed by Xsens MVN.
 
     The axes are the displacements of the right and the left hand of person 0, forward, left and up, since the first
-    frame. They are relative to the pelvis and its heading, and their unit is the arm's length. The events are those of
-    `Receiver.poll` except `Refused`. The device is open as soon as it listens, even without a sender.
+    frame. The displacements are relative to the pelvis and its heading, and are divided by the arm's length. The events
+    are those of `Receiver.poll` except `Refused`. The device is open as soon as it listens, even without a sender.
 
-    When the stream ceases, the device reports a `Silence` and a reading at rest. The next frame is then the new first
+    When the stream ceases, the device reports a `Silence` and a reading at rest. Displacements then count from the next
     frame.
     """
 
@@ -73,7 +73,7 @@ class Mvn(Device):
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of datagrams for each result of their processing."""
+        """Number of datagrams, keyed by result, see `StreamDecoder`."""
         return self.receiver.counts
 
     def open(self) -> None:

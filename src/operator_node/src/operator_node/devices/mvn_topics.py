@@ -40,7 +40,7 @@ RECENT_S = 5.0
 
 
 class MvnTopicsConfig(ConfigModel):
-    """Private parameters of the node that publishes people from MVN."""
+    """Private parameters of the node that publishes the people captured by MVN."""
 
     parent_frame_id: FrameId = Field("rpbi/world", description="TF frame of MVN's world.")
     recording_folder: Text = Field("~/mvn", description="Folder for the files that `mvn/record` writes.")

@@ -59,10 +59,10 @@ class SpacenavConfig(ConfigModel):
 
 
 class Spacenav(Device):
-    """A 6-D mouse.
+    """A 6-D mouse, read from the daemon spacenavd.
 
     The axes are the translations along x (forward), y (left) and z (up), followed by the rotations about x, y and z,
-    each as a share of `full_scale`.
+    each divided by `full_scale`.
     """
 
     Config = SpacenavConfig
@@ -237,7 +237,7 @@ class Spacenav(Device):
             self.buttons = [*map(str, range(len(self._pressed)))]
 
     def _zero_static_axes(self) -> None:
-        """Sets the axes to 0 after a time without motion events, as configured."""
+        """Sets the axes to 0 after the configured time without motion events."""
         config = self.config
         linear, angular = self._motion[:3], self._motion[3:]
         if config.zero_when_static or all(abs(each) < config.static_trans_deadband for each in linear):

@@ -71,7 +71,8 @@ class VirtualJoystick:
         """Sets the first axes and buttons to the given values, and leaves the remaining ones unchanged.
 
         Args:
-            axes: Values in [-1, 1] of the first axes, in the order of the class; the hat is set if all 8 are given.
+            axes: Values in [-1, 1] of the first axes, in the order given in the class's docstring. The hat is set only
+                if all 8 values are given.
             buttons: States of the first buttons, in SDL's order; 0 means released.
         """
         for index, value in enumerate(axes[:AXES]):

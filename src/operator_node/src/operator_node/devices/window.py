@@ -44,7 +44,7 @@ class DeviceWindow:
         self._root.bind(sequence, callback)
 
     def show(self) -> None:
-        """Shows the window at once, without processing events of the user, which `wait` does."""
+        """Shows the window at once. Does not process events of the user."""
         self._root.update_idletasks()
 
     def focus(self) -> None:
@@ -69,7 +69,7 @@ class DeviceWindow:
             raise DeviceClosedError(self._device, "its window was closed")
 
     def _failure_of_waiting(self, timeout_s: float) -> str:
-        """Processes events as `wait` does. Returns the reason of a failure, or an empty text."""
+        """Processes events as `wait` does. Returns the reason for a failure, or an empty text."""
         interpreter = self._root.tk
         try:
             is_over: list[bool] = []

@@ -1,4 +1,4 @@
-"""Emulates the service of a Haply Inverse3, with a hand on the device. Messages and port are those of the service."""
+"""Emulates the service of a Haply Inverse3, with a hand on the device. Messages and port equal the real service's."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class HaplyEmulator:
         self.force = ZERO
 
     def _obey(self, message: str | bytes) -> None:
-        """Simulates the time since the last message, and then applies the sum of the forces in this message."""
+        """Simulates the time since the last message. Then applies the forces in this message, added up."""
         self._pass_time()
         force = ZERO
         for device in json.loads(message).get("inverse3", []):

@@ -264,7 +264,7 @@ def main() -> int:
 
 
 def _person(options: argparse.Namespace, number: int) -> WalkingPerson | ArmHeldOut:
-    """Returns the person with a number. Each person is beside the previous person, and a little smaller."""
+    """Creates person `number`. Each person stands beside the previous person, and is a little smaller."""
     height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -SPACING_M * number)
     if options.arm_held_out:
         return ArmHeldOut(height_m, options.seed, start, options.t_pose)

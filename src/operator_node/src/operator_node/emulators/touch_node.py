@@ -1,4 +1,4 @@
-"""`touch_emulator.py`: emulates the driver of a Touch, with a hand on the device.
+"""`touch_emulator.py`: emulates the ROS driver of a 3D Systems Touch, with a hand on the device.
 
 Like the real driver, the emulator holds the last force forever.
 """
@@ -31,7 +31,7 @@ STEP_S = 0.001
 
 
 class TouchEmulator:
-    """Publishes the states of a simulated handle, and applies received forces to it, without limits and time-out."""
+    """Publishes the states of a simulated handle, and applies received forces to the handle. Forces are not limited."""
 
     def __init__(self) -> None:
         self._driver = rospy.get_param("~driver", "omni")

@@ -21,7 +21,7 @@ from .coupling import Mode
 
 
 class ForceFeedbackConfig(ConfigModel):
-    """Parameters of the mapping from handle to tool, and of the rendered forces."""
+    """Parameters of the mapping from the handle's motion to the tool's, and of the forces rendered on the handle."""
 
     mode: Mode = Field("wrench", description="Rendered force: the force on the tool, or a spring to its position.")
     stiffness: Positive = Field(200.0, description="Stiffness of the spring of `mode: coupling` [N/m].")

@@ -25,7 +25,7 @@ class ForceLimiter:
     The direction of a force stays unchanged, so a braking force still brakes. A force may decrease at any rate.
 
     Args:
-        max_force_n: Largest force [N].
+        max_force_n: Force limit [N].
         slew_n_per_s: Largest rate at which a force may grow [N/s].
 
     Attributes:
@@ -38,7 +38,10 @@ class ForceLimiter:
         self.not_finite = 0
 
     def limited(self, force: Vector, dt_s: float) -> Vector:
-        """Returns the limited force [N]; `dt_s` is the time since the last call [s]."""
+        """Returns the limited force [N], which is zero if `force` is not finite.
+
+        `dt_s` is the time since the last call [s].
+        """
         length = norm(force)
         if not math.isfinite(length):
             self.not_finite += 1
@@ -64,7 +67,7 @@ class Snapshot(NamedTuple):
         reading: The reading.
         velocity: Velocity of the handle, in the device's axes [m/s].
         deviation: Displacement of the handle since it was engaged, in the device's axes [m]; 0 while disengaged.
-        displacement: Displacement of the target since the start, in the tool's axes [m].
+        displacement: Displacement of the target from its start, in the tool's axes [m].
         force: Force that is sent to the device, in the device's axes [N].
         is_engaged: Whether handle and tool are coupled.
         time_s: Time of the reading, by the monotonic clock [s].
@@ -96,7 +99,7 @@ class HapticController:
         force: Force that is sent to the device now, in the device's axes [N].
         fault: Fault of the last reading; empty if the last reading was valid.
         faults: Number of refused readings, keyed by fault.
-        snapshot: Result for the last reading; None before the first.
+        snapshot: Result for the last valid reading; None before the first valid reading.
         stiffness_bound: Stiffness up to which a virtual wall is passive without the passivity controller [N/m].
     """
 
@@ -137,18 +140,18 @@ class HapticController:
         self.awaits_reset = False
 
     def observe_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Updates the force on the tool, in the tool's axes [N], finite; `delay_s` is the age of the force [s]."""
+        """Updates the force on the tool [N], finite and in the tool's axes. `delay_s` is the age of the force [s]."""
         if self._config.mode == "wrench":
             self.coupling.observe(turned_about_z(force, -self._yaw), now_s, delay_s)
 
     def observe_tool(self, displacement: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Updates the tool's displacement from its start, in the tool's axes [m]; `delay_s` is the sample's age [s]."""
+        """Updates the tool's displacement from its start, in the tool's axes [m]. `delay_s` is the sample's age [s]."""
         if self._config.mode == "coupling":
             self._tool_displacement = self._handle_displacement(displacement)
             self.coupling.observe(self._tool_displacement, now_s, delay_s)
 
     def reset(self) -> None:
-        """Moves the target back to its start. From there, the target follows the handle again."""
+        """Makes the target move back to its start, from where the target follows the handle again."""
         self.awaits_reset = True
 
     def lose(self) -> None:
@@ -227,7 +230,7 @@ class HapticController:
         )
 
     def _handle_displacement(self, displacement: Vector) -> Vector:
-        """Converts a displacement of the tool to one of the handle [m]. Components with motion scale 0 become 0."""
+        """Converts a displacement of the tool to a displacement of the handle [m]. Axes with motion scale 0 get 0."""
         x, y, z = (part / scale if scale else 0.0 for part, scale in zip(displacement, self._config.motion_scale))
         return turned_about_z((x, y, z), -self._yaw)
 

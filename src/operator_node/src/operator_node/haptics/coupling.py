@@ -12,7 +12,7 @@ class Clutch:
     """Couples handle and tool. While the clutch is engaged, the tool moves by the displacement of the handle.
 
     Args:
-        button: Index of the button that engages the clutch while it is held; None engages it always.
+        button: Index of the button that must be held to engage the clutch; None: the clutch is always engaged.
 
     Attributes:
         engaged: Whether handle and tool are coupled.
@@ -30,9 +30,7 @@ class Clutch:
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Updates the clutch with position [m] and buttons of the handle. Returns True if this call engaged handle and
-        tool.
-        """
+        """Updates the clutch with position [m] and buttons of the handle. Returns whether this call has engaged it."""
         is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
@@ -44,16 +42,16 @@ class Clutch:
         return False
 
     def release(self) -> None:
-        """Disengages the handle. The tool keeps its position. If the button is held, the next update engages again."""
+        """Disengages the handle. The tool keeps its position. If the button is held, the next update engages both."""
         self._kept, self.deviation, self.engaged = self.displacement, ZERO, False
 
     def set_displacement(self, displacement: Vector) -> None:
-        """Disengages the handle, and sets the displacement of the tool before the motion scale is applied [m]."""
+        """Disengages the handle, and sets the tool's displacement [m]. The motion scale is not yet applied to it."""
         self._kept, self.engaged, self.deviation = displacement, False, ZERO
 
 
 class TargetFollower:
-    """Lets the target of the tool follow the handle, at a limited speed and within a box.
+    """Moves the target of the tool after the handle, at a limited speed and within a box-shaped workspace.
 
     Args:
         scale: Displacement of the tool per metre of the handle's displacement, for each axis; 0 fixes an axis.
@@ -67,7 +65,7 @@ class TargetFollower:
         self.displacement: Vector = ZERO
 
     def follow(self, displacement: Vector, dt_s: float) -> Vector:
-        """Moves the target towards a displacement of the handle [m]; returns the target's displacement [m].
+        """Moves the target towards the scaled displacement of the handle. Returns the target's displacement [m].
 
         Args:
             displacement: Displacement of the handle, in the tool's axes [m].
@@ -81,7 +79,7 @@ class TargetFollower:
         return self.displacement
 
     def limited(self, displacement: Vector) -> Vector:
-        """Returns a displacement clipped to the box."""
+        """Clips a displacement of the target to the workspace [m]."""
         (ax, ay, az), (bx, by, bz) = self._low, self._high
         return min(max(displacement[0], ax), bx), min(max(displacement[1], ay), by), min(max(displacement[2], az), bz)
 
@@ -101,7 +99,7 @@ def stiffest_n_per_m(device_damping: float, coupling_damping: float, period_s: f
 
 
 class ToolSample(NamedTuple):
-    """Last sample of the tool from the simulator, in the device's axes.
+    """Sample of the tool's force or displacement from the simulator, in the device's axes.
 
     Attributes:
         value: Force on the tool [N], or displacement of the tool divided by the motion scale [m].
@@ -163,7 +161,7 @@ class VirtualCoupling:
         return float("inf") if last is None else now_s - last.arrived_s + last.delay_s
 
     def freshness(self, now_s: float) -> float:
-        """Returns the weight of the last sample: 1, falling to 0 during the second half of `expiry_s`."""
+        """Returns the weight of the last sample. It is 1 at first, and falls to 0 in the second half of `expiry_s`."""
         last = self._last
         if last is None:
             return 0.0
@@ -174,7 +172,7 @@ class VirtualCoupling:
         """Returns the force to render, in the device's axes [N].
 
         Args:
-            position: `Clutch.displacement` [m].
+            position: Value of `Clutch.displacement` [m].
             velocity: Velocity of the handle [m/s].
             now_s: Present time, by the monotonic clock [s].
         """

@@ -17,7 +17,7 @@ class HapticReading(NamedTuple):
         position: Position of the handle relative to the middle of the workspace [m].
         velocity: Velocity of the handle as measured by the device [m/s]; None if the device does not measure velocity.
         quat_xyzw: Orientation of the handle, x, y, z, w.
-        buttons: 1 for each button that is held, 0 for the others.
+        buttons: For each button, 1 while the button is held, otherwise 0.
     """
 
     position: Vector
@@ -27,7 +27,7 @@ class HapticReading(NamedTuple):
 
 
 class ReadingError(ValueError):
-    """A device sent invalid data. `fault` is a short name of the kind of error, under which errors are counted."""
+    """A device sent invalid data. `fault` is a short name for the kind of error, by which errors are counted."""
 
     def __init__(self, fault: str, message: str) -> None:
         self.fault = fault
@@ -39,7 +39,7 @@ class DeviceEnded(DeviceError):  # noqa: N818 (nothing went wrong)
 
 
 class HapticConfig(ConfigModel):
-    """Properties of a haptic device."""
+    """Options that all haptic devices have: force limit, workspace, and properties of the device and of a hand."""
 
     max_force_n: Positive = Field(description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(description="Radius of its workspace, the unit of the axes of `joy`.")

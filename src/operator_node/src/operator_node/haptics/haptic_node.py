@@ -57,7 +57,7 @@ class HapticNode:
         WallTimer(config.state_hz, lambda: self._state.publish(self.loop.report))
 
     def run(self) -> None:
-        """Waits until the user has finished with the device, or ROS shuts down.
+        """Waits until the device has ended, for example because the user closed it, or until ROS shuts down.
 
         Raises:
             InterfaceError: If the loop's process ends repeatedly.

@@ -180,7 +180,7 @@ class ToolFeed:
         self._look_up_sensor()
 
     def _look_up_sensor(self) -> None:
-        """Looks up the orientation of the frame in which forces are given, in TF."""
+        """Looks up in TF the orientation of the frame in which the forces are given."""
         frame = self._frame.strip("/")
         if not frame:
             return

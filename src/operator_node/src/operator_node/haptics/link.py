@@ -57,7 +57,8 @@ class Setup(NamedTuple):
         options: Options of the device.
         config: Parameters of the mapping and the forces, and the rate of reports.
         command: The present command.
-        displacement: Displacement of the target from its start, in the tool's axes [m]; not 0 after a restart.
+        displacement: Initial displacement of the target from its start, in the tool's axes [m]. It is not 0 if the
+            process is restarted after a crash.
     """
 
     device: type[HapticDevice]
@@ -108,8 +109,8 @@ class LoopReport(NamedTuple):
 class Link:
     """Sends and receives picklable objects over a connected socket that preserves messages (SOCK_SEQPACKET).
 
-    The kernel buffers some 200 unread messages and drops further messages. When a process ends, for whatever reason,
-    the kernel closes its end of the connection at once.
+    The kernel buffers some 200 unread messages; further messages are dropped. When a process ends for any reason, the
+    kernel closes that process's end of the connection at once.
 
     Args:
         connection: The socket. The link closes it.

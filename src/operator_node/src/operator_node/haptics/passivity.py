@@ -24,7 +24,7 @@ class PassivityController:
     therefore take the energy below zero by F a dt^2, with the largest force F. This amount is the leak. Every force is
     shortened such that the energy stays above `floor_j`.
 
-    Resolution: Each measured position has an error of up to e, half the diagonal of a cube of the device's steps. A
+    Resolution: Each measured position has an error of up to e, half the diagonal of a cube with edge `resolution_m`. A
     measured displacement may therefore differ from v dt by another 4 e. Summation by parts shows two errors of the
     energy: e times the last force, and e times each change of the force. The controller subtracts the second error from
     the energy, and reserves the energy needed to release the force. The leak is then F (a dt^2 + 5 e).

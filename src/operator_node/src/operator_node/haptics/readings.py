@@ -73,7 +73,7 @@ class ReadingCheck:
         return reading
 
     def _possible(self, reading: HapticReading) -> HapticReading:
-        """Does the checks that do not depend on earlier readings; returns the reading with a normalized quaternion."""
+        """Makes the checks that need no earlier readings. Returns the reading with a normalized quaternion."""
         position, velocity, quat, _ = reading
         if not math.isfinite(sum(position) + sum(quat) + sum(velocity or ZERO)):
             raise ReadingError("not finite", f"position {position}, velocity {velocity}, quaternion {quat}")

@@ -19,7 +19,7 @@ QUEUE_SIZE = 100
 
 
 class LoggerParameters(ConfigModel):
-    """Time span of the window, and rate at which the window is published."""
+    """Time span of the signals in a message, and rate at which messages are published."""
 
     window_duration: Seconds = Field(1.0, description="Time span shown in the window.")
     hz: HzOrOff = Field(

@@ -8,9 +8,9 @@ from .scale import ScaleConfig
 
 
 class IsometricMapping(Mapping):
-    """Limits the vector a of the axes to length 1, then scales it: `scale * min(n, 1) / n * a`, where n is its length.
+    """Shortens the vector of the selected axes to length 1 if it is longer, and multiplies the result by `scale`.
 
-    If `scale` is a list, it has one factor for each axis. For example, `[-0.2, 0.2, 0.2]` reverses the first axis.
+    `scale` may be a list with one factor for each axis. For example, `[-0.2, 0.2, 0.2]` reverses the first axis.
     """
 
     Config = ScaleConfig

@@ -28,14 +28,14 @@ If a press arrives later and has an earlier stamp than the release, the clock wa
 
 
 class KeyboardToJoyConfig(ConfigModel):
-    """Keys that act as axes and buttons."""
+    """Keys of a keyboard that act as the axes and buttons of a joystick."""
 
     axes: ListOf[KeyPair] = Field(description="For each axis, the key that makes it -1 and the key that makes it 1.")
     buttons: ListOf[KeyName] = Field((), description="The key of each button.")
 
 
 class KeyboardToJoyParameters(ConfigModel):
-    """Rate of the messages, and time for which keys count as held."""
+    """Rate of the messages on `joy`, and longest time for which a key counts as held."""
 
     hz: Hz = Field(100.0, description="Rate, in wall time; a key that goes down or up is published at once.")
     key_timeout_s: SecondsOrOff = Field(
@@ -49,7 +49,7 @@ class KeyboardToJoy:
     """Publishes `joy` from `keyboard/keydown` and `keyboard/keyup`, at a fixed rate and whenever a key changes.
 
     Repeated presses, and releases without a press, change nothing. Messages on the two topics may arrive in wrong
-    order: a press whose stamp is earlier than that of an earlier received release is ignored. When the keyboard's node
+    order. A press is therefore ignored if a release with a later stamp has already arrived. When the keyboard's node
     ends, all keys count as released.
 
     Raises:

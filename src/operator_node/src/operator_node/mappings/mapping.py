@@ -11,7 +11,7 @@ from custom_ros_tools.schema import ConfigModel, Count, ListOf
 
 
 class AxesConfig(ConfigModel):
-    """Selection of a device's axes."""
+    """Selection of a device's axes, and their dead zone."""
 
     axes_idx: ListOf[Count] = Field(
         min_length=1, description="Indices of axes, from 0 on, in the order of the signal; one may occur twice."
@@ -25,7 +25,7 @@ class AxesConfig(ConfigModel):
     )
 
     def pick(self, axes: Sequence[float]) -> list[float]:
-        """Returns the values of the selected axes, after removal of the dead zone.
+        """Returns the values of the selected axes, with the dead zone applied.
 
         Raises:
             ValueError: If the device has too few axes.
@@ -56,7 +56,7 @@ class Mapping(ABC):
 
     @abstractmethod
     def map(self, axes: Sequence[float]) -> tuple[float, ...]:
-        """Returns the signal, `size` numbers, for the finite axes of a device.
+        """Maps the axes of a device, which are finite, to a signal of `size` numbers.
 
         Raises:
             ValueError: If the device has too few axes.

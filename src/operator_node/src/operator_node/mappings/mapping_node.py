@@ -13,7 +13,7 @@ from .operator_node import NAME, OperatorNode
 
 
 class MappingNode(OperatorNode):
-    """Publishes the signal that a mapping computes from the axes of `joy`.
+    """Publishes the signal that a mapping computes from the axes of the messages on `joy`.
 
     Args:
         name: Name of a mapping in the table `MAPPINGS`, or `"their_package.module:Class"`.
@@ -28,7 +28,7 @@ class MappingNode(OperatorNode):
         super().__init__()
 
     def callback(self, joy: Joy) -> None:
-        """Publishes the mapping's signal, see `OperatorNode.callback`."""
+        """Applies the mapping to a message and publishes the signal."""
         self.publish(self._mapping.map(joy.axes))
 
 
@@ -43,7 +43,7 @@ def isometric() -> None:
 
 
 def main() -> None:
-    """Runs the node with the mapping that is named by the program's argument."""
+    """Runs the node with the mapping that the program's argument names."""
 
     def make() -> MappingNode:
         arguments = rospy.myargv(sys.argv)[1:]

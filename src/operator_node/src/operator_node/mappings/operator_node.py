@@ -29,7 +29,7 @@ LOOK_HZ = 50.0
 
 
 class OperatorParameters(StartParameters, InputParameters):
-    """Parameters of the nodes that map a device."""
+    """Private parameters of the nodes that map a device's axes to a signal."""
 
     repeat_hz: HzOrOff = Field(
         20.0, description="Rate at which a nonzero signal is repeated while the input stays the same; 0 never repeats."
@@ -154,7 +154,7 @@ class OperatorNode(ABC):
                 self._send(self._in_force)
 
     def _send(self, values: Sequence[float]) -> None:
-        """Sends a signal, and returns after it was sent: rospy's own thread might lose the last signal at shutdown."""
+        """Sends a signal and waits until it is sent. rospy's own thread might lose the last signal at shutdown."""
         if self._sending is not None:
             self._sending.wrap_connections()
         self._publisher.publish(Float64MultiArray(data=values))

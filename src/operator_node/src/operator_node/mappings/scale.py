@@ -13,7 +13,7 @@ from .mapping import AxesConfig, Mapping
 
 
 class ScaleConfig(AxesConfig):
-    """The axes that make up the signal, and their factors."""
+    """Selection of a device's axes for the signal, and a factor for each axis."""
 
     scale: Annotated[
         ListOf[float],
@@ -36,7 +36,7 @@ class ScaleConfig(AxesConfig):
 
 
 class ScaleMapping(Mapping):
-    """Scales each axis independently: `scale * axes[axes_idx]`."""
+    """Multiplies each selected axis by a factor: `scale * axes[axes_idx]`."""
 
     Config = ScaleConfig
 

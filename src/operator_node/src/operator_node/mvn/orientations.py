@@ -40,8 +40,8 @@ def about_z(angle_rad: float) -> Array:
 class Calibration:
     """Corrects the orientations of segments by constant offsets, one for each segment and person.
 
-    With the offsets, all segments are upright in the pose of the calibration, and face the heading of the pelvis.
-    Positions stay unchanged.
+    In the calibration pose, all corrected segments are upright and have the heading of the pelvis. Positions stay
+    unchanged.
     """
 
     def __init__(self) -> None:

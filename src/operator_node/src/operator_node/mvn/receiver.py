@@ -29,7 +29,7 @@ REMARK_PERIOD_S = 1.0
 
 
 class MvnConfig(ConfigModel):
-    """Source and interpretation of MVN's stream."""
+    """Address and time-out of the stream from MVN, and the units and axes of its positions."""
 
     host: Text = Field("127.0.0.1", description="Address to listen at; 0.0.0.0 also receives from other computers.")
     port: int = Field(DEFAULT_PORT, ge=0, le=65_535, description="UDP port; 0 selects any free one.")

@@ -48,7 +48,7 @@ class HaplyConfig(HapticConfig):
 
 
 class HaplyDevice(HapticDevice):
-    """Exchanges messages with the service in a thread of its own, at 1 kHz: one force for each state."""
+    """Haply Inverse3. A separate thread exchanges forces and states with the device's service at 1 kHz."""
 
     Config = HaplyConfig
     config: HaplyConfig
@@ -81,7 +81,7 @@ class HaplyDevice(HapticDevice):
         """Returns the newest state; None if no new state has arrived since the last call.
 
         Raises:
-            DeviceError: If the connection to the service is lost.
+            DeviceError: If the connection to the service is lost, or the service accepts no forces any more.
             ReadingError: If the state is invalid.
         """
         frame, self._frame = self._frame, None
@@ -102,7 +102,7 @@ class HaplyDevice(HapticDevice):
         return HapticReading((y, -x, z), (vy, -vx, vz), (qy, -qx, qz, qw), state.buttons)
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Passes a force to the thread, which sends the force until it expires."""
+        """Passes a force to the thread, which sends the force repeatedly until the force expires."""
         self._command = force, expires_s
 
     def close(self) -> None:
@@ -151,7 +151,7 @@ class HaplyDevice(HapticDevice):
 class ForceKey:
     """Determines the JSON key under which the service accepts a force: `vector` or `values`.
 
-    The service's documentation uses `vector`, its examples use `values`.
+    The service's documentation uses `vector`; the service's examples use `values`.
 
     Args:
         key: `vector`, `values`, or `auto` to choose the key from the forces that the service reports back.

@@ -16,7 +16,7 @@ class HaplyState(NamedTuple):
         position: Position of the cursor [m].
         velocity: Velocity of the cursor [m/s].
         quat_xyzw: Orientation of the grip, x, y, z, w; identity without a grip.
-        buttons: 1 for each button of the grip that is held, 0 for the others.
+        buttons: For each button of the grip, 1 while the button is held, otherwise 0.
         force: Force of the device on the hand, as reported by the service [N].
     """
 
@@ -44,7 +44,7 @@ def device_in(frame: str | bytes, device_id: str) -> str:
     """Returns `device_id`, or the id of the first Inverse3 in a message if `device_id` is empty.
 
     Raises:
-        ReadingError: If the message has no Inverse3, or not the Inverse3 `device_id`.
+        ReadingError: If the message does not contain an Inverse3, or not the one with the id `device_id`.
     """
     known = [str(each.get("device_id", "")) for each in _entries(_message(frame), "inverse3")]
     if not known or (device_id and device_id not in known):

@@ -28,7 +28,7 @@ class ScriptedConfig(HapticConfig):
 
 
 class ScriptedDevice(EmulatedDevice):
-    """Presses and releases once, and ends."""
+    """Simulated device whose hand presses down and releases once. Then the device ends."""
 
     Config = ScriptedConfig
 

@@ -37,7 +37,7 @@ ENDED = "its ROS node was shut down"
 
 
 class TouchConfig(HapticConfig):
-    """Options of a Touch and its driver."""
+    """Options of a 3D Systems Touch and its ROS driver."""
 
     max_force_n: Positive = Field(3.0, description="Largest force that is sent to it [N]; the Touch X has 7.9.")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
@@ -54,9 +54,9 @@ class TouchConfig(HapticConfig):
 
 
 class TouchDevice(HapticDevice):
-    """Exchanges states and forces by topics; only the newest state counts.
+    """3D Systems Touch. Receives states from the ROS topics of its driver, and publishes forces to the driver.
 
-    The device turns its process into a ROS node. The loop's process therefore communicates with the driver directly,
+    The device turns the loop's process into a ROS node. This process therefore communicates with the driver directly,
     and sends zero force even if the haptic node has crashed.
     """
 
@@ -132,7 +132,7 @@ class TouchDevice(HapticDevice):
         return reading
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Publishes a force, at most `force_hz` times a second. Ignores the expiry: the driver holds the last force."""
+        """Publishes a force, at most `force_hz` times a second. Ignores `expires_s`: drivers hold the last force."""
         now_s = time.monotonic()
         if self._force is None or (force != ZERO and now_s - self._sent_s < 1.0 / self.config.force_hz):
             return

@@ -25,7 +25,7 @@ SHOW_S = 0.02
 
 
 class VirtualConfig(HapticConfig):
-    """Options of the virtual device, a window with a handle."""
+    """Options of the virtual device, a window in which the mouse moves a handle."""
 
     max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
@@ -38,9 +38,10 @@ class VirtualConfig(HapticConfig):
 
 
 class VirtualDevice(EmulatedDevice):
-    """A handle on a spring that the mouse pulls: a force moves it away from the mouse, and is drawn as an arrow.
+    """Window in which the mouse pulls a simulated handle by a spring. No hardware is needed.
 
-    The window runs in a separate process, so that drawing does not delay the loop.
+    A force deflects the handle from the mouse, and is drawn as an arrow. The window runs in a separate process, so that
+    drawing does not delay the loop.
     """
 
     Config = VirtualConfig
