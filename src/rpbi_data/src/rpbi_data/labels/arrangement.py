@@ -45,16 +45,16 @@ Array = npt.NDArray[np.float64]
 
 
 class Arrangement:
-    """Arranges the objects of a world: its rigid bodies without joints that are moved by physics.
+    """Arranges the objects of a world. Objects are the rigid bodies without joints that are moved by physics.
 
-    The objects fall into a rectangular area that contains their initial positions. The camera looks at a random point
+    The objects fall onto a rectangular area that contains their initial positions. The camera looks at a random point
     near the middle of this area.
 
     Args:
         world: The world in its initial state.
 
     Raises:
-        InterfaceError: If the world has no such object, or the visible surface of an object cannot be read.
+        InterfaceError: If the world has no objects, or the visible surface of an object cannot be read.
     """
 
     def __init__(self, world: World) -> None:
@@ -77,13 +77,13 @@ class Arrangement:
 
     @property
     def middle(self) -> Array:
-        """Middle of the area, at the height of the lowest point of the initial objects, shape (3,) [m]."""
+        """Middle of the area, at the height of the objects' lowest initial point, shape (3,) [m]."""
         return np.array([*(self._low + self._high) / 2.0, self._bottom])
 
     def settle(self, random: np.random.Generator) -> None:
         """Resets the world, lets the objects fall from random poses, and simulates until they are at rest.
 
-        An object that is farther than two radii of the area from the middle of the area counts as at rest, too.
+        Objects that are farther than twice the radius of the area from its middle count as at rest, even if they move.
 
         Raises:
             InterfaceError: If the objects do not come to rest in any of `ATTEMPTS` attempts.
@@ -108,7 +108,7 @@ class Arrangement:
         )
 
     def view(self, random: np.random.Generator, intrinsics: Intrinsics) -> Pose:
-        """Returns a random pose of a camera's optical frame in the world, above the objects and directed at them.
+        """Returns a random pose of the camera's optical frame in the world, above the area and directed at its middle.
 
         No robot is within `CLEAR_M` of the camera, or between the camera and the point that the camera looks at.
 
@@ -134,7 +134,7 @@ class Arrangement:
         return target + distance * direction, target
 
     def _is_clear(self, eye: Array, target: Array) -> bool:
-        """Returns whether no robot is near the camera, or between the camera and the point that it looks at."""
+        """Returns whether no robot is near the camera position `eye`, or between `eye` and `target`."""
         pb, robots = self._world.pb, {body.body_id: body for body in self._world.bodies.values() if body.joint_indices}
         for body_id, body in robots.items():
             for link in (-1, *body.joint_indices):
@@ -145,7 +145,7 @@ class Arrangement:
         return hit not in robots
 
     def _throw(self, random: np.random.Generator) -> None:
-        """Puts each object at a random place of the area, in a random orientation, above all contacts."""
+        """Puts each object at a random place above the area, in a random orientation, high enough to touch nothing."""
         names = [str(name) for name in random.permutation(list(self.models))]
         there = [body for body in self._world.bodies.values() if body.name not in self.models]
         for name in names:
@@ -167,7 +167,7 @@ class Arrangement:
         return bool(self._world.pb.getClosestPoints(body.body_id, other.body_id, GAP_M))
 
     def _motion(self, name: str) -> float:
-        """Returns an object's speed as a multiple of the speed limit for rest; 0 if the object is far away."""
+        """Returns an object's speed divided by the speed below which it is at rest; 0 if it is far from the area."""
         body = self._world.bodies[name]
         if np.linalg.norm(np.subtract(body.base_pose().position, self.middle)) > 2.0 * self._radius:
             return 0.0

@@ -1,6 +1,6 @@
-"""The folder of a data set in the BOP format.
+"""Writes the folder of a data set in the BOP format.
 
-BOP is the format of the Benchmark for 6D Object Pose Estimation (Hodan et al., ECCV 2018). The format is described in
+BOP is the Benchmark for 6D Object Pose Estimation (Hodan et al., ECCV 2018). The format is described in
 `docs/bop_datasets_format.md` of https://github.com/thodan/bop_toolkit. Labels for object detectors are in
 `scene_gt_coco.json`, in the COCO format, as the BOP toolkit writes them.
 """
@@ -32,13 +32,13 @@ Array = npt.NDArray[np.float64]
 
 
 class Label(NamedTuple):
-    """An object in an image.
+    """Label of one object in an image.
 
     Attributes:
         model: Model of the object.
-        T: Pose of the object's base link in the optical frame, shape (4, 4) [m].
+        T: Pose of the object's base link in the camera's optical frame, shape (4, 4) [m].
         visible: Mask of the pixels in which the object is visible, shape (height, width).
-        whole: Silhouette of the object without occlusion.
+        whole: Silhouette that the object would have without occlusion.
     """
 
     model: ObjectModel
@@ -48,7 +48,7 @@ class Label(NamedTuple):
 
     @property
     def visible_fraction(self) -> float:
-        """Visible fraction of the object's silhouette; parts outside the image are not visible."""
+        """Visible fraction of the object's silhouette. Parts outside the image count as not visible."""
         return float(self.visible.sum()) / self.whole.pixels
 
 
@@ -58,7 +58,7 @@ class LabelledImage(NamedTuple):
     Attributes:
         colour: Red, green and blue, uint8, shape (height, width, 3).
         depth: Distances along the optical axis, shape (height, width) [m]; 0 in pixels without depth.
-        camera: Pose of the world in the optical frame, shape (4, 4) [m].
+        camera: Pose of the world frame in the camera's optical frame, shape (4, 4) [m].
         labels: Labels of the objects that are visible in at least one pixel.
     """
 
@@ -69,13 +69,13 @@ class LabelledImage(NamedTuple):
 
 
 class BopFolder:
-    """A BOP data set to which images are added.
+    """Writes a BOP data set, to which images are added one by one.
 
     Args:
         path: Folder of the data set, which must exist and be empty.
         name: Name of the data set.
         models: Models of the labelled objects.
-        intrinsics: Intrinsics of the camera of all images.
+        intrinsics: Intrinsics of the camera that takes all images.
 
     Raises:
         OSError: If the models cannot be written.
@@ -98,7 +98,7 @@ class BopFolder:
         (path / "camera.json").write_text(json.dumps(self._camera()) + "\n")
 
     def add(self, image: LabelledImage) -> None:
-        """Writes an image with its depth image and masks, and keeps its labels for `close`.
+        """Writes an image, a depth image and masks. The labels are kept in memory until `close`.
 
         Raises:
             OSError: If a file cannot be written.
@@ -129,10 +129,10 @@ class BopFolder:
             self._write(255 * label.visible.astype(np.uint8), f"mask_visib/{mask}", QUICK)
 
     def close(self, told: str) -> None:
-        """Writes the labels, and a description of the data set.
+        """Writes the labels and a description of the data set.
 
         Args:
-            told: Text of the description, in Markdown.
+            told: Description of the data set, in Markdown.
 
         Raises:
             OSError: If a file cannot be written.
@@ -188,9 +188,9 @@ class BopFolder:
 
 
 def run_lengths(mask: Mask) -> list[int]:
-    """Returns the lengths of runs of equal pixels in a mask, column by column, as COCO's uncompressed run lengths.
+    """Returns the lengths of runs of equal pixels in a mask, column by column, as in COCO's uncompressed format.
 
-    The first run is of pixels outside the mask; its length may be 0.
+    The first run contains pixels outside the mask, and may have the length 0.
     """
     pixels = mask.ravel(order="F")
     changes = np.flatnonzero(np.diff(pixels)) + 1
@@ -223,5 +223,5 @@ def _rounded(matrix: Array) -> list[float]:
 
 
 def _lines(entries: dict[str, Any]) -> str:
-    """Returns JSON text of a dictionary with one entry per line."""
+    """Converts a dictionary to JSON text with one entry per line."""
     return "{\n" + ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in entries.items()) + "\n}\n"

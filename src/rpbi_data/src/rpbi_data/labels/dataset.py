@@ -27,7 +27,7 @@ VIEWS = 20
 
 
 class Written(NamedTuple):
-    """Summary of a data set that was written.
+    """Summary of a written data set.
 
     Attributes:
         images: Number of images.
@@ -53,12 +53,12 @@ def write_labelled_images(
 ) -> Written:
     """Writes images of random arrangements of a world's objects, each from a random view, in the BOP format.
 
-    For each image, the world is reset, and its objects fall. When the objects are at rest, a camera at a random place
-    above them takes the image. Image n depends only on the world, the seed and n. The data set is written to a
-    temporary folder, which is renamed to `out` when the data set is complete.
+    For each image, the world is reset, and its objects fall from random poses. When the objects are at rest, the camera
+    takes the image from a random place above the objects. Image n depends only on the world, the seed and n. The data
+    set is written to a temporary folder, which is renamed to `out` when the data set is complete.
 
     Args:
-        world: The world, or its main YAML file. A world is reset: objects added at run time are removed.
+        world: The world, or its main YAML file. The world is reset, which removes objects that were added at run time.
         out: Folder of the data set, which must be empty or not exist.
         count: Number of images, at least 1.
         seed: Seed of the random numbers, at least 0.
@@ -66,10 +66,10 @@ def write_labelled_images(
         report: Function that is called after each image.
 
     Raises:
-        ConfigError: If the main file, or a file that it names, is wrong.
+        ConfigError: If the main file, or a file that the main file names, is wrong.
         UnknownNameError: If the world has no camera with the name `camera`.
         InterfaceError: If the world has no camera or no object to label, objects do not come to rest or are not
-            visible from any view, or the data set cannot be written. No data set is left then.
+            visible from any view, or the data set cannot be written. The temporary folder is then removed.
         ValueError: If `count` or `seed` is out of range.
     """
     if count < 1 or seed < 0:
@@ -125,7 +125,7 @@ def _write(
 
 
 class _Photographer:
-    """Takes labelled images of a world with a given camera.
+    """Takes labelled images of a world's objects with one of the world's cameras.
 
     Raises:
         InterfaceError: If the world has no object to label.
@@ -142,7 +142,7 @@ class _Photographer:
         self._silhouettes = Silhouettes(world, self._models)
 
     def image(self, random: np.random.Generator) -> LabelledImage:
-        """Arranges the objects, takes an image from a random view, and returns it with its labels.
+        """Arranges the objects, takes an image from a random view, and returns the image with labels.
 
         Raises:
             InterfaceError: If objects do not come to rest, or no object is visible from any of `VIEWS` views.
@@ -170,6 +170,6 @@ class _Photographer:
             yield Label(model, T, visible, alone.including(visible))
 
     def close(self) -> None:
-        """Disconnects from PyBullet."""
+        """Disconnects the PyBullet clients that draw images."""
         self._silhouettes.close()
         self._images.close()

@@ -1,4 +1,4 @@
-"""Models of the surfaces of objects, for a data set; identical objects share a model."""
+"""Models of objects' visible surfaces, which a data set contains. Identical objects share a model."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ObjectModel(NamedTuple):
         name: Name of the first object with this model.
         points: Corners in the frame of the object's base link, shape (n, 3) [m].
         triangles: Indices of the three corners of each triangle, shape (m, 3).
-        rgb: Colour of each corner, from 0 to 255, shape (n, 3); textures are ignored.
+        rgb: Colour of each corner, from 0 to 255, shape (n, 3). Textures are ignored.
     """
 
     obj_id: int
@@ -83,10 +83,10 @@ class ObjectModel(NamedTuple):
 
 
 def models_of(bodies: Iterable[Body]) -> dict[str, ObjectModel]:
-    """Returns the models of objects, indexed by object name; objects with the same shapes and colours share a model.
+    """Returns the models of objects, indexed by object name. Objects with the same shapes and colours share a model.
 
     Raises:
-        InterfaceError: If a mesh cannot be read, or an object has no visual shape that a file describes.
+        InterfaceError: If a mesh cannot be read, or the description of an object has no visual shape.
     """
     kinds: dict[Any, ObjectModel] = {}
     found = {}
@@ -113,7 +113,7 @@ def _model(obj_id: int, name: str, shapes: list[BodyShape]) -> ObjectModel:
 
 
 def _triangles(shape: BodyShape) -> Array:
-    """Returns the corners of the n triangles of a shape in the link's frame, shape (3 n, 3) [m]."""
+    """Returns the corners of a shape's n triangles in the link frame, shape (3 n, 3) [m]."""
     x, y, z = shape.size
     if shape.kind is ShapeKind.MESH:
         corners = np.concatenate(read_triangles(shape.mesh_file)) * shape.size

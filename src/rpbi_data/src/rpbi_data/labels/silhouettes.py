@@ -1,4 +1,4 @@
-"""Silhouettes of objects, each drawn as if nothing else were in the world."""
+"""Draws silhouettes of objects, each as if the world contained no other object."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ NOWHERE: Bounds = (0, -1, 0, -1)
 
 @dataclass(frozen=True)
 class ImageWindow(Intrinsics):
-    """Intrinsics of a rectangular window of an image; the window may extend beyond the image.
+    """Camera intrinsics of a rectangular window of an image. The window may extend beyond the image.
 
     Attributes:
-        left_px: Column of the image at which the window begins; it may be negative.
-        top_px: Row of the image at which the window begins; it may be negative.
+        left_px: Column of the image at which the window begins; may be negative.
+        top_px: Row of the image at which the window begins; may be negative.
         whole: Intrinsics of the image.
     """
 
@@ -44,7 +44,7 @@ class ImageWindow(Intrinsics):
 
     @classmethod
     def of(cls, whole: Intrinsics, left: int, top: int, right: int, bottom: int) -> ImageWindow:
-        """Returns the window from column `left` and row `top` to column `right` and row `bottom`, both exclusive."""
+        """Returns the window of the columns from `left` to `right - 1` and the rows from `top` to `bottom - 1`."""
         given = {field.name: getattr(whole, field.name) for field in fields(Intrinsics)}
         size = {"width_px": right - left, "height_px": bottom - top}
         return cls(**{**given, **size}, left_px=left, top_px=top, whole=whole)
@@ -61,12 +61,12 @@ class ImageWindow(Intrinsics):
 
 
 class Silhouette(NamedTuple):
-    """The pixels that an object covers if nothing else is in the world.
+    """The pixels that an object would cover if the world contained no other object.
 
     Attributes:
         mask: Mask of the pixels within the image, shape (height, width).
-        pixels: Number of pixels, including pixels outside the image.
-        box: Bounds of the silhouette, including its part outside the image.
+        pixels: Number of covered pixels, including pixels outside the image.
+        box: Bounds of the covered pixels, including pixels outside the image.
     """
 
     mask: Mask
@@ -76,7 +76,7 @@ class Silhouette(NamedTuple):
     def including(self, visible: Mask) -> Silhouette:
         """Returns this silhouette, extended to all pixels in which the object is visible.
 
-        Without this, the edges of two drawings of an object may differ because of rounding.
+        The extension is needed because rounding may make the edges of two drawings of an object differ.
         """
         missing = visible & ~self.mask
         if not missing.any():
@@ -89,7 +89,7 @@ class Silhouette(NamedTuple):
 
 
 class Silhouettes:
-    """Draws single objects, with a separate PyBullet client for each model.
+    """Draws one object at a time, with a separate PyBullet client for each model.
 
     Args:
         world: World of the objects.
@@ -114,8 +114,8 @@ class Silhouettes:
         Args:
             model: Model of the object.
             state: State of the object.
-            T: Pose of the object's base link in the optical frame, shape (4, 4) [m].
-            camera: Pose of the optical frame in the world.
+            T: Pose of the object's base link in the camera's optical frame, shape (4, 4) [m].
+            camera: Pose of the camera's optical frame in the world.
             whole: Intrinsics of the image.
         """
         mask = np.zeros((whole.height_px, whole.width_px), bool)
@@ -142,15 +142,16 @@ class Silhouettes:
 
 
 def bounds(mask: Mask) -> Bounds:
-    """Returns the bounds of the pixels in a mask, which must have at least one pixel."""
+    """Returns the bounds of the true pixels in a mask, which must have at least one true pixel."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return int(columns[0]), int(columns[-1]), int(rows[0]), int(rows[-1])
 
 
 def _window(points: Array, whole: Intrinsics) -> ImageWindow | None:
-    """Returns the window that contains given points of the optical frame, or None if the window is empty.
+    """Returns the window that contains the projections of points, or None if the window is empty.
 
-    On each side, the window extends beyond the image by at most the size of the image.
+    On each side, the window extends beyond the image by at most the size of the image. The points are in the optical
+    frame, shape (n, 3) [m].
     """
     width, height = whole.width_px, whole.height_px
     if points[:, 2].min() < whole.near_m:  # the object extends behind the camera

@@ -1,4 +1,4 @@
-"""Reads the content of a page from a bag."""
+"""Reads the content of an HTML page, which shows a recording, from a bag."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CONTACTS, WRENCHES, JOINTS, TF = (
 
 
 def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> PageScene:
-    """Returns the scene of an episode, built with the files that are stored with it.
+    """Returns the scene of an episode. The world is built from the files that are stored with the episode.
 
     Raises:
         EpisodeError: If the folder has no such episode, or the episode has no bag.
@@ -46,10 +46,10 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
 
 
 def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> PageScene:
-    """Returns the scene of a bag with `rpbi/world_description`, built with the files that are on the disk.
+    """Returns the scene of a bag with the topic `rpbi/world_description`. The world is built from its original files.
 
     Raises:
-        BagError: If the bag cannot be read, or lacks the description.
+        BagError: If the bag cannot be read, or lacks the topic.
         ConfigError: If the recorded world cannot be built.
     """
     return _scene(bag.name, bag, namespace, read_recording(bag, namespace, any_size, needs_states=False), any_size)
@@ -101,7 +101,7 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
 def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[float, Array]:
     """Returns the time of the first message [s], and at most `most` evenly spaced times up to the last message.
 
-    The evenly spaced times are relative to the first message [s].
+    The evenly spaced times are measured from the first message, shape (n,) [s].
     """
     stamps = [table.index for table in tables.values() if len(table) > 1]
     start_s = min((float(each[0]) for each in stamps), default=0.0)

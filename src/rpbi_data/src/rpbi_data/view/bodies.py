@@ -1,4 +1,4 @@
-"""Links of a recorded world: their shapes and poses."""
+"""Collects shapes and poses of the links of a recorded world."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Commands = Mapping[int, Mapping[int, RecordedCommand]]
 
 
 def add_later_bodies(world: World, commands: Commands) -> list[str]:
-    """Adds the bodies that were added after the start of the recording to a world, so that their shapes are known.
+    """Adds to a world all bodies that the recorded commands add, so that the shapes of these bodies are known.
 
     Returns:
         Messages about bodies that cannot be added.
@@ -45,18 +45,18 @@ def links_of(
     frames: Frames,
     joints: Mapping[str, pd.DataFrame],
 ) -> tuple[list[ShownLink], list[str]]:
-    """Returns all links with visible shapes.
+    """Returns all links that have visible shapes.
 
     Args:
         world: The world, with all bodies that were in it at any time of the recording.
         at_start: Names of the bodies that were in the world at the start of the recording.
         commands: The recorded commands.
-        states: Table of `rpbi/state`, which contains the times of ticks; None without this topic.
+        states: Table of `rpbi/state`, which contains the times of ticks; None if the topic is not recorded.
         frames: TF frames at the times of the scene.
-        joints: Tables of joint states, indexed by body name, for links that are not on TF.
+        joints: Tables of joint states, indexed by body name. They are used for links that are not on TF.
 
     Returns:
-        The links, and messages about bodies that are not shown, or are shown at their initial poses.
+        The links, and messages about bodies that are not shown, or that are shown only at their initial poses.
     """
     links: list[ShownLink] = []
     notes: list[str] = []
@@ -80,7 +80,7 @@ def links_of(
 
 
 class _Presence:
-    """Times at which bodies are in the world."""
+    """Computes at which times bodies are in the world."""
 
     def __init__(self, at_start: frozenset[str], commands: Commands, states: pd.DataFrame | None, times: Array) -> None:
         self._times = times
@@ -95,7 +95,7 @@ class _Presence:
                     self._changes.append((at_s, command.name, command.what == "add"))
 
     def of(self, name: str) -> Array:
-        """Returns for each time whether a body is present, shape (n,); without recorded states, this is always True."""
+        """Returns whether a body is in the world at each time, shape (n,); always True if states are not recorded."""
         is_there = np.ones(len(self._times), bool)
         for at_s, changed, comes in self._changes:
             if changed == name:
@@ -104,10 +104,10 @@ class _Presence:
 
 
 class _LinkPoses:
-    """Poses of the links of a body.
+    """Computes the poses of a body's links over time.
 
-    They are read from TF, or else computed from joint states and the base pose; without both, they are the initial
-    poses.
+    A pose is read from TF. If the link is not on TF, the pose is computed from the base pose and joint states. Without
+    recorded data, the initial pose or initial joint positions are used.
     """
 
     def __init__(self, world: World, body: Body, frames: Frames, joints: pd.DataFrame | None) -> None:
@@ -123,7 +123,7 @@ class _LinkPoses:
         self._by_joints: dict[int, Poses] = {}
 
     def of(self, index: int) -> Poses:
-        """Returns the poses of the link with a given PyBullet index; the index of the base is -1."""
+        """Returns the poses of the link with a given PyBullet index, which is -1 for the base."""
         if index < 0:
             return self._base
         return self._on_tf(self._body.link_name(index)) or self._base @ self._in_base(index)

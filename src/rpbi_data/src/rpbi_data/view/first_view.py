@@ -1,4 +1,4 @@
-"""The initial view of a page, in which all links are visible."""
+"""Chooses the initial camera of a page, such that all links are visible."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ Camera = tuple[Vector, Vector]
 def first_view(
     own: ResetDebugVisualizerCamera, links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]
 ) -> Camera:
-    """Returns the camera that the world configures, or a camera that sees all links at their initial poses.
+    """Returns the camera from the world's configuration, or a camera that sees all links at their initial poses.
 
     Args:
-        own: Camera of PyBullet's window in the world's configuration. The default values count as not configured.
-        links: Links to be seen.
-        meshes: Meshes of the shapes that are meshes.
+        own: Camera of PyBullet's window in the world's configuration. Default values count as not configured.
+        links: Links that the camera must see.
+        meshes: Meshes of the links, indexed by shape.
     """
     if own != ResetDebugVisualizerCamera():
         target = np.array(own.cameraTargetPosition)
@@ -55,7 +55,7 @@ def first_view(
 
 
 def _forward(yaw_deg: float, pitch_deg: float) -> Array:
-    """Returns the viewing direction of PyBullet's camera as a unit vector."""
+    """Returns the viewing direction of PyBullet's camera in the world frame, as a unit vector of shape (3,)."""
     yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
     return np.array([-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)])
 
@@ -65,9 +65,10 @@ def _camera(target: Array, distance: float, forward: Array) -> Camera:
 
 
 def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]) -> Array:
-    """Returns points to be seen, shape (n, 3) [m].
+    """Returns points that the camera must see, shape (n, 3) [m].
 
-    These are the corners of small shapes, and for each large shape the point nearest to the middle of the small ones.
+    These are the box corners of small shapes, and the point of each large shape's box that is nearest to the middle of
+    the small shapes. Shapes larger than `LARGE_M` are large.
     """
     corners = [each for link in links for each in _corners(link, meshes)]
     if not corners:
@@ -80,7 +81,7 @@ def _points(links: Sequence[ShownLink], meshes: Mapping[BodyShape, TriangleMesh]
 
 
 def _corners(link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> Iterator[Array]:
-    """Yields the corners of the box around each shape of a link when the link first appears, shape (8, 3) [m]."""
+    """Yields the corners of each shape's box at the time when the link first appears, shape (8, 3) [m]."""
     first = int(np.argmax(link.is_there))
     position, rotation = link.poses.position[first], link.poses.rotation[first]
     for shape in link.shapes:

@@ -1,4 +1,4 @@
-"""Forces of a recording, as arrows and as lines of plots."""
+"""Converts recorded forces to arrows and to lines of plots."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _NOTHING = np.empty((0, 3))
 
 
 def contact_arrows(topic: str, table: pd.DataFrame, times: Array) -> Arrows:
-    """Returns the contact forces on a body at given times, each from the newest message at that time.
+    """Returns the contact forces on a body. The forces at each time are taken from the newest message.
 
     Args:
         topic: Topic of the contacts.
         table: Table of the messages of the topic.
-        times: Times of the arrows, in ROS time [s].
+        times: ROS times of the arrows, shape (n,) [s].
     """
     points, forces = (_columns(table, "position"), _contact_forces(table)) if "position/x" in table else (None, None)
     arrows = Arrows(topic, True, [], [])
@@ -37,7 +37,9 @@ def contact_arrows(topic: str, table: pd.DataFrame, times: Array) -> Arrows:
 
 
 def wrench_arrows(topic: str, table: pd.DataFrame, frames: Frames) -> Arrows | str:
-    """Returns the forces of stamped wrenches at the origin of their frame, or the reason why they cannot be drawn.
+    """Returns the forces of stamped wrenches, drawn at the origin of the wrench frame.
+
+    If the forces cannot be drawn, returns a message with the reason.
 
     Args:
         topic: Topic of the wrenches.
@@ -60,7 +62,7 @@ def wrench_arrows(topic: str, table: pd.DataFrame, frames: Frames) -> Arrows | s
 
 
 def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str, Mapping[str, pd.Series]]:
-    """Returns the panels of plots of forces and torques, indexed by title; each has lines over time from the start [s].
+    """Returns the lines of each plot of forces and torques over time since the start [s], indexed by plot title.
 
     Args:
         tables: Tables of contacts and stamped wrenches, indexed by topic.
@@ -74,7 +76,7 @@ def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str
 
 
 def _contact_forces(table: pd.DataFrame) -> Array:
-    """Returns the contact force of each row, shape (n, 3) [N]; rows without contact have NaN."""
+    """Returns the contact force in each row of a table, shape (n, 3) [N]; NaN in rows without contact."""
     return np.asarray(
         _columns(table, "normal") * table[["normal_force"]].to_numpy()
         + _columns(table, "friction_direction_1") * table[["friction_force_1"]].to_numpy()
@@ -87,7 +89,7 @@ def _columns(table: pd.DataFrame, vector: str) -> Array:
 
 
 def _newest(stamps: Array, times: Array) -> Iterator[slice]:
-    """Yields for each time the rows of the newest message, or an empty slice if that message is too old."""
+    """Yields, for each time, the rows of the newest message; empty if the message is older than `MAX_AGE_S`."""
     for time_s in times:
         end = int(np.searchsorted(stamps, time_s, side="right"))
         is_new = end > 0 and time_s - stamps[end - 1] <= MAX_AGE_S

@@ -1,4 +1,4 @@
-"""Poses of TF frames in a recording, at the times of a page."""
+"""Reads the poses of TF frames from the tables of a recording."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .scene import Array, Poses
 
 
 class Frames:
-    """Poses of TF frames in the world at given times.
+    """Computes the poses of TF frames in the world frame at given times.
 
     Args:
         tables: Tables of a bag, of which only `/tf` and `/tf_static` are read.
-        own: Frames of the simulator, without TF prefix. The prefix with which most of these frames are on TF is used.
+        own: Frames of the simulator, without TF prefix, from which the recorded TF prefix is determined.
         times: Times of the poses, ascending, shape (n,) [s].
     """
 
@@ -36,9 +36,12 @@ class Frames:
         self._found: dict[str, Poses | None] = {}
 
     def poses(self, frame: str) -> Poses | None:
-        """Returns the poses of a frame, given with or without the TF prefix, or None if the frame is not on TF.
+        """Returns the poses of a frame, or None if TF has no transform from the world frame to the frame.
 
-        Before its first transform, the frame has its first pose; after its last transform, it has its last pose.
+        Outside the time range of the transforms, the frame keeps its first or last pose.
+
+        Args:
+            frame: Name of the frame, with or without the TF prefix.
         """
         name = self._prefix + frame if self._prefix + frame in self._known else frame
         if name not in self._found:

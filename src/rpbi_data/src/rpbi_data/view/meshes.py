@@ -26,14 +26,14 @@ MIN_TRIANGLES = 200
 CREASE_RAD = 0.6
 """Angle between two triangles above which their common edge is visible [rad]."""
 _SAME_M = 1e-6
-"""Grid to which corners of a mesh are rounded, in the units of the file; corners at the same grid point are merged."""
+"""Grid to which mesh corners are rounded, in the units of the mesh file. Corners at the same grid point are merged."""
 
 
 def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, TriangleMesh], list[str]]:
-    """Returns the meshes of shapes, all simplified if their total number of triangles is too large.
+    """Returns the meshes of shapes. If they have too many triangles in total, all meshes are simplified.
 
     Args:
-        shapes: Shapes of any kind; shapes that are not meshes are left out.
+        shapes: Shapes of any kind. Shapes that are not meshes are left out.
 
     Returns:
         The meshes, indexed by shape, and messages about unreadable meshes and about simplification.
@@ -67,14 +67,14 @@ def _key(shape: BodyShape) -> object:
 
 
 def _corners(shape: BodyShape) -> Array:
-    """Returns the triangle corners of a mesh, shape (n, 3, 3)."""
+    """Returns the corners of a mesh's n triangles before scaling, shape (n, 3, 3)."""
     if shape.kind is ShapeKind.MESH:
         return np.concatenate(read_triangles(shape.mesh_file))
     return np.reshape(shape.corners, (-1, 3, 3))
 
 
 def _merged(corners: Array) -> Trimesh:
-    """Returns a mesh in which adjacent triangles share their corners."""
+    """Returns the mesh of given triangles, in which adjacent triangles share corners."""
     numbers = np.round(corners.reshape(-1, 3) / _SAME_M).astype(np.int64)
     _, first, inverse = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
     faces = inverse.reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Writes a scene as one HTML page with viser."""
+"""Converts a scene to one HTML page with viser."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _WXYZ = [3, 0, 1, 2]
 
 
 def page_of(scene: PageScene) -> tuple[str, PageScene]:
-    """Returns the HTML text of a page, and the scene on that page, with fewer times if the page would be too large."""
+    """Returns the HTML text of a page, and the shown scene, which has fewer times if the page would be too large."""
     while len((text := _page(scene)).encode()) > MAX_BYTES and len(scene.times) > MIN_TIMES:
         scene = scene.coarser(max(MIN_TIMES, len(scene.times) // 2))
     return text, scene
@@ -75,7 +75,7 @@ def _record(server: Any, recording: Any, scene: PageScene, metres_per_newton: fl
 
 
 class _LinkPlayer:
-    """Shows the poses of a link at the times of the scene."""
+    """Moves a link in viser to its pose at a given time of the scene."""
 
     def __init__(self, api: Any, link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
         name = f"/{link.body}/{link.name}"
@@ -97,7 +97,7 @@ class _LinkPlayer:
 
 
 class _ArrowPlayer:
-    """Shows the forces of a topic at the times of the scene."""
+    """Draws the forces of a topic in viser at a given time of the scene."""
 
     def __init__(self, api: Any, arrows: Arrows, metres_per_newton: float) -> None:
         self._segments = [
@@ -122,9 +122,9 @@ class _ArrowPlayer:
 
 
 def _segments(points: Array, arrows: Array) -> Array:
-    """Returns start and end of arrows, shape (k, 2, 3) [m].
+    """Returns start and end of each arrow, shape (k, 2, 3) [m].
 
-    Arrows longer than `MAX_ARROW_M` are shortened; arrows no longer than their head are left out.
+    Arrows longer than `MAX_ARROW_M` are shortened. Arrows that are not longer than their head are left out.
     """
     length = np.linalg.norm(arrows, axis=1, keepdims=True)
     cut = arrows * np.minimum(1.0, MAX_ARROW_M / np.maximum(length, 1e-9))
@@ -132,7 +132,7 @@ def _segments(points: Array, arrows: Array) -> Array:
 
 
 def _arrow_scale(arrows: list[Arrows]) -> float:
-    """Returns the scale of arrows, rounded to 1, 2 or 5 times a power of ten [m/N]."""
+    """Returns the arrow length per force, rounded to 1, 2 or 5 times a power of ten [m/N]."""
     forces = np.concatenate([np.empty((0, 3)), *(each for of_topic in arrows for each in of_topic.forces)])
     sizes = np.linalg.norm(forces, axis=1)
     sizes = sizes[sizes > 0.0]
@@ -168,7 +168,7 @@ def _rounded(values: Array, step: float) -> Array:
 
 
 def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
-    """Returns viser's page with plots below its view."""
+    """Adds plots below the 3-D view to viser's page, and returns the HTML text."""
     count = min(MAX_LINE_POINTS, MAX_POINTS // max(1, sum(map(len, scene.panels.values()))))
     data = {
         "title": scene.title,
@@ -188,9 +188,10 @@ def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
 
 
 def _points(line: pd.Series, count: int) -> dict[str, list[float]]:
-    """Returns the points of a line as lists `x` and `y`; a line of more than `count` points is reduced to extremes.
+    """Returns the points of a line as lists `x` and `y`.
 
-    The extremes are the smallest and the largest value of each of `count // 2` intervals.
+    A line with more than `count` points is divided into `count // 2` intervals, of which only the smallest and the
+    largest value are kept.
     """
     values = line.dropna()
     x, y = values.index.to_numpy(float), values.to_numpy(float)

@@ -1,4 +1,4 @@
-"""HTML of the plots below viser's view; the plots follow viser's time line."""
+"""HTML text of the plots below viser's 3-D view. The plots follow viser's time line."""
 
 HEAD = """<style>
 body { display: flex; flex-direction: column; }

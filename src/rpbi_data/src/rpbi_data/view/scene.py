@@ -1,4 +1,4 @@
-"""Content of a page, independent of the libraries that draw it."""
+"""Content of a page that shows a recording, independent of the libraries that draw the page."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ MAX_POSES = MAX_ARROWS = 25_000
 
 
 class Poses(NamedTuple):
-    """Poses of a frame in the world over time.
+    """Poses of a frame at n times.
 
     Attributes:
-        position: Shape (n, 3) [m].
-        rotation: n rotations.
+        position: Positions, shape (n, 3) [m].
+        rotation: The n rotations.
     """
 
     position: Array
@@ -35,16 +35,16 @@ class Poses(NamedTuple):
 
     @classmethod
     def still(cls, pose: Pose, count: int) -> Poses:
-        """Returns the same pose for each of `count` times."""
+        """Returns poses that are equal at all `count` times."""
         return cls(np.tile(pose.position, (count, 1)), Rotation.from_quat(np.tile(pose.quat_xyzw, (count, 1))))
 
     @classmethod
     def from_numbers(cls, numbers: Array) -> Poses:
-        """Returns poses from an array of shape (n, 7), whose rows are a position [m] and a quaternion x, y, z, w."""
+        """Converts an array of shape (n, 7) to poses. A row is a position [m] and a quaternion x, y, z, w."""
         return cls(numbers[:, :3], Rotation.from_quat(numbers[:, 3:]))
 
     def __matmul__(self, other: Poses) -> Poses:
-        """Composes the poses of each time with the poses of another frame at the same time."""
+        """Composes the poses at each time with other poses at the same time, which are relative to this frame."""
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 
@@ -52,7 +52,7 @@ class TriangleMesh(NamedTuple):
     """A surface of triangles.
 
     Attributes:
-        corners: Shape (n, 3) [m].
+        corners: Positions of the corners, shape (n, 3) [m].
         triangles: Indices of the three corners of each triangle, shape (m, 3).
     """
 
@@ -62,14 +62,14 @@ class TriangleMesh(NamedTuple):
 
 @dataclass
 class ShownLink:
-    """A link with visible shapes.
+    """A link with visible shapes, and its poses over time.
 
     Attributes:
-        body: Name of the body that the link belongs to.
+        body: Name of the link's body.
         name: Name of the link.
         shapes: Visible shapes of the link.
         poses: Poses of the link in the world, at the times of the scene.
-        is_there: Whether the body is in the world, at each time of the scene, shape (n,).
+        is_there: Whether the body is in the world at each time of the scene, shape (n,).
     """
 
     body: str
@@ -81,11 +81,11 @@ class ShownLink:
 
 @dataclass
 class Arrows:
-    """Forces that one topic reports.
+    """Forces that one topic reports over time.
 
     Attributes:
         topic: Name of the topic.
-        is_contact: Whether the forces are contact forces; otherwise, they are measured by a sensor.
+        is_contact: Whether the forces are contact forces. If False, they are measured by a force sensor.
         points: Points of application in the world frame, one array of shape (k, 3) [m] for each time of the scene.
         forces: Forces in the world frame, one array of shape (k, 3) [N] for each time of the scene.
     """
@@ -106,9 +106,9 @@ class PageScene:
         times: Times of poses and arrows since the start, shape (n,) [s].
         camera: Initial position of the camera, and the point that it looks at [m].
         links: Visible links.
-        meshes: Meshes, indexed by the shape that they belong to.
+        meshes: Meshes of the links, indexed by shape.
         arrows: Forces, with one entry for each topic.
-        panels: Lines of the plots over time since the start [s], indexed by the title of their panel.
+        panels: Lines of the plots over time since the start [s], indexed by plot title.
         notes: Messages about content that is not shown, or differs from the recording; see `all_notes`.
     """
 
@@ -124,7 +124,7 @@ class PageScene:
 
     @property
     def all_notes(self) -> list[str]:
-        """The notes, and a message about the rate of poses if that rate is lower than usual."""
+        """The notes, and a message if the scene has fewer times per second than usual."""
         hz = (len(self.times) - 1) / self.times[-1]
         if hz >= MAX_HZ - 1.0:
             return self.notes
@@ -149,7 +149,7 @@ class PageScene:
         return replace(self, times=self.times[kept], links=links, arrows=arrows)
 
     def with_few_arrows(self) -> PageScene:
-        """Returns the same scene, with fewer times if it has more than `MAX_ARROWS` arrows."""
+        """Returns this scene, with fewer times if it has more than `MAX_ARROWS` arrows."""
         arrows = sum(len(points) for each in self.arrows for points in each.points)
         if arrows <= MAX_ARROWS:
             return self
