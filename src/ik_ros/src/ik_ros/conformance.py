@@ -1,4 +1,4 @@
-"""Pytest tests that every solver must pass; derive from `SolverConformance` to test a solver of your own."""
+"""Pytest tests that every solver must pass; derive a class from `SolverConformance` to test your own solver."""
 
 import math
 import os
@@ -35,17 +35,17 @@ pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "
 
 
 class SolverConformance:
-    """Tests that every solver for the pose of one link must pass.
+    """Tests that every solver must pass that brings one link to a target pose.
 
-    A subclass names the solver and the robot, and may override the first four methods.
+    A subclass sets `solver_name` and `options`, and may override the methods from `make` to `positions`.
 
     Attributes:
         solver_name: Argument of `make_solver`: a name in the table of solvers, or `"their_package.module:Class"`.
         options: Options of the solver. `forward` needs the keys `urdf_filename`, `base_link` and `tip_link`.
         least_share: Smallest fraction of reachable problems that the solver must solve.
         reachable_problems: Number of reachable problems.
-        random_problems: Number of problems whose targets may be unreachable. Their answers must be valid, not solved.
-        reach_m: Largest absolute coordinate of random target positions in the base [m].
+        random_problems: Number of problems whose targets may be unreachable. Solutions must be valid, but may fail.
+        reach_m: Largest absolute coordinate of random target positions in the base frame [m].
     """
 
     solver_name: ClassVar[str]
@@ -62,11 +62,11 @@ class SolverConformance:
         return SOLVERS.make(self.solver_name, self.options)
 
     def problem(self, target: Pose, start: Mapping[str, float], seed: int = 0) -> IKProblem:
-        """Makes a problem with a target pose in the base, start positions by joint [rad or m], and a seed."""
+        """Makes a problem from a target pose in the base frame, start positions by joint name, and a seed."""
         return IKProblem(target=target, start=start, seed=seed)
 
     def forward(self, positions: Sequence[float]) -> Pose:
-        """Computes the pose of the tip in the base with `RobotModel`, independently of the solver."""
+        """Computes the pose of the tip in the base frame with `RobotModel`, independently of the solver."""
         at = dict(zip(self.solver.joint_names, positions))
         q = [at.get(name, 0.0) for name in self.robot.joint_names]
         return self.robot.pose(q, str(self.options["tip_link"]), str(self.options["base_link"]))
@@ -84,7 +84,7 @@ class SolverConformance:
 
     @cached_property
     def limits(self) -> Limits:
-        """The solver's limits, with all joints as revolute; joints without limits are sampled from -pi to pi."""
+        """The solver's joint limits, for random positions; all joints are treated as revolute."""
         return Limits(self.solver.lower, self.solver.upper, [True] * len(self.solver.joint_names))
 
     @cached_property
@@ -93,7 +93,7 @@ class SolverConformance:
         return RobotModel(str(self.options["urdf_filename"]))
 
     def start_at(self, positions: Sequence[float]) -> dict[str, float]:
-        """Converts positions in the solver's order to positions by joint name [rad or m]."""
+        """Converts positions in the solver's joint order to a dict of positions by joint name [rad or m]."""
         return dict(zip(self.solver.joint_names, positions))
 
     def reachable(self, generator: random.Random, count: int) -> list[IKProblem]:
@@ -104,9 +104,10 @@ class SolverConformance:
         ]
 
     def checked(self, problem: IKProblem) -> IKSolution:
-        """Solves a problem, checks the answer, and returns it.
+        """Solves a problem, checks the solution, and returns the solution.
 
-        Checks the joints' order, number, finiteness and limits, the message, and whether a claimed success is true.
+        Checks joint order and number, that positions are finite and within the limits, and that there is a message. If
+        the solution claims success, also checks that the tip reaches the target.
         """
         solution = self.solver.solve(problem)
         assert solution.joint_names == self.solver.joint_names, "joints are in another order"
@@ -127,7 +128,7 @@ class SolverConformance:
     # --- The tests.
 
     def test_its_joints_and_limits_belong_together(self) -> None:
-        """Names are unique, and each joint has ordered limits and a velocity limit, which may be inf."""
+        """Joint names are unique. Each joint has a lower limit up to its upper limit, and a positive velocity limit."""
         names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
         assert names and len(set(names)) == len(names) == len(lower) == len(upper)
         assert all(low <= high for low, high in zip(lower, upper))
@@ -135,13 +136,13 @@ class SolverConformance:
         assert all(velocity > 0.0 for velocity in self.solver.velocity_limits)
 
     def test_reachable_targets_are_reached(self) -> None:
-        """Reported successes are true, and at least the fraction `least_share` of the problems is solved."""
+        """The tip reaches the target if success is reported, and at least `least_share` of the problems are solved."""
         problems = self.reachable(random.Random(1), self.reachable_problems)
         share = sum(self.checked(problem).success for problem in problems) / self.reachable_problems
         assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
 
     def test_unreachable_target_returns_the_best_pose_and_its_distance(self) -> None:
-        """The solver answers `success=False` instead of raising an exception, and reports the true error."""
+        """The solver returns `success=False` instead of raising an exception, and reports the true pose error."""
         start = self.start_at(self.limits.middle)
         target = Pose((0.0, 0.0, 100.0))
         solution = self.checked(self.problem(target, start))
@@ -151,7 +152,7 @@ class SolverConformance:
         assert abs(angle - solution.orientation_error_rad) < 0.01, (angle, solution)
 
     def test_answers_to_random_problems_are_finite_and_within_limits(self) -> None:
-        """This holds even if targets are unreachable, and starts are outside the limits."""
+        """Solutions are finite and within the limits, even if targets are unreachable and starts outside the limits."""
         generator = random.Random(2)
         for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
             x, y, z = (generator.uniform(-self.reach_m, self.reach_m) for _ in range(3))
@@ -159,20 +160,20 @@ class SolverConformance:
             self.checked(self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed))
 
     def test_a_target_that_is_not_finite_is_refused(self) -> None:
-        """Such a target raises a ValueError; `IKProblem` already refuses it."""
+        """A target with a non-finite number raises a ValueError, usually from the constructor of `IKProblem`."""
         for bad in (math.nan, math.inf, 1e300):
             for target in (Pose((0.1, bad, 0.3)), Pose((0.1, 0.2, 0.3), (0.0, 0.0, bad, 1.0))):
                 with pytest.raises(ValueError, match="finite"):
                     self.solver.solve(self.problem(target, {}))
 
     def test_unknown_joint_is_refused_naming_the_known_ones(self) -> None:
-        """An unknown joint name in the start raises an error; otherwise a misspelt joint would silently be ignored."""
+        """An unknown joint name in the start raises an error, so that a misspelt name is not silently ignored."""
         problem = self.problem(self.forward(self.limits.middle), {"no_such_joint": 0.0})
         with pytest.raises(UnknownNameError, match=f"no_such_joint.*{self.solver.joint_names[0]}"):
             self.solver.solve(problem)
 
     def test_equal_problems_have_equal_answers(self) -> None:
-        """The answers do not depend on earlier problems, on the solver object, on the process or on its threads."""
+        """Solutions do not depend on earlier problems, the solver object, the process, or the number of threads."""
         if not self.solver.deterministic:
             pytest.skip(f"'{self.solver_name}' is not declared deterministic")
         problems = self.reachable(random.Random(3), 10) + [self.problem(Pose((0.0, 0.0, 100.0)), {})]

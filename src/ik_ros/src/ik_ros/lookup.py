@@ -3,4 +3,4 @@
 from .solvers import SOLVERS
 
 make_solver = SOLVERS.make
-"""Makes a solver that is given by name, see `PluginTable.make`."""
+"""Makes the solver with a given name, see `PluginTable.make`."""

@@ -38,7 +38,10 @@ LISTS_OF_TASKS = ("constraints", "costs")
 
 
 class RobotIKConfig(ConfigModel):
-    """Options of a simulated robot's own inverse kinematics, named like the fields of its message."""
+    """Options of a simulated robot's own inverse kinematics.
+
+    Names are those of the fields of the message `CalculateInverseKinematicsProblem`.
+    """
 
     robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
     link_name: Text = Field(description="The link that is moved to the target.")
@@ -55,7 +58,7 @@ class RobotIKConfig(ConfigModel):
 
 
 class TargetParameters(ConfigModel):
-    """Rate of publication, and the largest age of the transforms that are used."""
+    """Parameters of nodes that publish data from TF: publication rate, and largest age of transforms."""
 
     hz: Hz = Field(50.0, description="Rate of publication, in wall time.")
     tf_timeout_s: Seconds = Field(0.5, description="Longest time without new TF; then nothing is published.")
@@ -117,7 +120,10 @@ class TfToFloatArrayConfig(TargetParameters):
 
 
 def schemas() -> dict[str, Schema]:
-    """Generates the JSON Schema of each solver's options by solver name; leaves out solvers with missing libraries."""
+    """Generates the JSON Schema of each solver's options, indexed by solver name.
+
+    Leaves out solvers whose libraries are not installed.
+    """
     found = {}
     for name, config in SOLVERS.configs().items():
         both = create_model(config.__name__, __base__=(config, SolverNodeParameters), __doc__=config.__doc__)

@@ -46,13 +46,13 @@ class IKProblem:
         position_tolerance: Largest allowed error along each axis of the target, in both directions [m].
         rotation_tolerance: Largest allowed rotation about each axis of the target, in both directions [rad]. From pi
             on, every rotation is accepted.
-        start: Start positions of the search by joint [rad or m]. Joints that are left out start at the middle of their
-            limits. Positions outside the limits are moved into the limits, with a warning.
-        previous: Previous solutions, the newest last, for solvers that can stay near them.
-        goals: Numbers of each task's goal, by task name, for solvers with tasks.
+        start: Start positions of the search by joint name [rad or m]. Joints that are left out start at the middle of
+            their limits. Positions outside the limits are moved into the limits, with a warning.
+        previous: Previous solutions, the newest last, for solvers that use them.
+        goals: Values of each task's goal, indexed by task name, for solvers with tasks.
         waypoints: Waypoints of the link, sorted by time, for solvers that find trajectories.
-        frames: Frames of the scene to attach to another parent, by name, for solvers with a scene. Other frames of the
-            scene do not change.
+        frames: Frames of the scene to attach to a new parent, indexed by frame name, for solvers with a scene. Other
+            frames of the scene keep their parent.
         seed: Seed of the solver's random generator. A deterministic solver returns equal answers for equal problems.
 
     Raises:
@@ -142,10 +142,10 @@ class IKSolution:
         joint_names: Names of the solver's n joints, always in the same order.
         positions: n positions within the limits [rad or m]. Without success, the best positions that the solver found,
             or the start of the search.
-        position_error_m: Position error of the link, reduced by the tolerances [m]. For several links or waypoints, the
-            largest error.
-        orientation_error_rad: Orientation error, reduced by the tolerances [rad]; for several, the largest error.
-        alternatives: Other solutions with n positions each, the best first, from solvers that find several.
+        position_error_m: Part of the link's position error that exceeds the tolerances [m]. With several links or
+            waypoints, the largest of them.
+        orientation_error_rad: The same for the orientation error [rad].
+        alternatives: Other solutions with n positions each, the best first, from solvers that find several solutions.
         trajectory: The trajectory, from solvers that find trajectories; `positions` are then its last positions.
         base_pose: Pose of a floating root in the solver's base frame; None for a fixed root.
     """

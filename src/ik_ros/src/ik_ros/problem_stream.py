@@ -33,9 +33,9 @@ class JointRateLimiterConfig(ConfigModel):
 class JointRateLimiter:
     """Limits the joint velocities between successive targets.
 
-    If a solution is too far from the last target, the next target is on the straight line between both in joint space.
-    The joint that needs most time moves at its velocity limit, and all other joints move in proportion. So near a
-    singularity or at a change of posture, the robot lags behind instead of jumping.
+    If a solution is too far from the last target, the next target is on the straight line from the last target to the
+    solution in joint space. The joint that needs most time moves at its velocity limit, and all other joints move in
+    proportion. So near a singularity or at a change of posture, the robot lags behind instead of jumping.
 
     Args:
         config: The configuration.
@@ -43,7 +43,7 @@ class JointRateLimiter:
         velocity_limits: Velocity limits of the n joints in the URDF [rad/s or m/s]; 0 and inf mean no limit.
 
     Attributes:
-        hold: Whether targets continue towards the last solution while problems have no solution.
+        hold: Whether targets continue towards the last solution while problems cannot be solved.
         max_period_s: Longest time between two targets that is taken into account [s].
 
     Raises:
@@ -81,8 +81,8 @@ class JointRateLimiter:
             period_s: Time since the last target [s].
 
         Returns:
-            The target, n positions [rad or m], and a fraction of the motion from the last target to the solution. The
-            target completes this fraction of the motion; 1 means that the target is the solution.
+            The next target, n positions [rad or m], and the fraction of the way from the last target to the solution at
+            which it lies; 1 means that the next target is the solution.
         """
         goal = np.array(solution, dtype=float)
         if self._last is None:
@@ -104,7 +104,7 @@ class ProblemStream:
         continuity: Limits the joint velocities between targets. None: the targets are the solutions.
 
     Attributes:
-        target: n positions to command after the last problem [rad or m]; None if the problem gives no target.
+        target: n positions to command after the last problem [rad or m]; None if the problem did not lead to a target.
     """
 
     def __init__(self, solver: Solver, continuity: JointRateLimiter | None = None) -> None:
@@ -116,7 +116,7 @@ class ProblemStream:
         self._last_s: float | None = None
 
     def restart(self) -> None:
-        """Forgets the last target, so that the next problem counts as the first problem."""
+        """Deletes the last target, so that the next problem counts as the first problem."""
         self.target = self._goal = self._last_s = None
         self._last = {}
         if self._continuity is not None:
@@ -127,12 +127,12 @@ class ProblemStream:
 
         Args:
             problem: The problem, with poses in the solver's base frame. Joints that `problem.start` leaves out start at
-                the last target. With continuity, `start` applies to the first problem only: it must have all joints, or
-                be empty. Later, all joints start at the last target.
+                the last target. With `continuity`, `problem.start` is only used for the first problem, and must contain
+                all joints or be empty. In later problems, all joints start at the last target.
             stamp_s: Time of the problem [s]; 0 for now.
 
         Returns:
-            The solution. With continuity, its positions are replaced by the target; a trajectory is not changed.
+            The solution. With `continuity`, its positions are replaced by the target, except if it has a trajectory.
 
         Raises:
             UnknownNameError: If the problem names an unknown joint.
@@ -162,21 +162,24 @@ class ProblemStream:
     def _advance(
         self, continuity: JointRateLimiter, goal: tuple[float, ...], stamp_s: float
     ) -> tuple[tuple[float, ...], float]:
-        """Sets the next target towards a goal; returns the target, and the completed fraction of the motion."""
+        """Moves the target towards a goal. Returns the new target, and the fraction of the way that it covers."""
         positions, share = continuity.next(goal, self._period_s(stamp_s))
         self.target = tuple(positions.tolist())
         self._last = dict(zip(self._solver.joint_names, self.target))
         return self.target, share
 
     def _complete(self, start: JointPositions) -> JointPositions:
-        """Checks that a start has all joints or is empty, since the robot would jump to guessed positions."""
+        """Returns the start after checking that it has all joints or is empty.
+
+        Otherwise, the robot would jump to guessed positions.
+        """
         missing = [name for name in self._solver.joint_names if name not in start]
         if start and missing:
             raise ValueError(f"start: continuity begins there and needs all joints; it lacks {', '.join(missing)}")
         return start
 
     def _period_s(self, stamp_s: float) -> float:
-        """Returns the time from the last call to `stamp_s` [s], or 0 at the first call; `stamp_s=0` means now."""
+        """Returns the time between the last stamp and `stamp_s` [s], or 0 at the first call; `stamp_s=0` means now."""
         now_s = stamp_s or time.monotonic()
         period_s = 0.0 if self._last_s is None else now_s - self._last_s
         self._last_s = now_s

@@ -1,4 +1,4 @@
-"""Spheres, boxes and capsules that approximate links and obstacles."""
+"""Options of spheres, boxes and capsules that approximate links and obstacles."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RoundedCore(NamedTuple):
 
     @property
     def is_box(self) -> bool:
-        """Whether the core is a box; otherwise it is a point, or a line along z."""
+        """Whether the core is a box. If False, the core is a point, or a line along z."""
         return bool(self.half[:2].any())
 
 
@@ -33,9 +33,9 @@ class ShapeConfig(ConfigModel):
 
     Attributes:
         name: Name of the shape in tasks and messages.
-        link: Link that the shape is attached to. None: the shape is fixed in the base.
-        position: Position of the shape's centre in the link or base [m].
-        orientation: Orientation of the shape in the link or base, quaternion x, y, z, w.
+        link: Link that the shape is attached to. None: the shape is fixed in the base frame.
+        position: Position of the shape's centre in the link's frame or base frame [m].
+        orientation: Orientation of the shape in the link's frame or base frame, quaternion x, y, z, w.
         sphere: Radius of a sphere [m].
         box: Full lengths of a box along x, y and z [m].
         capsule: Radius of a capsule, and its length along z between the centres of the round ends [m].
@@ -62,7 +62,7 @@ class ShapeConfig(ConfigModel):
 
     @property
     def pose(self) -> Pose:
-        """Pose of the shape in the link or base."""
+        """Pose of the shape in the frame of `link`, or in the base frame."""
         return Pose(self.position, self.orientation)
 
     @property

@@ -16,9 +16,9 @@ _log = logging.getLogger(__name__)
 class Solver(ABC):
     """Solves problems of inverse kinematics for one robot.
 
-    A subclass declares its options in `Config`; users give them in YAML, or as parameters of the solver's node. If a
-    problem has no solution, the answer has `success=False` and the reason in `message`. An exception means that the
-    problem is invalid.
+    A subclass declares its options in `Config`; users set the options in YAML, or as parameters of the solver's node.
+    If a problem cannot be solved, the result has `success=False` and the reason in `message`. An exception means that
+    the problem is invalid.
 
     Attributes:
         Config: Pydantic model of the options.
@@ -40,7 +40,7 @@ class Solver(ABC):
 
     @abstractmethod
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Searches for joint positions.
+        """Searches for joint positions that solve a problem.
 
         Raises:
             ValueError: If the problem does not fit the solver: a required field is missing, or the solver does not
@@ -52,7 +52,7 @@ class Solver(ABC):
 class StartLimits:
     """Moves start positions into the joint limits, and logs a warning once per joint.
 
-    The warning is not repeated, since a stream may have the same start a hundred times per second.
+    The warning is not repeated, since a stream of problems may have the same start a hundred times per second.
     """
 
     def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
@@ -61,7 +61,7 @@ class StartLimits:
         self._warned_of: set[str] = set()
 
     def wrap_to_limits(self, start: Sequence[float]) -> list[float]:
-        """Moves n positions into the limits, and returns them [rad or m]; see `Limits.wrap_to_limits`."""
+        """Returns n start positions, moved into the limits [rad or m]; see `Limits.wrap_to_limits`."""
         inside = self._limits.wrap_to_limits(start, start)[0]
         joints = zip(self._joint_names, start, inside)
         outside = {name: asked for name, asked, used in joints if abs(asked - used) > LIMIT_ROUNDING}

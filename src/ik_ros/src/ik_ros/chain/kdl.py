@@ -1,4 +1,4 @@
-"""Kinematics of a chain, and a target pose with tolerances, in the Orocos Kinematics and Dynamics Library (KDL)."""
+"""Computes chain kinematics and pose errors with the Orocos Kinematics and Dynamics Library (KDL)."""
 
 import math
 from collections.abc import Sequence
@@ -19,8 +19,8 @@ class KdlChain:
         description: The chain, with n joints to solve for.
 
     Attributes:
-        kdl: KDL's chain; its m joints are the moving joints, mimic joints included.
-        is_plain: Whether the chain has no mimic joints, so that the m joints are the n joints to solve for.
+        kdl: KDL's object for the chain. Its m joints are all moving joints, including mimic joints.
+        is_plain: True if the chain has no mimic joints. Then the m joints are the n joints to solve for.
     """
 
     def __init__(self, description: Chain) -> None:
@@ -34,13 +34,16 @@ class KdlChain:
         self._to_jacobian = PyKDL.ChainJntToJacSolver(self.kdl)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
-        """Returns the pose of the tip in the base at n joint positions [rad or m]; the next call changes the object."""
+        """Returns the pose of the tip in the base frame at n joint positions [rad or m].
+
+        The next call overwrites the returned object.
+        """
         self._set(q)
         self._to_frame.JntToCart(self._positions, self._frame)
         return self._frame
 
     def pose(self, q: Sequence[float]) -> Pose:
-        """Returns the pose of the tip in the base at n joint positions [rad or m]."""
+        """Returns the pose of the tip in the base frame at n joint positions [rad or m]."""
         frame = self.frame(q)
         x, y, z = frame.p
         return Pose((x, y, z), frame.M.GetQuaternion())
@@ -62,9 +65,9 @@ class Goal:
     """The target pose of a problem, with tolerances for each axis.
 
     Attributes:
-        frame: Pose of the target in the base.
-        inverse: Pose of the base in the target.
-        tolerance: Largest allowed errors of the link in the axes of the target: 3 distances [m], and 3 components of
+        frame: Pose of the target in the base frame.
+        inverse: Pose of the base in the target frame.
+        tolerance: Largest allowed errors of the link's pose in the target frame: 3 distances [m], and 3 components of
             the rotation vector from target to link [rad]. A component is inf if the rotation is free.
         is_point: Whether all tolerances are at most the default tolerances, `POSITION_TOLERANCE_M` and
             `ORIENTATION_TOLERANCE_RAD`.
@@ -102,7 +105,7 @@ class Goal:
         return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
 
     def residual(self, frame: PyKDL.Frame) -> Residual:
-        """Returns position and orientation error of a link pose, each reduced by the tolerances."""
+        """Returns the parts of a link pose's position and orientation error that exceed the tolerances."""
         x, y, z, rx, ry, rz = self.beyond(self.off(frame))
         return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
 

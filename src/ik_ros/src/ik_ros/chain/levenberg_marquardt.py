@@ -14,7 +14,7 @@ ITERATIONS = 60
 LEVER_M = 0.1
 """Length that converts rotation errors to metres [m]: 0.01 rad count as 1 mm."""
 DONE_M = 1e-5
-"""Error at which the descent ends [m]."""
+"""Error up to which the goal counts as reached, which ends the descent [m]."""
 LARGEST_STEP = 1.0
 """Largest motion of a joint in one iteration [rad or m]."""
 LEAST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-4, 1e2
@@ -25,10 +25,10 @@ PATIENCE = 3
 
 
 def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
-    """Searches for joint positions that bring the tip of a chain to a goal, by descent from a start.
+    """Searches for joint positions that bring the tip of a chain to a goal, by descent from start positions.
 
-    The descent minimises the part of the error that exceeds the goal's tolerances. In each iteration, joints at a limit
-    are held if the step would move them beyond the limit.
+    The descent minimises the part of the error that exceeds the goal's tolerances. In each iteration, a joint at a
+    limit is held if descent would move the joint beyond the limit.
 
     Args:
         chain: The chain, with n joints to solve for.
@@ -37,7 +37,7 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
         start: n positions within the limits [rad or m].
 
     Returns:
-        The n best positions that were found, within the limits [rad or m].
+        The best joint positions that were found: n positions within the limits [rad or m].
     """
     lower, upper = np.array(limits.lower), np.array(limits.upper)
     to_target = np.array([[goal.inverse.M[row, column] for column in range(3)] for row in range(3)])
@@ -72,8 +72,10 @@ def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequ
 
 
 def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
-    """Returns the 6 errors that exceed the tolerances, rotations times `LEVER_M` [m], and the rotation vector from
-    target to link [rad]."""
+    """Returns the parts of the 6 errors that exceed the tolerances, and the rotation vector from target to link [rad].
+
+    Rotation errors are multiplied by `LEVER_M`, so that all errors are in metres.
+    """
     off = goal.off(chain.frame(q.tolist()))
     error = np.array(goal.beyond(off))
     error[3:] *= LEVER_M
@@ -81,7 +83,7 @@ def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list
 
 
 def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
-    """Returns the Jacobian of the 6 errors by the n joints, ignoring tolerances, 6 x n.
+    """Returns the derivatives of the 6 errors with respect to the n joint positions, 6 x n; ignores tolerances.
 
     The derivative of a rotation vector is the inverse left Jacobian of SO(3) times the angular velocity (Barfoot, State
     Estimation for Robotics, 2017, section 7.1.5).
@@ -89,7 +91,7 @@ def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Seque
     Args:
         chain: The chain.
         q: n joint positions [rad or m].
-        to_target: Rotation from the base to the axes of the target, 3 x 3.
+        to_target: Rotation matrix that converts base coordinates to target coordinates, 3 x 3.
         turn: Rotation vector from target to link [rad].
     """
     x, y, z = turn

@@ -56,8 +56,8 @@ class ChainConfig(ConfigModel):
 class ChainSolver(Solver):
     """Brings the tip of a chain of joints to a target pose.
 
-    Subclasses only search for joint positions. This class moves the positions into the limits and checks them by
-    forward kinematics, so a reported success is always true. A lock makes `solve` thread-safe.
+    Subclasses only search for joint positions. This class moves the positions into the limits, and checks by forward
+    kinematics that the tip reaches the target before it reports success. A lock makes `solve` thread-safe.
 
     Attributes:
         description: The chain, read from the URDF.
@@ -83,7 +83,7 @@ class ChainSolver(Solver):
 
     @abstractmethod
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Searches for joint positions.
+        """Searches for joint positions that bring the tip to the goal.
 
         Args:
             problem: The problem.
@@ -118,17 +118,17 @@ class ChainSolver(Solver):
         )
 
     def residual(self, goal: Goal, q: Sequence[float]) -> Residual:
-        """Returns the tip's error, reduced by the goal's tolerances, at n joint positions [rad or m]."""
+        """Returns the part of the tip's error that exceeds the goal's tolerances, at n joint positions [rad or m]."""
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
-        """Returns whether the target's position is certainly unreachable, see `Reach`; false without a target."""
+        """Returns whether the target's position is certainly unreachable (see `Reach`); False without a target."""
         if problem.target is None:
             return False
         return not self.description.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
 
     def _start(self, given: Mapping[str, float]) -> list[float]:
-        """Completes start positions by the middle of the limits, moves them into the limits, and returns them."""
+        """Returns n start positions within the limits; for joints that are not given, the middle of their limits."""
         for name in given:
             if name not in self.description.robot_joints:
                 raise UnknownNameError("joint", name, self.joint_names)
@@ -150,7 +150,7 @@ def refuse_mimics(config: ChainConfig, solver: str) -> None:
         solver: Name of the solver, for the message.
 
     Raises:
-        ConfigError: If the chain has mimic joints; the error names them.
+        ConfigError: If the chain has mimic joints; the message names these joints.
     """
     if mimics := config.chain.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"

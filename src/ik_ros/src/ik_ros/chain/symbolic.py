@@ -1,4 +1,4 @@
-"""Symbolic kinematics of a chain in CasADi: link poses, and distances of spheres on links from obstacles.
+"""Symbolic kinematics of a chain in CasADi: link poses, and distances between spheres on links and obstacles.
 
 Pinocchio cannot be used here, since its wheel lacks CasADi bindings.
 """
@@ -15,11 +15,11 @@ from robot_model.chain import Chain
 from robot_model.urdf.elements import UrdfJoint
 
 SMALL = 1e-12
-"""Constant added below square roots, so that they are smooth at 0 [m^2]."""
+"""Constant added to the arguments of square roots, so that the roots are differentiable everywhere [m^2]."""
 
 
 def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
-    """Returns the pose of each link of a chain in the base, by link name.
+    """Returns the pose of each link of a chain in the base frame, indexed by link name.
 
     Args:
         chain: The chain, which must not have mimic joints.
@@ -44,11 +44,11 @@ def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
 
 
 def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[Any, Any]]) -> list[Any]:
-    """Returns the distance of each sphere on a link from each obstacle [m]; negative if they penetrate each other.
+    """Returns the distance between each sphere on a link and each obstacle [m]; negative if they overlap.
 
     Args:
-        shapes: Spheres on links of the chain, and obstacles, which are shapes fixed in the base.
-        frames: Pose of each link in the base, see `link_frames`.
+        shapes: Spheres on links of the chain, and obstacles, which are shapes fixed in the base frame.
+        frames: Pose of each link in the base frame, see `link_frames`.
     """
     obstacles = [shape for shape in shapes if shape.link is None]
     distances = []
@@ -70,7 +70,7 @@ def rotation_vector(rotation: Any) -> Any:
 
 
 def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
-    """Returns rotation matrix and translation [m] of a joint's motion to the position q, in the joint's frame."""
+    """Returns the rotation matrix and translation [m] by which a joint at position q moves its child link."""
     if not joint.is_revolute:
         return casadi.DM.eye(3), np.array(joint.axis) * q
     cross = casadi.skew(casadi.DM(joint.axis))
@@ -79,7 +79,7 @@ def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
 
 
 def _distance(point: Any, obstacle: ShapeConfig) -> Any:
-    """Returns the distance of a point in the base from the surface of an obstacle; negative inside [m]."""
+    """Returns the distance from a point to an obstacle's surface [m]; negative if the point is in the obstacle."""
     half, radius = obstacle.core
     local = Rotation.from_quat(obstacle.orientation).as_matrix().T @ (point - np.array(obstacle.position))
     if not obstacle.core.is_box:

@@ -37,16 +37,16 @@ OPTIONS: Any = {
 class Spline:
     """Cubic B-splines over the time from 0 to 1, for any number of joints.
 
-    At each time, a B-spline is a convex combination of its control points. The same holds for its derivatives and their
-    control points. So limits that hold at all control points hold at all times (de Boor, A Practical Guide to Splines,
-    1978). Accelerations are piecewise linear.
+    At each time, a B-spline is a convex combination of its control points, and each derivative is a convex combination
+    of the derivative's control points. So limits that hold at all control points hold at all times (de Boor, A
+    Practical Guide to Splines, 1978). Accelerations are piecewise linear.
 
     Args:
-        intervals: Number of polynomials of the spline.
+        intervals: Number of polynomial pieces of the spline.
 
     Attributes:
         count: Number m of control points.
-        times: Time of each control point, from 0 to 1, as the mean of the control point's knots.
+        times: Time of each control point, from 0 to 1: the mean of the control point's inner knots (Greville abscissa).
         to_velocity: Matrix from position control points to velocity control points, (m - 1) x m.
         to_acceleration: Matrix from position control points to acceleration control points, (m - 2) x m.
     """
@@ -74,7 +74,7 @@ class Spline:
 
     @property
     def roughness(self) -> np.ndarray:
-        """Matrix R, m x m: p R p is the integral of the squared acceleration of a spline with control points p."""
+        """Matrix R, m x m, such that p^T R p is a spline's integrated squared acceleration for control points p."""
         pair = np.array(((2.0, 1.0), (1.0, 2.0))) / (
             6.0 * self.intervals
         )  # integral of the square of a linear function, given by its end values
@@ -89,12 +89,12 @@ class Program:
 
     Args:
         chain: The chain.
-        shapes: Spheres on links of the chain, and obstacles fixed in the base.
-        intervals: Number of polynomials of each joint's spline.
+        shapes: Spheres on links of the chain, and obstacles fixed in the base frame.
+        intervals: Number of polynomial pieces of each joint's spline.
         waypoints: Number of waypoints.
 
     Attributes:
-        spline: Basis of the splines.
+        spline: B-spline basis that all joints share.
     """
 
     def __init__(self, chain: Chain, shapes: Sequence[ShapeConfig], intervals: int, waypoints: int) -> None:
@@ -151,8 +151,8 @@ class Program:
 
         Args:
             start: n start positions, at rest [rad or m].
-            poses: Poses of the waypoints in the base, 12 x w: 9 numbers of the rotation matrix, column by column, and 3
-                numbers of the position [m].
+            poses: Poses of the waypoints in the base frame, 12 x w: 9 numbers of the rotation matrix, column by
+                column, and 3 numbers of the position [m].
             basis: Matrix from control points to the positions at the waypoints, w x m, see `Spline.basis`.
             tolerance: Largest errors of the tip at a waypoint: 3 along [m] and 3 about [rad] the waypoint's axes.
             limits: Limits of the n joints.
@@ -192,5 +192,5 @@ class Program:
 
 
 def _sparse(matrix: np.ndarray) -> casadi.DM:
-    """Converts a matrix to a sparse CasADi matrix, so that CasADi leaves out its zeros in derivatives."""
+    """Converts a matrix to a sparse CasADi matrix, so that CasADi skips the matrix's zeros in derivatives."""
     return casadi.sparsify(casadi.DM(matrix))

@@ -42,7 +42,7 @@ NOTATIONS: Mapping[str, tuple[int, Callable[[Sequence[float]], Rotation]]] = {
     "Quaternion": (4, _checked_quaternion),
     "Matrix": (9, _checked_matrix),
 }
-"""For each notation: number of values, and the function that converts the values to a rotation."""
+"""Number of values for each notation of a rotation, and the function that converts the values to a rotation."""
 
 
 def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
@@ -53,7 +53,7 @@ def rotation_of(notation: str, numbers: Sequence[float]) -> Quaternion:
         numbers: The rotation in this notation.
 
     Raises:
-        ValueError: If the numbers are not a rotation, or there are too many or too few.
+        ValueError: If the numbers are not a rotation, or their number is wrong.
     """
     count, make = NOTATIONS[notation]
     if len(numbers) != count:
@@ -130,11 +130,11 @@ class ElementConfig(ConfigModel):
 
 
 def element_of(model: type[Element], record: XmlRecord, file: str) -> Element:
-    """Validates a record with the model of its element, and returns the model's instance.
+    """Validates an XML element, and returns an instance of the element's model.
 
     Args:
-        model: Class of the element.
-        record: The record, as read from XML.
+        model: Pydantic model of the element.
+        record: The element, as read from XML.
         file: Path of the XML file, for messages and relative paths.
 
     Raises:
@@ -149,7 +149,7 @@ def list_of(models: Callable[[], Mapping[str, type[ElementConfig]]], kind: str) 
 
     Args:
         models: Function that returns the allowed models by tag. Elements with other tags are rejected.
-        kind: Noun for one of the elements, in messages.
+        kind: Noun for an element of the list, for error messages.
     """
 
     def check(value: Any, info: ValidationInfo) -> Any:
@@ -180,7 +180,7 @@ def _refuse(kind: str, value: Any) -> Any:
 
 
 class MapFrame(ElementConfig):
-    """A frame of a task map: the frame `Link` with `LinkOffset`, relative to the frame `Base` with `BaseOffset`."""
+    """A frame of a task map: the frame `Link`, relative to the frame `Base`, each displaced by its offset."""
 
     Link: Text
     LinkOffset: PoseNumbers = Pose()
@@ -189,7 +189,7 @@ class MapFrame(ElementConfig):
 
 
 class LinkConfig(ElementConfig):
-    """A frame of the scene that does not belong to the robot."""
+    """An additional frame of the scene, which does not belong to the robot."""
 
     IGNORED = frozenset(("Debug", "Mass", "CenterOfMass", "Shape"))
     Name: Text
@@ -198,7 +198,7 @@ class LinkConfig(ElementConfig):
 
 
 class SceneConfig(ElementConfig):
-    """The robot, and additional frames; collisions are not checked."""
+    """The scene: a robot, its joint group, and additional frames. Collisions are not checked."""
 
     IGNORED = frozenset(
         (
@@ -219,7 +219,7 @@ class SceneConfig(ElementConfig):
 
 
 class CostConfig(ElementConfig):
-    """Weights `Rho` and goal of a task map in the costs."""
+    """A cost: the name of a task map, and the weights `Rho` and the goal of the map's values."""
 
     Task: Text
     Rho: Numbers = ()
@@ -227,7 +227,7 @@ class CostConfig(ElementConfig):
 
 
 class SolverConfig(ElementConfig):
-    """The element `IKSolver`; only its number of iterations has an effect here."""
+    """The element `IKSolver`, of which only the number of iterations has an effect here."""
 
     IGNORED = frozenset(
         (

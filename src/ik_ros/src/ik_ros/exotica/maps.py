@@ -1,4 +1,4 @@
-"""EXOTica's task maps, as far as tasks of the solver `tasks` can express them."""
+"""Those task maps of EXOTica that tasks of the solver `tasks` can express."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Situation(NamedTuple):
 
     Attributes:
         scene: The scene.
-        frames: Frames of the scene that the problem attaches to another parent, by name.
-        start: Start positions of the group's joints, by name [rad or m].
+        frames: Frames of the scene that the problem attaches to a new parent, indexed by frame name.
+        start: Start positions of the joint group, indexed by joint name [rad or m].
         previous: Previous solutions, the newest last.
     """
 
@@ -43,7 +43,7 @@ class MapTask(NamedTuple):
         options: Options of the task, without name and weight.
         rho: EXOTica's weight of the task.
         goal: Function that computes the task's goal from the numbers of the map's goal; None for a task without goal.
-        on_link: Frame that the task moves; None for tasks that do not concern a frame.
+        on_link: Frame on a link that the task moves; None for tasks that do not concern a link's pose.
     """
 
     options: dict[str, Any]
@@ -56,7 +56,8 @@ class TaskMap(ElementConfig):
     """Base class of task maps. A task map computes values from the configuration, and has a goal for these values.
 
     Attributes:
-        is_about_links: Whether the map concerns links or the centre of mass. Such maps may be required for success.
+        is_about_links: Whether the map concerns links or the centre of mass. Success may depend on the error of such
+            maps.
     """
 
     is_about_links: ClassVar[bool] = False
@@ -69,7 +70,7 @@ class TaskMap(ElementConfig):
 
     @abstractmethod
     def size(self, scene: ExoticaScene) -> int:
-        """Returns how many numbers the map's goal has."""
+        """Returns the number of values in the map's goal."""
 
     @abstractmethod
     def parts(self, scene: ExoticaScene, rho: Sequence[float]) -> Iterator[MapTask]:
@@ -77,16 +78,16 @@ class TaskMap(ElementConfig):
 
         Args:
             scene: The scene.
-            rho: Weights of the map's values, see `weights`.
+            rho: Weights of the map's values; `weights` returns the number of weights.
         """
 
     def weights(self, scene: ExoticaScene) -> int:
-        """Returns how many weights the map has."""
+        """Returns the number of weights that the map has."""
         return self.size(scene)
 
 
 def _groups(names: Sequence[str], rho: Sequence[float]) -> dict[float, list[str]]:
-    """Groups names by their weight in `rho`, and leaves out names with weight 0."""
+    """Returns lists of names, indexed by the weight in `rho` that they share; leaves out names with weight 0."""
     found: dict[float, list[str]] = {}
     for name, weight in zip(names, rho):
         if weight:
@@ -98,7 +99,7 @@ Frames = Annotated[tuple[MapFrame, ...], list_of(lambda: {"Frame": MapFrame}, "f
 
 
 class LinkMap(TaskMap):
-    """Base class of the maps about positions, orientations or poses of links in other frames."""
+    """Base class of the task maps for positions, orientations or poses of links in other frames."""
 
     is_about_links = True
     axes: ClassVar[tuple[str, ...]]
@@ -111,12 +112,12 @@ class LinkMap(TaskMap):
 
     @property
     def positions(self) -> int:
-        """Number of position coordinates of one frame in the map's goal."""
+        """Number of position coordinates that the map's goal has for each frame."""
         return sum(axis in XYZ for axis in self.axes)
 
     @property
     def stride(self) -> int:
-        """How many numbers one frame has in the map's goal: position coordinates and rotation."""
+        """Number of values that the map's goal has for each frame: position coordinates and rotation."""
         return self.positions + (NOTATIONS[self.notation][0] if self.notation else 0)
 
     def size(self, scene: ExoticaScene) -> int:
@@ -194,7 +195,7 @@ def _refuse_goal(values: Sequence[float], situation: Situation) -> None:
 
 
 class LookAtMap(TaskMap):
-    """Task map of the direction of a frame's z axis: the frame `Base` on a moving link points at the frame `Link`."""
+    """Task map that points the z axis of the frame `Base`, on a moving link, at the fixed frame `Link`."""
 
     is_about_links = True
     EndEffector: Frames
@@ -271,14 +272,14 @@ class JointPoseMap(TaskMap):
         return goal
 
     def reference(self, joints: Sequence[str], situation: Situation) -> JointPositions:
-        """Returns the positions by joint to which the numbers of the map's goal are added [rad or m]."""
+        """Returns the positions by joint name to which the values of the map's goal are added [rad or m]."""
         return dict(zip(joints, self.JointRef or (0.0,) * len(joints)))
 
 
 class _BackwardDifference(JointPoseMap):
     factors: ClassVar[tuple[float, ...]]
-    """Factors of the previous solutions, the newest first. The sum of the products is the position at which the
-    difference is 0."""
+    """Factors by which previous solutions are multiplied, the newest solution first. The sum of the products is the
+    joint position at which the difference is 0."""
     JointMap: Annotated[Numbers, Field(max_length=0)] = ()
     JointRef: Annotated[Numbers, Field(max_length=0)] = ()
     StartState: Numbers = ()
@@ -316,7 +317,7 @@ class JointJerkBackwardDifferenceMap(_BackwardDifference):
 
 
 class JointLimitMap(TaskMap):
-    """Task map of the distance of joints beyond their limits, after the ranges are narrowed by `SafePercentage`."""
+    """Task map of the distance by which joints exceed their limits, after `SafePercentage` has narrowed the ranges."""
 
     SafePercentage: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.0
 

@@ -18,9 +18,9 @@ Element = TypeVar("Element", bound=ElementConfig)
 
 
 class UnconstrainedEndPoseProblem(ElementConfig):
-    """A problem that minimises costs of one configuration.
+    """A problem that minimises costs of one robot configuration.
 
-    The field `W` only weights the steps of EXOTica's own solver, and has no effect here.
+    The field `W` weights joints in the steps of EXOTica's own solver, and has no effect here.
     """
 
     IGNORED = frozenset(("Debug", "StartTime", "DerivativeOrder", "W", "NominalState"))
@@ -63,8 +63,8 @@ def read_problem(path: str) -> ProblemFile:
     """Reads the first problem and the first solver in a file, as EXOTica does.
 
     Raises:
-        ConfigError: If the file cannot be read, or contains an element that the tasks cannot express. The error names
-            file and element.
+        ConfigError: If the file cannot be read, or contains an element that the solver `tasks` cannot express. The
+            message names the file and the element.
     """
     records = read_records(path)
     solvers = [record for record in records if record.kind.endswith("Solver")]

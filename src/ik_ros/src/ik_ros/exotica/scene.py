@@ -29,7 +29,7 @@ class OnLink(NamedTuple):
 
 @contextmanager
 def errors_of(key: str) -> Iterator[None]:
-    """Converts a `ValueError` or `UnknownNameError` to a `KeyedError` for the key `key`."""
+    """Context that converts a `ValueError` or `UnknownNameError` to a `KeyedError` for the key `key`."""
     try:
         yield
     except KeyedError:
@@ -50,7 +50,7 @@ class ExoticaScene:
 
     Raises:
         KeyedError: If a field does not fit the robot; the error names the field.
-        ConfigError: If URDF or SRDF cannot be read.
+        ConfigError: If the URDF or SRDF file cannot be read.
     """
 
     def __init__(self, config: SceneConfig) -> None:
@@ -72,14 +72,14 @@ class ExoticaScene:
                 self.place(name)
 
     def place(self, name: str, frames: Mapping[str, AttachedFrame] | None = None) -> OnLink | Pose:
-        """Finds out whether a frame is fixed or moves with a link of the robot.
+        """Returns where a frame is: on a moving link of the robot, or at a fixed pose.
 
         Args:
             name: Name of a link, or of a frame of the scene; empty for the root.
-            frames: Frames of the scene that are attached to another parent than in the XML, by name.
+            frames: Frames with a parent that differs from the XML, indexed by frame name.
 
         Returns:
-            The moving link and the frame's pose in the link; for a fixed frame, the frame's pose in the robot's root.
+            For a moving frame, the link and the frame's pose in it. For a fixed frame, the frame's pose in the root.
 
         Raises:
             UnknownNameError: If the frame, or a frame that it is attached to, does not exist.
@@ -102,7 +102,7 @@ class ExoticaScene:
         return self.robot.pose([0.0] * len(self.robot.joint_names), name) @ pose
 
     def fixed(self, name: str, frames: Mapping[str, AttachedFrame] | None = None) -> Pose:
-        """Returns the pose of a fixed frame in the robot's root; see `place`.
+        """Returns the pose of a fixed frame in the robot's root frame; see `place`.
 
         Raises:
             UnknownNameError: If the frame does not exist.
@@ -126,14 +126,14 @@ class ExoticaScene:
         return place
 
     def check_attached(self, frames: Mapping[str, AttachedFrame]) -> None:
-        """Checks the frames that a problem attaches to another parent.
+        """Checks the frames that a problem attaches to a new parent.
 
         Args:
-            frames: The frames by name.
+            frames: The frames, indexed by frame name.
 
         Raises:
-            UnknownNameError: If the scene does not have a frame, or the parent of a frame.
-            ValueError: If a frame moves with the robot, in the XML or with the new parent.
+            UnknownNameError: If the scene lacks one of the frames or of their parents.
+            ValueError: If a frame moves with the robot, either in the XML or with the new parent.
         """
         for name in frames:
             if name not in self._attached:
@@ -143,7 +143,7 @@ class ExoticaScene:
 
 
 def _world_names(srdf: Element, file: str) -> set[str]:
-    """Returns the parent frames of the SRDF's virtual joints, which are names for the fixed frame of the root."""
+    """Returns the names of the parent frames of the SRDF's virtual joints. All stand for the robot's root frame."""
     names = set()
     for joint in srdf.iter("virtual_joint"):
         if joint.get("type") != "fixed":
@@ -160,7 +160,7 @@ def _joints_of_group(srdf: Element, name: str, robot: RobotModel, inside: tuple[
         srdf: Top element of the SRDF.
         name: Name of the group.
         robot: The robot.
-        inside: Names of the groups that contain this group, to detect loops.
+        inside: Names of the groups that contain this group, to detect a group that contains itself.
     """
     groups = {group.get("name", ""): group for group in srdf.findall("group")}
     if name not in groups:

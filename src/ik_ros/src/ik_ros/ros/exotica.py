@@ -1,4 +1,4 @@
-"""EXOTica's messages and services, compatible with clients of the original package, and `ik_setup_node.py exotica`."""
+"""EXOTica's messages and services as in the original package, and the setup node `ik_setup_node.py exotica`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def problem_in_exotica(message: EXOTicaProblem) -> IKProblem:
     """Converts a message of the original package to a problem.
 
     Raises:
-        ValueError: If a number is not finite or out of range, or lengths differ; the error names the field.
+        ValueError: If a number is not finite or out of range, or lists differ in length; the message names the field.
     """
     names, goals = message.task_map_names, message.task_map_goals
     if len(names) != len(goals):
@@ -104,9 +104,9 @@ def synced_frames(lines: Sequence[str]) -> list[SyncedFrame]:
 
 
 class ExoticaSetup:
-    """Publishes problems for the solver `exotica`, with goals of task maps and frames, as in the original package.
+    """Publishes problems for the solver `exotica`, with task map goals and frame poses, as in the original package.
 
-    First waits for the solver node, which describes its task maps.
+    First waits until the solver node has described its task maps.
 
     Raises:
         ConfigError: If a parameter is invalid.
@@ -150,7 +150,7 @@ class ExoticaSetup:
 
 
 def _info() -> EXOTicaInfoResponse:
-    """Waits for the solver node, and returns the description of its task maps."""
+    """Waits for the solver node, and returns the solver node's description of its task maps."""
     service = rospy.ServiceProxy(INFO, EXOTicaInfo)
     rospy.loginfo("waiting for %s", service.resolved_name)
     service.wait_for_service()

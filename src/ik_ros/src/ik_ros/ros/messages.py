@@ -16,10 +16,10 @@ from robot_model.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:
-    """Converts a message to a problem, without transforming its poses to another frame.
+    """Converts a message to a problem. The poses stay in the frame of the message.
 
     Raises:
-        ValueError: If a number is not finite or out of range, or lengths differ; the error names the field.
+        ValueError: If a number is not finite or out of range, or lists differ in length; the message names the field.
     """
     return IKProblem(
         target=pose_in(message.target) if message.has_target else None,
@@ -66,14 +66,14 @@ def problem_message(problem: IKProblem, header: Header) -> IKProblemMessage:
 
 
 def positions_in(what: str, message: JointState) -> JointPositions:
-    """Converts a joint state to positions by joint; empty for an empty message.
+    """Converts a joint state to positions by joint name; returns an empty dict for an empty message.
 
     Args:
-        what: Name of the field, for error messages.
+        what: Name of the field that contains the joint state, for error messages.
         message: The joint state.
 
     Raises:
-        ValueError: If lengths differ, names are missing or repeated, or a value is not finite.
+        ValueError: If names and positions differ in number, a name is missing or repeated, or a value is not finite.
     """
     try:
         values = JointValues.of(message.name, message.position)
@@ -85,7 +85,7 @@ def positions_in(what: str, message: JointState) -> JointPositions:
 
 
 def positions_message(positions: JointPositions) -> JointState:
-    """Converts positions by joint to a joint state."""
+    """Converts positions by joint name to a joint state."""
     return JointState(name=list(positions), position=list(positions.values()))
 
 

@@ -27,14 +27,14 @@ from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import FreshTf
 
 START_PATIENCE_S = 2.0
-"""Time without a start position after which the node warns that it waits for one [s]."""
+"""Time without a start position after which the node warns that it is waiting for a start position [s]."""
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
 """Keys of `~config` that are not fields of the message `CalculateInverseKinematicsProblem`."""
 
 
 class SetupNode:
-    """Publishes problems at a fixed rate while switched on, if start and target are available.
+    """Publishes problems at a fixed rate while switched on and while start and target are available.
 
     Args:
         name: Name of the solver, which is part of the names of topics and services.
@@ -109,10 +109,10 @@ def _fields(tolerances: dict[str, float]) -> dict[str, Any]:
 
 
 class RobotIKSetup:
-    """Publishes problems for the simulated robot's own inverse kinematics (`pybullet` with the parameter `~config`).
+    """Publishes problems for a simulated robot's own inverse kinematics (`pybullet` with the parameter `~config`).
 
-    The messages are of the type that the robot's topic `rpbi/NAME/ik` expects, so a solver node is not needed. First
-    waits for the robot, which knows the order of its joints.
+    The messages have the type of the robot's topic `rpbi/NAME/ik`, so a solver node is not needed. First waits until
+    the robot has reported the order of its joints.
 
     Raises:
         ConfigError: If `~config` or a parameter is invalid.

@@ -1,4 +1,4 @@
-"""Topics of setup nodes: receives start and previous solutions, publishes problems, and watches the solver node."""
+"""Topics of setup nodes: receives start positions and previous solutions, publishes problems, monitors the solver."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .messages import positions_in
 
 QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
-"""Topics of the start position; the solvers of the original package have different names for this topic."""
+"""Topics on which start positions are received; each is the name that a solver of the original package uses."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 LOOK_HZ = 1.0
 SILENT_AFTER_S = 5.0
@@ -30,17 +30,17 @@ SILENT_AFTER_S = 5.0
 
 
 class ProblemInputs:
-    """Receives start and previous solutions of the next problem from topics.
+    """Receives start positions and previous solutions for the next problem from topics.
 
     Args:
         topics: Prefix of the topic names.
         max_previous: Largest number of previous solutions that are kept.
-        start: Start positions until a message is received; None if problems have to wait for a message.
+        start: Start positions before the first message. None: problems have to wait for the first message.
 
     Attributes:
         lock: Lock that is held while a message is processed.
-        start: Start positions by joint [rad or m]; None before the first message.
-        previous: Previous solutions as positions by joint [rad or m], the newest last.
+        start: Start positions by joint name [rad or m]; None while problems have to wait.
+        previous: Previous solutions as positions by joint name [rad or m], the newest last.
     """
 
     def __init__(self, topics: str, max_previous: int, start: JointPositions | None) -> None:
@@ -50,7 +50,7 @@ class ProblemInputs:
         self._topics, self._warn = topics, ThrottledWarning()
 
     def subscribe(self) -> None:
-        """Subscribes to the topics of start and previous solutions."""
+        """Subscribes to the topics of start positions and previous solutions."""
         for topic in START_TOPICS:
             self.listen(topic, JointState, partial(self._on_start, topic))
         for topic in PREVIOUS_TOPICS:
@@ -90,16 +90,16 @@ def publish_problems(
     problem: Callable[[], rospy.Message | None],
     has_solver_node: bool = True,
 ) -> None:
-    """Starts to publish problems on the topic `ik` at a fixed rate, while switched on by the service `toggle`.
+    """Starts a timer that publishes problems on the topic `ik`, and the service `toggle` that switches it on and off.
 
     Args:
         topics: Prefix of the name of the service `toggle`.
         message_type: Type of the problem messages.
         hz: Rate, in wall time [Hz].
         start_on_init: Whether publishing is switched on initially.
-        problem: Function that returns the next problem. If a problem is not available, it returns None, or raises an
-            `InterfaceError` or `ValueError` with the reason, which is logged.
-        has_solver_node: Whether to expect answers of a solver node on `ik/solution`, see `SolverWatch`.
+        problem: Function that returns the next problem. If a problem is not available, the function returns None, or
+            raises an `InterfaceError` or `ValueError` with the reason, which is logged.
+        has_solver_node: Whether to expect a solver node's solutions on `ik/solution`, see `SolverWatch`.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -124,7 +124,7 @@ def publish_problems(
 
 
 class SolverWatch:
-    """Reports if the solver node has ended or does not answer: logs a warning, and publishes on /diagnostics.
+    """Logs a warning if the solver node has ended or does not answer. Publishes the state on /diagnostics.
 
     Args:
         problems: Publisher of the problems.
@@ -135,14 +135,14 @@ class SolverWatch:
         self._lock = threading.Lock()
         self._solver = ""
         self._asked_s: float | None = None
-        """Time of the first problem after the newest solution, None if there is no such problem."""
+        """Time of the first problem after the newest solution; None if a problem has not been published since."""
         self._fault = ""
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         rospy.Subscriber("ik/solution", rospy.AnyMsg, self._on_solution, queue_size=1)
         WallTimer(LOOK_HZ, self._look)
 
     def note_problem(self) -> None:
-        """Tells the watch that a problem was published, so that it expects a solution."""
+        """Records that a problem was published, so that a solution is expected."""
         with self._lock:
             if self._asked_s is None:
                 self._asked_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""Use of a solver's name in ROS: as the argument of its nodes, and as part of node, topic and service names."""
+"""Use of a solver's name in ROS: as a command line argument, and as part of node, topic and service names."""
 
 import sys
 from collections.abc import Callable
@@ -21,7 +21,7 @@ def topics_of(kind: str, name: str) -> str:
 
 
 def trust_only_what_was_named() -> None:
-    """Forbids imports of further plug-ins: only those that the node's options name at the start can be used."""
+    """Allows only plug-ins that the node's options have named by now, and forbids importing further plug-ins."""
     trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import only plug-ins that their options name at the start")
 
 
@@ -30,7 +30,7 @@ def run_for_solver(kind: str, make: Callable[[str], object]) -> None:
 
     Args:
         kind: Kind of the node, `setup` or `solver`.
-        make: Function that makes the node for the solver's name.
+        make: Function that takes the solver's name and makes the node.
     """
     arguments = rospy.myargv(sys.argv)[1:]
     if len(arguments) != 1:

@@ -50,7 +50,7 @@ PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProbl
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
 }
-"""Message types that every solver accepts on the topic `ik`: message class, and function that converts a message."""
+"""Messages that every solver accepts on the topic `ik`, by type name: message class, and conversion function."""
 
 
 class SolverNode:
@@ -182,7 +182,7 @@ class SolverNode:
         return EXOTicaResponse(*_in_short(self._solve_alone(problem_in_exotica, request.problem)))
 
     def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
-        """Solves one problem, independently of the problems on the topic, and returns the answer.
+        """Solves one problem, independently of the problems on the topic.
 
         Args:
             read: Function that converts the message to a problem.
@@ -197,12 +197,12 @@ class SolverNode:
 
 
 def _in_short(solution: IKSolution) -> tuple[bool, str, JointState]:
-    """Converts an answer to the three response fields of the services `TracIK` and `EXOTica`."""
+    """Converts a solution to the three response fields of the services `TracIK` and `EXOTica`."""
     return solution.success, solution.message, JointState(name=solution.joint_names, position=solution.positions)
 
 
 def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:
-    """Reads the private parameters; returns the parameters of the node itself, and the options of the solver."""
+    """Reads the private parameters, and splits them into the node's own parameters and the solver's options."""
     given = rospy.get_param("~", {})
     own = {key: value for key, value in given.items() if key in SolverNodeParameters.model_fields}
     options = {key: value for key, value in given.items() if key not in own}

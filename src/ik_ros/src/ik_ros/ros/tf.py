@@ -15,9 +15,9 @@ from .messages import transform_in
 
 
 class FreshTf:
-    """Reads the pose of a TF frame in another frame, and rejects it if it is too old.
+    """Reads the pose of a TF frame in another frame, and rejects poses that are too old.
 
-    The age is the wall time since the transform's stamp last changed. So the transforms of a paused simulation become
+    A pose's age is the wall time since the transform's stamp last changed. So the poses from a paused simulation become
     too old as well. Static transforms are never too old.
 
     Args:
@@ -66,11 +66,11 @@ class BaseFrame:
             self._listener = TfListener(self._buffer)
 
     def with_poses_in_it(self, problem: IKProblem, frame_id: str) -> IKProblem:
-        """Returns the problem with target and waypoints transformed to the base.
+        """Returns the problem with target and waypoints transformed to the solver's base frame.
 
         Args:
             problem: The problem.
-            frame_id: TF frame in which the problem's poses are expressed; empty for the base.
+            frame_id: TF frame in which the problem's poses are expressed; empty for the base frame.
 
         Raises:
             InterfaceError: If TF does not have the transform between the two frames.

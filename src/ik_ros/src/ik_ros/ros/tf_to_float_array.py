@@ -16,7 +16,7 @@ QUEUE_SIZE = 10
 
 
 class TfToFloatArrayNode:
-    """Publishes a transform on the topic `transform` at a fixed rate, while TF has a recent transform.
+    """Publishes a transform on the topic `transform` at a fixed rate, while the transform in TF is recent.
 
     Raises:
         ConfigError: If a parameter is invalid.

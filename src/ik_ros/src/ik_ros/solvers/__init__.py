@@ -1,4 +1,4 @@
-"""The table of solvers. To add a solver, write a class in a file of its own, and add a line here."""
+"""The table of solvers. To add a solver, write a class in a new file, and add a line to the table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from ik_ros.solver import Solver

@@ -1,4 +1,4 @@
-"""The solver `exotica`: solves problems in EXOTica's XML with the solver `tasks`."""
+"""The solver `exotica`: solves problems from EXOTica's XML files with the solver `tasks`."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class ExoticaConfig(ConfigModel):
 
     Attributes:
         xml_filename: EXOTica's XML file, with one problem and its solver; `{package}/path` is resolved.
-        use_scipy_solver: Whether the weight of a cost is Rho, as in EXOTica's SciPy solver, instead of the square of
-            Rho. If true, the file does not need to contain a solver.
+        use_scipy_solver: Whether Rho itself weights a cost, as in EXOTica's SciPy solver, instead of the square of Rho.
+            If true, the file does not need to contain a solver.
         scipy_solver_method: Accepted for compatibility, without effect.
         tolerance_m: Largest position error of a link up to which a goal counts as met [m].
         tolerance_rad: Largest rotation error of a link up to which a goal counts as met [rad].
@@ -48,8 +48,8 @@ class _Cost(NamedTuple):
     """The cost of a task map.
 
     Attributes:
-        goal: Default goal of the map, for problems without a goal for the map.
-        parts: The tasks that express the map, by name.
+        goal: Goal of the map in problems that do not set a goal for the map.
+        parts: The tasks that express the map, indexed by task name.
     """
 
     goal: tuple[float, ...]
@@ -57,7 +57,7 @@ class _Cost(NamedTuple):
 
 
 class ExoticaSolver(Solver):
-    """Solves a problem in EXOTica's XML, whose task maps are converted to tasks of the solver `tasks`.
+    """Solves problems that are defined in EXOTica's XML, by converting task maps to tasks of the solver `tasks`.
 
     Attributes:
         config: The options.
@@ -65,7 +65,7 @@ class ExoticaSolver(Solver):
         scene: The robot and the additional frames.
 
     Raises:
-        ConfigError: If the tasks cannot express an element of the XML; the error names file and element.
+        ConfigError: If the solver `tasks` cannot express an element of the XML. The message names file and element.
     """
 
     Config = ExoticaConfig
@@ -97,15 +97,15 @@ class ExoticaSolver(Solver):
         self.velocity_limits = self._solver.velocity_limits
 
     def map_size(self, name: str) -> int:
-        """Returns how many numbers the goal of a task map has."""
+        """Returns the number of values in a task map's goal."""
         return self.maps[name].size(self.scene)
 
     def solve(self, problem: IKProblem) -> IKSolution:
         """Searches for joint positions that minimise the costs.
 
         Raises:
-            ValueError: If a goal or frame is invalid, or the problem has a target that does not belong to a unique
-                task, see `_main_task`.
+            ValueError: If a goal or frame is invalid, or if the problem has a target but no unique task can take it,
+                see `_main_task`.
             UnknownNameError: If the problem names an unknown joint, task map or frame.
         """
         for name in problem.goals:
@@ -131,11 +131,11 @@ class ExoticaSolver(Solver):
         return self._solver.solve(dataclasses.replace(problem, goals=goals, previous=(), frames={}))
 
     def _costs_of(self, tasks: Sequence[CostConfig], key: str) -> Iterator[tuple[str, _Cost]]:
-        """Yields name and cost of each task map that has a cost.
+        """Yields the name and the cost of each task map that has a cost.
 
         Args:
             tasks: The costs in the XML.
-            key: Path of the costs in the XML, for messages.
+            key: Key path of the costs in the XML, for error messages.
         """
         seen = set()
         for task in tasks:
@@ -213,10 +213,10 @@ class ExoticaSolver(Solver):
         return rho if self.config.use_scipy_solver else rho**2  # IKSolver minimises the square of Rho times the error
 
     def _main_task(self) -> str | None:
-        """Returns the name of the task that gets the target of a problem, or None.
+        """Returns the name of the task whose goal is set to a problem's target, or None.
 
-        The task belongs to the only EffFrame map or, without an EffFrame map, to the only map about a link. The result
-        is None if the map is not unique, or is expressed by several tasks.
+        The task is that of the only EffFrame map. Without an EffFrame map, it is that of the only link map. The result
+        is None if there are several such maps, or several tasks express the map.
         """
         links = [name for name in self._costs if isinstance(self.maps[name], LinkMap)]
         whole = [name for name in links if isinstance(self.maps[name], EffFrameMap)] or links

@@ -18,12 +18,12 @@ class GlobalConfig(KdlConfig):
     """Options of the solver `global`.
 
     Attributes:
-        restarts: Number of random starts after the given start, even if a solution is found before. The number is
-            reduced to 15 with tolerances or mimic joints, and to 3 for targets beyond reach. The search also ends if
-            the first 10 starts miss the target even without joint limits.
+        restarts: Number of random starts after the given start, even if a solution is found before. At most 15 with
+            tolerances or mimic joints, and at most 3 for targets beyond reach. The search also ends if the first 10
+            starts miss the target even without joint limits.
         rank_by: Quantity by which solutions are sorted. `distance_to_start` is the Euclidean distance of the joint
-            positions from the start. `middle_of_limits` is the distance of a joint from the middle of its limits,
-            divided by half its range, for the joint with the largest value.
+            positions from the start. `middle_of_limits` is the largest distance of a joint from the middle of its
+            limits, divided by half the joint's range.
         distinct: Two solutions count as distinct if a joint differs by more than this value [rad or m].
         most: Largest number of returned solutions, including the best solution.
     """
@@ -51,7 +51,7 @@ class GlobalSolver(KdlSolver):
         }[config.rank_by]
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns distinct solutions; without a solution, the best positions found. See `ChainSolver.find`."""
+        """Returns distinct solutions, or the best positions if all searches fail. See `ChainSolver.find`."""
         found = [(self.residual(goal, q).size, q) for q in self.candidates(problem, goal, start, self._restarts)]
         solutions = sorted((self._cost(q, start), q) for size, q in found if size <= 1.0)
         if not solutions:
@@ -64,7 +64,7 @@ class GlobalSolver(KdlSolver):
         return kept
 
     def _off_middle(self, q: Sequence[float], start: Sequence[float]) -> float:
-        """Returns the largest distance of a joint from the middle of its limits, relative to half its range.
+        """Returns the largest distance of a joint from the middle of its limits, divided by half the joint's range.
 
         The value is 1 if a joint is at a limit.
         """

@@ -1,4 +1,4 @@
-"""The solver `pybullet`: PyBullet's inverse kinematics as for simulated robots, with restarts and joint limits."""
+"""The solver `pybullet`: the inverse kinematics of simulated robots in PyBullet, with restarts and joint limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rpbi.kinematics.problem import PybulletProblem
 
 
 class PybulletConfig(ChainConfig):
-    """Options of the solver `pybullet`, with the names and meanings of the fields of `PybulletProblem`.
+    """Options of the solver `pybullet`. Those that are not about the chain are explained in `PybulletProblem`.
 
     Each list has one value for each joint of the chain.
     """
@@ -52,8 +52,8 @@ class PybulletSolver(ChainSolver):
     The random starts are the same for all seeds.
 
     Raises:
-        ConfigError: If the chain has mimic joints; the error names them.
-        ValueError: If the limits in the options and in the URDF exclude each other.
+        ConfigError: If the chain has mimic joints; the message names these joints.
+        ValueError: If a joint's ranges in the options and in the URDF do not overlap.
     """
 
     Config = PybulletConfig
@@ -68,7 +68,7 @@ class PybulletSolver(ChainSolver):
         self.use_limits(question.narrowed(self._kinematics.limits, self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns the first solution; without a solution, the best positions found. See `ChainSolver.find`.
+        """Returns the first solution, or the best positions if all searches fail. See `ChainSolver.find`.
 
         Raises:
             ValueError: If a tolerance of the problem is too large for this solver. Free orientations are allowed.

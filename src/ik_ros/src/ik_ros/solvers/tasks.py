@@ -1,4 +1,4 @@
-"""The solver `tasks`: minimises weighted costs subject to constraints, by sequential quadratic programming."""
+"""The solver `tasks`: minimises weighted costs subject to constraints by sequential quadratic programming."""
 
 import random
 import threading
@@ -24,21 +24,21 @@ from ik_ros.tasks.gauss_newton import Candidate, GaussNewton, Iterate
 from ik_ros.tasks.robot import from_base, to_se3
 
 AIM = 0.1
-"""Fraction of the tolerances at which the search ends, so that solutions are safely within the tolerances."""
+"""Fraction of the tolerances that errors must not exceed when the search ends."""
 PATIENCE, PATIENCE_OF_MANY = 5, 25
-"""Number of iterations within which the largest violation has to halve; otherwise the search restarts. The first number
-applies to a single task, the second to several tasks, which may conflict at first."""
+"""Number of iterations within which the largest violation has to halve to avoid a restart of the search. `PATIENCE`
+applies to a single task, `PATIENCE_OF_MANY` to several tasks, which may conflict at first."""
 SETTLED = 1e-2
-"""Costs that decrease by less than this fraction within `PATIENCE` iterations count as minimal."""
+"""If costs decrease by less than this fraction within `PATIENCE` iterations, they count as minimal."""
 STANDSTILL = 1e-6
-"""The search from one start ends at steps smaller than this [rad or m]."""
+"""Step size below which the search from one start ends [rad or m]."""
 NEAR_RANGE = 0.5
-"""Standard deviation of random starts around the given start [rad or m]. With a floating base, every other random start
-is drawn this way; all other random starts are drawn uniformly within the limits."""
+"""Standard deviation of Gaussian random starts around the given start [rad or m]. With a floating base, every second
+random start is Gaussian; all other random starts are uniformly distributed within the limits."""
 
 
 class TasksSolver(Solver):
-    """Finds joint positions that minimise costs subject to constraints, all chosen by the user.
+    """Finds joint positions that minimise the user's costs subject to the user's constraints.
 
     A lock makes the solver thread-safe.
 
@@ -67,7 +67,7 @@ class TasksSolver(Solver):
         self._start_limits = StartLimits(robot.joint_names, robot.limits)
 
     def solve(self, problem: IKProblem) -> IKSolution:
-        """Searches for joint positions that satisfy the formulation.
+        """Searches for joint positions that minimise the costs and satisfy the constraints.
 
         Raises:
             ValueError: If a goal is missing or invalid, or a previous solution lacks a joint that a task needs. Also if
@@ -141,9 +141,9 @@ class TasksSolver(Solver):
             yield robot.with_positions(start, positions)
 
     def _on_anchor(self, q: np.ndarray) -> np.ndarray:
-        """Moves a floating base such that the first link with a constrained pose is at its goal.
+        """Moves a floating base in a configuration so that the link of the first pose constraint is at its goal.
 
-        Without such a constraint, the base gets the pose in the options. A fixed base does not change.
+        Without a pose constraint, the base gets the pose in the options. A fixed base does not change.
         """
         robot, anchor = self.tasks.robot, self.tasks.anchor
         if not robot.is_floating:
@@ -155,7 +155,7 @@ class TasksSolver(Solver):
         return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
 
     def _from(self, first: np.ndarray) -> Candidate:
-        """Searches from one start, and returns the best candidate."""
+        """Searches from one start configuration, and returns the best candidate."""
         candidates: list[Candidate] = []
         merits: list[float] = []
         for tried in self._gauss_newton(first):

@@ -31,9 +31,9 @@ class TracIkConfig(ChainConfig):
     Attributes:
         timeout: Longest search from one start [s]. Solve types other than `Speed` always use the whole time.
         epsilon: Largest error of a solution [m and rad].
-        solve_type: Which solution is returned. `Speed`: the first. `Distance`: the nearest to the start. `Manip1`: the
-            one with the largest product of the Jacobian's singular values. `Manip2`: the one with the best ratio of the
-            Jacobian's singular values.
+        solve_type: Criterion of the returned solution. `Speed`: found first. `Distance`: nearest to the start.
+            `Manip1`: largest product of the Jacobian's singular values. `Manip2`: best ratio of the Jacobian's singular
+            values.
         restarts: Number of random starts after the given start. Each start has its own timeout.
     """
 
@@ -44,10 +44,10 @@ class TracIkConfig(ChainConfig):
 
 
 class TracIkSolver(ChainSolver):
-    """Uses the TRAC-IK library from the package `pytracik`, which does not support Cartesian tolerances.
+    """Uses the TRAC-IK library from the package `pytracik`.
 
-    Problems with tolerances are solved by the solver `kdl` instead. The result is not deterministic, since it depends
-    on the timing of two threads.
+    Problems with Cartesian tolerances, which `pytracik` does not support, are solved by the solver `kdl`. Solutions are
+    not deterministic, since they depend on the timing of two threads.
 
     Raises:
         ConfigError: If the chain has a mimic joint, or a prismatic joint without limits; the error names the joint.
@@ -70,7 +70,7 @@ class TracIkSolver(ChainSolver):
         self._trac_ik = pytracik.TRAC_IK(*ends, self.description.urdf, config.timeout, config.epsilon, solve_type)
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns TRAC-IK's solution, or an empty list if TRAC-IK does not find a solution. See `ChainSolver.find`."""
+        """Returns the first solution, or an empty list if TRAC-IK does not find a solution. See `ChainSolver.find`."""
         if large_tolerances(problem):
             return self._with_tolerances.find(problem, goal, start)
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())

@@ -33,8 +33,8 @@ from ik_ros.chain.symbolic import link_frames, sphere_distances
 from ik_ros.chain.trajectory_program import Program, Spline
 
 MAX_INTERVALS = 128
-"""Largest number of intervals of a spline. If waypoints are less than two intervals apart, a spline can hardly pass
-through all of them."""
+"""Largest number of intervals of a spline. If waypoints are less than two intervals apart, a spline can rarely pass
+through all waypoints."""
 MAX_WAYPOINTS = MAX_INTERVALS // 2
 """Largest number of waypoints of a problem."""
 MAX_SAMPLES = 100_000
@@ -42,11 +42,11 @@ KEPT_PROGRAMS = 4
 """Largest number of compiled programs in the cache. Each combination of intervals and waypoints needs its own program.
 """
 CHECKS = 10
-"""Number of samples in each interval at which the result is checked."""
+"""Number of samples in each interval of a spline at which limits and clearance of the result are checked."""
 AIM = 0.01
-"""Fraction of the default tolerances that the program may use at waypoints. The smoothest motion uses all it may."""
+"""Fraction of the default tolerances that is allowed as an error at waypoints. The smoothest motion uses it fully."""
 SPARE = 1e-6
-"""Relative margin of speed and acceleration limits, for rounding errors."""
+"""Fraction by which speed and acceleration limits are reduced, as a margin for rounding errors."""
 
 
 class TrajectoryConfig(KdlConfig):
@@ -54,13 +54,13 @@ class TrajectoryConfig(KdlConfig):
 
     Attributes:
         duration_s: Duration of the motion for problems that have a target but no waypoints [s].
-        intervals: Smallest number of polynomials of each joint's spline.
+        intervals: Smallest number of polynomial pieces of each joint's spline.
         sample_s: Time between two samples of the returned trajectory [s].
-        velocity_limits: Largest speed by joint [rad/s or m/s]; the URDF's limits apply to other joints.
-        acceleration_limits: Largest acceleration by joint [rad/s^2 or m/s^2]; other joints are not limited.
-        shapes: Spheres on links, and obstacles fixed in the base.
+        velocity_limits: Largest speed by joint name [rad/s or m/s]; the URDF's limits apply to other joints.
+        acceleration_limits: Largest acceleration by joint name [rad/s^2 or m/s^2]; other joints are not limited.
+        shapes: Spheres on links, and obstacles fixed in the base frame.
         clearance: Smallest distance between spheres and obstacles [m].
-        attempts: Largest number of attempts; each attempt has different joint positions at the waypoints.
+        attempts: Largest number of attempts. Each attempt starts from different joint positions at the waypoints.
     """
 
     duration_s: Seconds = 2.0
@@ -136,7 +136,7 @@ class TrajectorySolver(KdlSolver):
         return answers[-1] if answers[-1].success else answers[0]
 
     def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
-        """Returns the waypoints of a problem, or its target as the only waypoint, after checking their times."""
+        """Checks and returns the waypoints of a problem, or the problem's target as the only waypoint."""
         waypoints = problem.waypoints
         if not waypoints:
             if problem.target is None:
@@ -156,16 +156,17 @@ class TrajectorySolver(KdlSolver):
     def _postures(
         self, problem: IKProblem, waypoints: Sequence[Waypoint], start: Sequence[float], attempt: int
     ) -> tuple[list[Sequence[float]], IKSolution | None]:
-        """Finds joint positions at the start and at each waypoint, each near the positions before.
+        """Finds joint positions for each waypoint. Each search begins at the positions for the previous waypoint.
 
         Args:
             problem: The problem.
             waypoints: The waypoints.
             start: n start positions [rad or m].
-            attempt: Number of the attempt. From 1 on, the search begins at random positions.
+            attempt: Number of the attempt. From 1 on, the search for the first waypoint begins at random positions.
 
         Returns:
-            The joint positions, and None. If a waypoint has no solution, the second value is the failed answer.
+            The joint positions at the start and at each waypoint, and None. If a waypoint cannot be reached, the second
+            value is the failed solution.
         """
         postures: list[Sequence[float]] = [start]
         if attempt:
@@ -187,7 +188,7 @@ class TrajectorySolver(KdlSolver):
         start: Sequence[float],
         postures: Sequence[Sequence[float]],
     ) -> IKSolution:
-        """Computes the trajectory; returns an answer with the trajectory, or with the violated requirements.
+        """Computes the trajectory. If requirements are violated, the returned solution names them instead.
 
         Args:
             problem: The problem.
@@ -241,7 +242,10 @@ class TrajectorySolver(KdlSolver):
         )
 
     def _program(self, times_s: np.ndarray) -> Program:
-        """Returns a program whose splines have enough intervals for the times of start and waypoints [s]."""
+        """Returns a program whose splines have enough intervals to pass through waypoints at m times [s].
+
+        The first time is that of the start.
+        """
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MAX_INTERVALS:
@@ -249,15 +253,18 @@ class TrajectorySolver(KdlSolver):
         return self._compiled(intervals, len(times_s) - 1)
 
     def _nearest_m(self, q: np.ndarray) -> float:
-        """Returns the smallest distance between a sphere and an obstacle in k configurations, k x n; inf without
-        spheres or obstacles [m]."""
+        """Returns the smallest distance between spheres and obstacles in k configurations [m].
+
+        Args:
+            q: n joint positions for each of the k configurations, k x n [rad or m].
+        """
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Checks speeds and accelerations on a fine grid.
+        """Checks speeds and accelerations at many times.
 
-        Returns a message for the largest violation of a speed limit, and one for the largest violation of an
-        acceleration limit.
+        Returns one message for the largest violation of a speed limit, and one for the largest violation of an
+        acceleration limit. Without violations, the list is empty.
         """
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):

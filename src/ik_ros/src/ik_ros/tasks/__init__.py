@@ -1,4 +1,4 @@
-"""The table of tasks for the solver `tasks`. To add a task, write a class in a file of its own, and add a line here."""
+"""The table of tasks for the solver `tasks`. To add a task, write a class in a new file, and add it to the table."""
 
 from __future__ import annotations
 
@@ -27,4 +27,4 @@ TASKS: PluginTable[Task] = PluginTable(
         "distance": "ik_ros.tasks.distance:Distance",
     },
 )
-"""All types of tasks by name. A task's module is imported when the task is looked up, since tasks need Pinocchio."""
+"""All types of tasks by name. A task's module is only imported when the task is looked up, since it needs Pinocchio."""

@@ -12,12 +12,12 @@ CROSSING_M = 1e-9
 
 
 class RobotShape(NamedTuple):
-    """A shape that is attached to a link, or fixed in the base.
+    """A shape that is attached to a link, or fixed in the base frame.
 
     Attributes:
         core: Size of the shape, as a core and a radius.
-        link_id: Pinocchio's index of the link; None for a shape that is fixed in the base.
-        placement: Pose of the shape in the link, or in the base, as a `pinocchio.SE3`.
+        link_id: Pinocchio's index of the link; None for a shape that is fixed in the base frame.
+        placement: Pose of the shape in the link's frame or base frame, as a `pinocchio.SE3`.
     """
 
     core: RoundedCore
@@ -30,9 +30,9 @@ class Clearance(NamedTuple):
 
     Attributes:
         distance: Distance between the surfaces; negative if the shapes penetrate each other [m].
-        direction: Unit vector from the first shape to the second, in the base.
-        first: Point of the first shape's core that is nearest to the second core, in the base [m].
-        second: Point of the second shape's core that is nearest to the first core, in the base [m].
+        direction: Unit vector from the first shape to the second, in the base frame.
+        first: Point of the first shape's core that is nearest to the second core, in the base frame [m].
+        second: Point of the second shape's core that is nearest to the first core, in the base frame [m].
     """
 
     distance: float
@@ -44,14 +44,14 @@ class Clearance(NamedTuple):
 def clearance(first: RoundedCore, place: Any, second: RoundedCore, other: Any) -> Clearance:
     """Measures the distance between two shapes.
 
-    The cores are measured, and the radii subtracted, since hpp-fcl returns no direction for round shapes that penetrate
-    each other.
+    The result is the distance between the cores minus the radii, since hpp-fcl does not return a direction for round
+    shapes that penetrate each other.
 
     Args:
         first: The first shape.
-        place: Pose of the first shape in the base, a `pinocchio.SE3`.
+        place: Pose of the first shape in the base frame, a `pinocchio.SE3`.
         second: The second shape.
-        other: Pose of the second shape in the base, a `pinocchio.SE3`.
+        other: Pose of the second shape in the base frame, a `pinocchio.SE3`.
     """
     result = hppfcl.DistanceResult()
     places = (hppfcl.Transform3f(each.rotation, each.translation) for each in (place, other))

@@ -12,7 +12,7 @@ from .task import TaskConfig
 
 
 class Closeness(JointTask):
-    """Keeps joints near the problem's previous solution, or near the start if there is no previous solution."""
+    """Keeps joints near the problem's previous solution, or near the start if a previous solution is not given."""
 
     def __init__(self, config: TaskConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot, robot.joint_names, "name")

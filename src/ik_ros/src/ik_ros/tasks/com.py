@@ -16,8 +16,8 @@ class ComConfig(TaskConfig):
     """Options of the task `com`.
 
     Attributes:
-        goal: Target position x, y, z of the centre of mass in the base [m]. None: taken from each problem.
-        axes: Axes of the base along which the position has to match.
+        goal: Target position x, y, z of the centre of mass in the base frame [m]. None: taken from each problem.
+        axes: Axes of the base frame along which the position has to match.
     """
 
     goal: Position | None = None

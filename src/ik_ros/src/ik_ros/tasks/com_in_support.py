@@ -15,9 +15,9 @@ class ComInSupportConfig(TaskConfig):
     """Options of the task `com_in_support`.
 
     Attributes:
-        support: Contact points with the ground, such as the corners of both soles: for each link name, positions in the
-            link's frame [m].
-        margin: Smallest distance from the centre of mass to the edges of the support polygon [m].
+        support: Contact points with the ground, such as the corners of both soles. Positions are in the frame of the
+            link, indexed by link name [m].
+        margin: Smallest distance of the centre of mass from the edges of the support polygon [m].
     """
 
     support: dict[str, ListOf[Position]] = Field(min_length=1)
@@ -25,10 +25,10 @@ class ComInSupportConfig(TaskConfig):
 
 
 class ComInSupport(Task):
-    """Keeps the centre of mass over the support polygon, in the x-y plane of the base, whose z axis must be vertical.
+    """Keeps the centre of mass over the support polygon, in the base frame's x-y plane, which must be horizontal.
 
-    The polygon is the convex hull of the present contact points. The Jacobian ignores the motion of the contact points,
-    since other constraints should hold the standing feet.
+    The polygon is the convex hull of the contact points' current positions. The Jacobian ignores the motion of the
+    contact points, since other constraints should hold the feet that stand on the ground.
     """
 
     Config = ComInSupportConfig
@@ -42,7 +42,7 @@ class ComInSupport(Task):
             raise KeyedError("support", "expected 3 points at least")
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns the distance from each edge of the polygon to the centre of mass, negative inside [m]; see `Task`."""
+        """Returns the distance of the centre of mass from each edge of the polygon, negative inside [m]; see `Task`."""
         com, jacobian = self.robot.com(q)
         corners = self.polygon()
         edges = np.roll(corners, -1, axis=0) - corners
@@ -54,13 +54,13 @@ class ComInSupport(Task):
         return Linearization(values, outward @ jacobian[:2], np.full(len(values), -np.inf), upper)
 
     def polygon(self) -> np.ndarray:
-        """Returns the k corners x, y of the support polygon in the base, counter-clockwise, k x 2 [m]."""
+        """Returns the k corners x, y of the support polygon in the base frame, counter-clockwise, k x 2 [m]."""
         points = [self.robot.frame(link).act(point) for link, points in self._contacts for point in points]
         return np.array(_hull((float(x), float(y)) for x, y, _ in points))
 
 
 def _hull(points: Iterable[tuple[float, float]]) -> Sequence[tuple[float, float]]:
-    """Returns the corners of the convex hull of points, counter-clockwise.
+    """Returns the corners of the points' convex hull, counter-clockwise.
 
     Source: Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9(5),
     1979.

@@ -12,14 +12,14 @@ from .robot import PinocchioRobot
 from .task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAR_M = 0.3
-"""Pairs that are further apart than the required distance plus this value are ignored [m]."""
+"""Distance beyond the required distance from which a pair of shapes is ignored [m]."""
 
 
 class DistanceConfig(TaskConfig):
     """Options of the task `distance`.
 
     Attributes:
-        pairs: Pairs of shapes, each given by two names.
+        pairs: Names of the two shapes of each pair.
         at_least: Smallest allowed distance between the two shapes of each pair [m].
     """
 
@@ -28,7 +28,7 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps the two shapes of each pair apart: shapes on two links, or a shape on a link and an obstacle."""
+    """Keeps the two shapes of each pair apart. A pair is two shapes on links, or a shape on a link and an obstacle."""
 
     Config = DistanceConfig
 
@@ -47,7 +47,7 @@ class Distance(Task):
             self._pairs.append((first, second))
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns the distance between the shapes of each pair, without pairs that are far apart [m]; see `Task`."""
+        """Returns the distance between the shapes of each pair [m], without pairs that are far apart; see `Task`."""
         values, rows = [], []
         for first, second in self._pairs:
             found = clearance(first.core, self._place(first), second.core, self._place(second))
@@ -63,12 +63,12 @@ class Distance(Task):
         return shape.placement if shape.link_id is None else self.robot.frame(shape.link_id) * shape.placement
 
     def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Returns the derivative of a point's coordinate along a direction by the m free components, shape (m,).
+        """Returns the gradient of a point's coordinate along a direction with respect to the m free components.
 
         Args:
             shape: The shape that the point is fixed to.
-            point: Position of the point in the base [m].
-            direction: Unit vector in the base.
+            point: Position of the point in the base frame [m].
+            direction: Unit vector in the base frame.
         """
         if shape.link_id is None:
             return np.zeros(len(self.robot.free))

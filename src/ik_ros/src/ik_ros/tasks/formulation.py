@@ -19,7 +19,7 @@ from .robot import PinocchioRobot
 from .task import Task, TaskConfig, keyed_errors
 
 WORLD = "world"
-"""Default name of the frame in which poses are expressed, for a robot with a floating base."""
+"""Default name of the frame in which poses are expressed if the robot has a floating base."""
 
 
 def _of_its_type(value: Any, info: ValidationInfo) -> Any:
@@ -46,8 +46,8 @@ class FrameOnLinkConfig(ConfigModel):
     Attributes:
         name: Name of the frame, which tasks use like a link name.
         link: Name of the link.
-        position: Position of the frame in the link [m].
-        orientation: Orientation of the frame in the link, quaternion x, y, z, w.
+        position: Position of the frame in the link's frame [m].
+        orientation: Orientation of the frame in the link's frame, quaternion x, y, z, w.
     """
 
     name: Text
@@ -65,16 +65,16 @@ class Formulation(ConfigModel):
         base_frame: Frame in which poses are expressed: a link, by default the root. With a floating base, the name of
             the world frame.
         base_position: Position of a floating root at the start of the search [m]. Has no effect if there is a
-            constraint on the pose of a link: then the first such constraint determines the start.
+            constraint on the full pose of a link. Then the first of these constraints determines the start.
         base_orientation: Orientation of a floating root at the start of the search, quaternion x, y, z, w.
         joints: Joints to find positions for; by default all moving joints. Other joints keep their start positions.
-        start: Start position by joint [rad or m], for joints that a problem's start leaves out. Joints that are not
-            listed here are at the middle of their limits at the start.
-        frames: Frames attached to links; tasks can use frame names like link names.
+        start: Start position by joint name [rad or m], for joints that a problem's start leaves out. Joints that this
+            option leaves out as well start at the middle of their limits.
+        frames: Frames attached to links; tasks can use the names of these frames like link names.
         shapes: Shapes of links and obstacles, for tasks of type `distance`.
         costs: Tasks whose errors are minimised.
         constraints: Tasks that have to be satisfied.
-        main_task: Name of the task that takes the target of a problem as its goal. None: the only task about the pose,
+        main_task: Name of the task that takes a problem's target as the goal. None: the only task about the pose,
             position or orientation of a link.
         restarts: Number of random starts after the given start.
         iterations: Largest number of iterations from one start.
@@ -118,7 +118,7 @@ class Formulation(ConfigModel):
 
 
 class Part(NamedTuple):
-    """A task of a formulation, as a cost or as a constraint.
+    """A task of a formulation, which is either a cost or a constraint.
 
     Attributes:
         task: The task.
@@ -141,7 +141,7 @@ class TaskSet:
         robot: The robot.
         base_frame: Name of the frame in which poses are expressed.
         parts: All tasks by name, the costs first.
-        main: Name of the task that takes the target of a problem as its goal; None if there is no such task.
+        main: Name of the task that takes a problem's target as the goal; None if the formulation has no such task.
 
     Raises:
         KeyedError: If an option does not fit the robot; the error names the key.
@@ -164,7 +164,7 @@ class TaskSet:
 
     @property
     def anchor(self) -> FrameTask | None:
-        """The first constraint on all axes of a link's pose, or None. It determines the start of a floating base."""
+        """The first constraint on all axes of a link's pose, which determines the start of a floating base, or None."""
         poses = (part.task for part in self.parts.values() if part.is_hard and isinstance(part.task, FrameTask))
         return next((task for task in poses if task.is_complete), None)
 

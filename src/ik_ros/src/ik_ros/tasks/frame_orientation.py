@@ -8,7 +8,7 @@ from .frame_task import FrameTask
 
 
 class FrameOrientation(FrameTask):
-    """Turns a link to an orientation, given as a quaternion x, y, z, w; the position of the link is free."""
+    """Turns a link to an orientation, given as a quaternion x, y, z, w. The position of the link is not constrained."""
 
     available = ("rx", "ry", "rz")
     goal_words = "a quaternion (x, y, z, w) that is not zero"

@@ -39,7 +39,7 @@ class FrameTask(Task):
 
     Attributes:
         link_id: Pinocchio's index of the link.
-        goal: Target pose of the link in the base, a `pinocchio.SE3`.
+        goal: Target pose of the link in the base frame, a `pinocchio.SE3`.
         is_complete: Whether the options select all six axes.
     """
 
@@ -62,10 +62,10 @@ class FrameTask(Task):
         self._set_goal(self._default or Pose())
 
     def pose_of(self, values: Sequence[float]) -> Pose:
-        """Converts the numbers of a goal to a pose.
+        """Converts the values of a goal to a pose.
 
         Raises:
-            ValueError: If there are too many or too few numbers, or the quaternion is 0.
+            ValueError: If the number of values is wrong, or the quaternion is 0.
         """
         if len(values) != 7 or math.hypot(*values[3:]) < 1e-6:
             raise ValueError(f"expected {self.goal_words}, got {list(values)}")
@@ -79,12 +79,12 @@ class FrameTask(Task):
         self._set_goal(pose)
 
     def aim(self, problem: IKProblem) -> None:
-        """Sets goal and tolerances to the target and the tolerances of a problem, if it has a target."""
+        """Sets goal and tolerances to those of a problem; does nothing if the problem has no target."""
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns the position error [m] and the rotation vector [rad] of the link in the goal frame, see `Task`.
+        """Returns the link's position [m] and rotation vector [rad] in the goal frame, see `Task`.
 
         Only the components of the selected axes are returned.
         """

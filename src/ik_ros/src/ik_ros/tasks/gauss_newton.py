@@ -20,7 +20,7 @@ class Candidate(NamedTuple):
 
     Attributes:
         q: The configuration.
-        residuals: Error of each required task, by task name.
+        residuals: Error of each required task, indexed by task name.
         size: Largest error of a required task, as a multiple of the task's tolerance.
         hard_size: Largest error of a constraint, as a multiple of the constraint's tolerance.
     """
@@ -32,22 +32,22 @@ class Candidate(NamedTuple):
 
     @property
     def rank(self) -> tuple[float, float]:
-        """Sort key, smaller is better: compares constraints first. Errors within the tolerances count as equal."""
+        """Sort key that compares constraints first; smaller is better. Errors within the tolerances count as equal."""
         return max(self.hard_size, 1.0), max(self.size, 1.0)
 
 
 LARGEST_STEP = 1.0
 """Largest motion of a joint, or of the base along or about an axis, in one step [rad or m]."""
 DAMPING = 1e-3
-"""Factor of the squared errors in the damping of a step."""
+"""Factor of the weighted squared errors in the damping of a step."""
 LEAST_DAMPING = 1e-6
 """Constant part of the damping of a step."""
 FIRST_DAMPING, TIGHTENING, EASING = 1e-4, 10.0, 0.2
-"""Additional damping after failed steps: value after the first failure, factor at each failure, factor at a success."""
+"""Additional damping: its value after the first rejected step, and its factors at each rejected and accepted step."""
 HARD = 1e4
-"""Weight of constraints in the merit of a configuration."""
+"""Weight of constraints in the merit of a configuration, see `Iterate.merit`."""
 MEMORY = 2
-"""Number of recent merits. A step is accepted if it is not worse than the worst of these merits."""
+"""Number of accepted configurations to compare with. A step is accepted if its merit is at most their largest merit."""
 SLACK = 1e-6
 """DAQP's parameter `rho_soft`, the penalty for violating a soft constraint."""
 SOFT = 8
@@ -61,7 +61,7 @@ class Iterate(NamedTuple):
     Attributes:
         q: The configuration.
         rows: Linearisation of each task at q.
-        beyond: For each task, by how much its values violate their bounds.
+        beyond: Amounts by which the values of each task violate their bounds.
         merit: Weighted sum of the squared violations; smaller is better.
         step: Largest motion of a joint, or of the base, since the last accepted configuration [rad or m].
     """
@@ -74,11 +74,11 @@ class Iterate(NamedTuple):
 
 
 class GaussNewton:
-    """Minimises the costs subject to the constraints, with Gauss-Newton steps.
+    """Minimises the costs subject to the constraints with Gauss-Newton steps.
 
     Each step minimises the weighted squares of the linearised costs plus a damping term, subject to the linearised
-    constraints and the joint limits. Constraints are soft, with a large penalty, so that conflicting constraints do not
-    prevent a step.
+    constraints and the joint limits. Constraints are soft with a large penalty, so that a step is possible even if
+    constraints conflict.
 
     Args:
         robot: The robot.
@@ -100,7 +100,7 @@ class GaussNewton:
         self.begin()
 
     def begin(self) -> None:
-        """Computes the joint limits for a new problem, after the tasks have begun it.
+        """Computes the joint limits for a new problem, for which each task's `begin` must have been called before.
 
         Constraints on joint positions narrow the limits, so that each step satisfies these constraints exactly.
         """
@@ -115,7 +115,8 @@ class GaussNewton:
     def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
         """Searches from the configuration q, clipped to the joint limits.
 
-        Yields each tried configuration, even if it is worse than the configurations before.
+        Yields each tried configuration, even if it is worse than the configurations before. The search does not end
+        unless a quadratic program fails.
         """
         q = self._robot.moved(q, np.zeros(self._count), self.lower, self.upper)
         damping, merits = 0.0, deque([np.inf], MEMORY)

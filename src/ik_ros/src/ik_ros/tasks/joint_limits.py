@@ -1,4 +1,4 @@
-"""The task `joint_limits`: limits joint positions to ranges that are narrower than the URDF's limits."""
+"""The task `joint_limits`: keeps joint positions in ranges that are narrower than the URDF's limits."""
 
 from pydantic import Field
 

@@ -20,7 +20,7 @@ class JointTask(Task):
         config: Options of the task.
         robot: The robot.
         joints: Names of the k joints.
-        key: Key of the option that names the joints, for messages.
+        key: Key of the option that names the joints, for error messages.
 
     Attributes:
         indices: Indices of the k joints in the robot's `joint_names`.
@@ -50,7 +50,7 @@ class JointTask(Task):
         self.bounds = goal, goal
 
     def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
-        """Returns the k joint positions of a problem's last previous solutions, the newest last [rad or m].
+        """Returns the k joint positions of a problem's latest previous solutions, the newest last [rad or m].
 
         Args:
             problem: The problem.

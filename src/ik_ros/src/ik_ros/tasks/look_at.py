@@ -23,8 +23,8 @@ class LookAtConfig(TaskConfig):
 
     Attributes:
         frame: Name of the link.
-        axis: Axis that is to point at the goal, in the link's frame; any length but 0.
-        goal: Position x, y, z of the point in the base [m]. None: taken from each problem.
+        axis: Vector in the link's frame that has to point at the goal; the length may have any value but 0.
+        goal: Position x, y, z of the point in the base frame [m]. None: taken from each problem.
     """
 
     frame: Text
@@ -61,7 +61,7 @@ class LookAt(Task):
         self._goal = np.array(point)
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """Returns the angle between axis and point as two components perpendicular to the axis [rad]; see `Task`."""
+        """Returns the angle from the axis to the point, as rotations about two perpendicular axes [rad]; see `Task`."""
         point = self.robot.frame(self._link_id).actInv(self._goal)  # in the link's frame
         jacobian = self.robot.jacobian(self._link_id)
         change = pin.skew(point) @ jacobian[3:] - jacobian[:3]

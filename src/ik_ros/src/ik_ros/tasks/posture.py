@@ -16,14 +16,14 @@ class PostureConfig(TaskConfig):
     """Options of the task `posture`.
 
     Attributes:
-        goal: Position to reach by joint name [rad or m]; other joints are free.
+        goal: Target position by joint name [rad or m]; joints that are not listed are free.
     """
 
     goal: dict[str, float] = Field(min_length=1)
 
 
 class Posture(JointTask):
-    """Moves joints to given positions; a problem's goal can replace these positions, in the same order."""
+    """Moves joints to given positions. A problem's goal replaces all positions, in the order of the option `goal`."""
 
     Config = PostureConfig
 

@@ -23,7 +23,7 @@ def to_se3(pose: Pose) -> Any:
 
 
 def from_base(q: np.ndarray) -> Pose:
-    """Returns the pose of a floating root, which is the first 7 numbers of a configuration q."""
+    """Returns the pose of a floating root, which a configuration q contains as its first 7 numbers."""
     x, y, z, qx, qy, qz, qw = q[:7].tolist()
     return Pose((x, y, z), (qx, qy, qz, qw))
 
@@ -35,9 +35,9 @@ FREE = 6
 class PinocchioRobot:
     """Joints, limits and kinematics of one robot, a tree of links whose root may float.
 
-    A configuration q has one position for each moving joint [rad or m]. For a floating root, 7 numbers precede them:
-    x, y, z [m] and a quaternion x, y, z, w. A velocity has one number for each moving joint, preceded by 6 numbers for
-    a floating root.
+    A configuration q has one position for each moving joint [rad or m]. If the root floats, 7 numbers precede the joint
+    positions: x, y, z [m] and a quaternion x, y, z, w. A velocity has one number for each moving joint. If the root
+    floats, 6 numbers precede the joint velocities.
 
     Args:
         urdf_path: Path of the URDF; its meshes need not exist.
@@ -52,15 +52,15 @@ class PinocchioRobot:
         lower: Lower limits of the n joints [rad or m]; -inf for joints without a lower limit.
         upper: Upper limits of the n joints [rad or m]; inf for joints without an upper limit.
         limits: The same limits as a `Limits` object.
-        is_revolute: For each of the n joints, whether it is revolute or continuous.
+        is_revolute: n flags, true for revolute and continuous joints.
         max_velocity: Largest speeds of the n joints [rad/s or m/s]; inf for joints without a speed limit.
-        free: Indices of the m free components in a velocity: 6 of a floating root, then the n joints.
+        free: Indices of the m components of a velocity that are solved for: 6 of a floating root, then the n joints.
         all_joints: Names of all moving joints.
         links: Names of all links and added frames.
 
     Raises:
         ConfigError: If the URDF cannot be read, or has joints with more than one axis.
-        UnknownNameError: If a joint or the base does not exist.
+        UnknownNameError: If a joint or the link `base` does not exist.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class PinocchioRobot:
         return int(self.model.getJointId(_known("joint", name, self.all_joints)))
 
     def moving(self, names: Iterable[str]) -> list[str]:
-        """Filters joint names: leaves out the names of fixed joints and mimic joints.
+        """Returns joint names without the names of fixed joints and mimic joints.
 
         Raises:
             UnknownNameError: If a joint does not exist.
@@ -149,7 +149,7 @@ class PinocchioRobot:
         self.links += (name,)
 
     def add_shape(self, config: ShapeConfig) -> None:
-        """Adds a shape that is attached to a link, or fixed in the base.
+        """Adds a shape that is attached to a link, or fixed in the base frame.
 
         Raises:
             UnknownNameError: If the link does not exist.
@@ -168,12 +168,11 @@ class PinocchioRobot:
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
         """Makes a configuration from joint positions.
 
-        Those of the n joints that `positions` leaves out are at the middle of their limits. All other joints that
+        Those of the n joints that `positions` leaves out are at the middle of their limits. Other moving joints that
         `positions` leaves out are at 0.
 
         Args:
-            positions: Positions by joint name [rad or m]. Fixed and mimic joints, which joint states may include, are
-                ignored.
+            positions: Positions by joint name [rad or m]. Fixed and mimic joints are ignored.
 
         Raises:
             UnknownNameError: If a joint does not exist.
@@ -201,7 +200,7 @@ class PinocchioRobot:
         return changed
 
     def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Returns the configuration after a step, with the n joints clipped to limits.
+        """Returns the configuration after a step, in which the n joints are clipped to limits.
 
         Args:
             q: The configuration before the step.
@@ -219,22 +218,23 @@ class PinocchioRobot:
         return self.with_positions(q, np.minimum(np.maximum(positions, lower), upper))
 
     def update(self, q: np.ndarray) -> None:
-        """Sets the configuration for which `frame` and `jacobian` return results."""
+        """Sets the configuration for which `frame` and `jacobian` return results to q."""
         pin.computeJointJacobians(self.model, self.data, q)
 
     def frame(self, link_id: int) -> Any:
-        """Returns the pose of a link in the base, a `pinocchio.SE3`, in the configuration set by `update`."""
+        """Returns the pose of a link in the base frame, a `pinocchio.SE3`, in the configuration set by `update`."""
         return pin.updateFramePlacement(self.model, self.data, link_id)
 
     def jacobian(self, link_id: int) -> np.ndarray:
-        """Returns the Jacobian of a link's velocity, in the axes of the link, by the m free components, 6 x m.
+        """Returns the matrix that maps the m free velocity components to a link's velocity, 6 x m.
 
-        The first three rows are linear, the last three angular. The configuration is the one set by `update`.
+        The link's velocity is in the link's axes, the first three rows linear, the last three angular. The
+        configuration is the one set by `update`.
         """
         return self._of_free(pin.getFrameJacobian(self.model, self.data, link_id, pin.LOCAL))
 
     def com(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the position of the centre of mass in the base, shape (3,) [m], and its Jacobian by the m free
+        """Returns the centre of mass in the base frame, shape (3,) [m], and its derivatives with respect to the m free
         components, 3 x m."""
         jacobian = self._of_free(pin.jacobianCenterOfMass(self.model, self.data, q))
         com, moving, still = self.data.com[0].copy(), self.data.mass[0], self.model.inertias[0]
@@ -244,7 +244,7 @@ class PinocchioRobot:
         return com, jacobian
 
     def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
-        """Returns the Jacobian of selected joint positions by the m free components, k x m, with a single 1 per row.
+        """Returns the k x m matrix that selects k joints' velocities from the m free components.
 
         Args:
             indices: Indices of the k joints in `joint_names`.
@@ -257,7 +257,7 @@ class PinocchioRobot:
 
 
 def _known(kind: str, name: str, names: Collection[str]) -> str:
-    """Checks that `names` contains `name`, and returns it; raises an `UnknownNameError` otherwise."""
+    """Returns `name` if `names` contains it, and raises an `UnknownNameError` otherwise."""
     if name not in names:
         raise UnknownNameError(kind, name, names)
     return name

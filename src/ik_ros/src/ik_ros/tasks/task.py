@@ -25,7 +25,7 @@ class TaskConfig(ConfigModel):
         weight: For a cost, factor of the squared error.
         required: For a cost, whether a solution counts as successful only if the task is met.
         tolerance_m: Largest position error at which the task counts as met [m].
-        tolerance_rad: Largest error of angles [rad], or of joint positions [rad or m], at which the task counts as met.
+        tolerance_rad: Largest angle error [rad], or joint position error [rad or m], at which the task counts as met.
     """
 
     name: Text
@@ -38,7 +38,7 @@ class TaskConfig(ConfigModel):
 
 @contextmanager
 def keyed_errors(key: str) -> Iterator[None]:
-    """Converts errors about names or values to a `KeyedError` for the option `key`, or for a key inside the option."""
+    """Context that converts errors to a `KeyedError` for the option `key`, or for a key inside the option."""
     try:
         yield
     except KeyedError as error:
@@ -48,14 +48,14 @@ def keyed_errors(key: str) -> Iterator[None]:
 
 
 class Linearization(NamedTuple):
-    """The k values of a task and their bounds, linearised at one configuration.
+    """The k values of a task, linearised at one configuration, and the bounds of the values.
 
     Attributes:
         values: k task values [m or rad].
-        jacobian: Derivatives of the values by the m free components, k x m.
+        jacobian: Derivatives of the values with respect to the m free components, k x m.
         lower: k lower bounds; -inf for values without a lower bound.
-        upper: k upper bounds; inf for values without an upper bound. The same array object as `lower` if the task
-            prescribes exact values.
+        upper: k upper bounds; inf for values without an upper bound. If the task prescribes exact values, `upper` and
+            `lower` are the same array object.
     """
 
     values: np.ndarray
@@ -69,7 +69,7 @@ class Linearization(NamedTuple):
         return self.lower is self.upper
 
     def beyond(self) -> np.ndarray:
-        """Returns by how much each value is above its upper bound (positive) or below its lower bound (negative)."""
+        """Returns the amount by which each value exceeds its upper bound (positive) or lower bound (negative)."""
         if self.is_exact:
             return self.values - self.lower
         return self.values - np.minimum(np.maximum(self.values, self.lower), self.upper)
@@ -83,7 +83,7 @@ class Task(ABC):
 
     Args:
         config: The options.
-        robot: The robot. Before each call of `rows`, the robot's `update` has set the configuration.
+        robot: The robot. The solver calls `update` of the robot before each call of `rows`.
 
     Raises:
         KeyedError: If an option does not fit the robot; the error names the key.
@@ -100,7 +100,7 @@ class Task(ABC):
 
         Args:
             problem: The problem.
-            goal: The problem's goal for this task. None: the goal in the task's options applies.
+            goal: The problem's goal for this task. None: the goal in the task's options is used.
             q: The configuration where the search starts.
 
         Raises:
@@ -115,9 +115,9 @@ class Task(ABC):
         """Returns the values of the task, their derivatives and their bounds at a configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """Converts the k violations of the bounds [m or rad] to a residual; by default, all violations are lengths."""
+        """Converts k bound violations [m or rad] to a residual; by default, all violations count as lengths."""
         return Residual(math.hypot(*beyond.tolist()), 0.0)
 
     def size(self, residual: Residual) -> float:
-        """Returns a residual as a multiple of the task's tolerances; up to 1, the task counts as met."""
+        """Returns a residual as a multiple of the task's tolerances. The task counts as met up to a multiple of 1."""
         return max(residual.position_m / self.config.tolerance_m, residual.orientation_rad / self.config.tolerance_rad)

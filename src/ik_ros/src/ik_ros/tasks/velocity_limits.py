@@ -18,9 +18,9 @@ class VelocityLimitsConfig(TaskConfig):
 
     Attributes:
         dt_s: Time between two successive solutions [s].
-        limits: Largest speed by joint name [rad/s or m/s]; other joints are free. By default the URDF's speed limits
-            apply to all joints.
-        factor: Factor of all speed limits.
+        limits: Largest speed by joint name [rad/s or m/s]; joints that are not listed are free. By default, the URDF's
+            speed limits apply to all joints.
+        factor: Factor by which all speed limits are multiplied.
     """
 
     dt_s: Seconds
