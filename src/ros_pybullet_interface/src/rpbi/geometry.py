@@ -52,7 +52,7 @@ class LinkWrench(NamedTuple):
         link: PyBullet's index of the link, -1 for the base.
         force: Force [N].
         torque: Torque [N m].
-        point: Point of application, in the world [m].
+        point: Point of application, in the world frame [m].
     """
 
     link: int

@@ -52,7 +52,7 @@ def check_sample(sample: Any, sample_type: Any, name: str) -> None:
     Args:
         sample: The sample.
         sample_type: Expected class of the sample.
-        name: Name of the sensor, which the sample must contain.
+        name: Name of the sensor; the sample must have the same name.
 
     Raises:
         TypeError: If the sample has another class.

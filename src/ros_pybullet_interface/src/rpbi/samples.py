@@ -30,7 +30,7 @@ class JointStateSample(NamedTuple):
 
 
 class LinkPoseSample(NamedTuple):
-    """Poses of a body's links in the world.
+    """Poses of a body's links in the world frame.
 
     Attributes:
         name: Name of the body.
@@ -49,7 +49,7 @@ class BaseStateSample(NamedTuple):
     Attributes:
         name: Name of the robot.
         frame: TF frame id of the root link.
-        pose: Pose of the root link's URDF frame in the world.
+        pose: Pose of the root link's URDF frame in the world frame.
         twist: Linear [m/s] and angular velocity [rad/s] of the root link's URDF frame, in the frame's own axes.
     """
 
@@ -160,7 +160,7 @@ class ContactsSample:
 
     @cached_property
     def points(self) -> tuple[ContactPoint, ...]:
-        """All contact points, computed at first use, since most samples are never used."""
+        """All contact points. They are computed at the first access, since most samples are never used."""
         return self._points()
 
     def __eq__(self, other: object) -> bool:
@@ -223,7 +223,7 @@ class ViconSample(NamedTuple):
     Attributes:
         name: `BODY/SENSOR`. BODY is Vicon's subject, SENSOR is Vicon's segment.
         frame: TF frame of the reported pose.
-        pose: Pose of the frame in the world.
+        pose: Pose of the frame in the world frame.
         age_ns: Age of the pose [ns].
     """
 

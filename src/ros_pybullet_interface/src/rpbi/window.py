@@ -51,7 +51,7 @@ class MouseEvent(NamedTuple):
 class Window:
     """Reads events and images of a client's window, and controls the window's camera.
 
-    Only the simulation thread may make calls.
+    Only the simulation thread may call the methods.
 
     Args:
         pb: The client.

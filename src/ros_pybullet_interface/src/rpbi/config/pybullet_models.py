@@ -212,7 +212,7 @@ class SetJointMotorControlArray(PybulletModel):
 
 
 class ObjectTf(ConfigModel):
-    """A TF frame to follow."""
+    """The TF frame that an object or camera follows."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
     hz: Hz = Field(30.0, description="Rate of look-ups.")

@@ -1,4 +1,7 @@
-"""Models of the YAML keys that set arguments of PyBullet's functions for the world. Models have functions' names."""
+"""Models of the YAML keys that set arguments of PyBullet's functions for the world.
+
+Each model is named after a PyBullet function.
+"""
 
 from __future__ import annotations
 

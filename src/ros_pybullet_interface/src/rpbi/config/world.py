@@ -235,7 +235,10 @@ class WorldConfig(ConfigModel):
         return self
 
     def pose_of(self, frame: str) -> Pose | None:
-        """Returns the pose of a TF frame in the world, computed from `poses`; None if a frame on the way is missing."""
+        """Returns the pose of a TF frame in the world frame, computed from `poses`.
+
+        Returns None if `poses` contains no chain of frames from this frame to the world frame.
+        """
         poses = {each.tf_id: each for each in self.poses}
         pose = Pose()
         while (frame := self.without_prefix(frame)) != WORLD_FRAME:

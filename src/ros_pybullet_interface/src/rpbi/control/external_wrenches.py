@@ -43,7 +43,7 @@ class ExternalWrenches:
     """Applies external wrenches to one body. A new wrench on a link replaces the link's previous wrench.
 
     Args:
-        body: The body. The constructor keeps no reference to the object.
+        body: The body. The constructor reads properties of this object, but keeps no reference to the object.
 
     Attributes:
         can_act: Whether at least one link of the body can move.
@@ -112,7 +112,7 @@ class ExternalWrenches:
         """Applies the wrenches for one tick. PyBullet clears external forces after each step.
 
         Args:
-            link_pose: Function from PyBullet's link index to the pose of the link's URDF frame in the world.
+            link_pose: Function from PyBullet's link index to the pose of the link's URDF frame in the world frame.
         """
         self.loads = [_load(index, wrench, link_pose(index)) for index, (wrench, _) in self._acting.items()]
         for link, force, torque, point in self.loads:

@@ -71,13 +71,14 @@ class Playout(NamedTuple):
 class JitterBuffer:
     """Delays the targets of a stream such that they are played at the intervals at which they were sampled.
 
-    Send times are estimated in two ways. The first estimate, for samples at irregular intervals, is the stamps, or the
-    arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late, is a
+    Send times are estimated in two ways. The first estimate, for samples at irregular intervals, equals the stamps, or
+    the arrivals if stamps are not valid. The second estimate, for regular samples that a busy machine sends late, is a
     regular period fitted to the first estimate. The buffer uses the estimate for which positions change more smoothly
     over time.
 
-    Transport delays are never negative, so the recent target with the smallest delay counts as undelayed. The buffer
-    delay is added. The sum changes slowly, except if a target comes too late for the present delay.
+    Transport delays are never negative, so the recent target with the smallest delay counts as undelayed. A target is
+    played the buffer delay, plus a period of the stream, after the time at which it would have come undelayed. The
+    offset from send times to play times changes slowly, except if a target comes too late for the present offset.
 
     Args:
         dt_s: Length of a tick [s].
@@ -154,7 +155,7 @@ class JitterBuffer:
         return max(tick - last.tick, sent_ticks) > self._longest
 
     def _at_every_tick(self, tick: int, interval: float) -> Playout:
-        """Schedules a target that comes alone or at every tick.
+        """Schedules a single target, or a target of a stream that has a target at every tick.
 
         The target acts at once, or after the targets that are still to be played.
         """
@@ -205,8 +206,8 @@ class JitterBuffer:
     def _undelayed(self, times: Sequence[float], steps: Sequence[int], regular: bool) -> float:
         """Estimates when the newest target would have come without delay, relative to its arrival [ticks].
 
-        The smallest delay of the recent targets is slightly above zero. The estimate corrects this, as for uniformly
-        distributed delays.
+        The smallest delay of the recent targets is slightly above zero. The estimate corrects this under the assumption
+        that delays are distributed uniformly.
         """
         tick, scale, sent = self._seen[-1].tick, self._rate, times
         if regular:
@@ -218,7 +219,7 @@ class JitterBuffer:
         return undelayed
 
     def _steps(self) -> list[int]:
-        """Returns, for each recent target, the number of periods from the newest target to it, 0 or negative."""
+        """Returns each recent target's send time relative to the newest target, in whole periods: 0 or negative."""
         steps = [0]
         for each in list(self._seen)[:0:-1]:
             steps.append(steps[-1] - each.step)
@@ -267,7 +268,7 @@ class JitterBuffer:
             self._seen[-1] = last[-1]._replace(step=periods)
 
     def _compare(self, times: Sequence[float], steps: Sequence[int]) -> None:
-        """Chooses between stamps (or arrivals) and a regular period, by the smoothness of positions over time."""
+        """Chooses stamps (or arrivals) or a regular period as send times, by the smoothness of positions over time."""
         last = list(self._seen)[-4:]
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):

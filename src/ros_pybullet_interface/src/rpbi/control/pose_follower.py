@@ -140,14 +140,14 @@ class PoseFollower:
         """Tick from which the next jump is logged."""
 
     def push(self, pose: Pose) -> None:
-        """Sets a new goal, which acts from the next tick on. The base is set to the first pose at once."""
+        """Sets a new goal, which acts from the next tick on. For the first pose, moves the base to the pose at once."""
         if self._path is None:
             self.put(pose)
         else:
             self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
-        """Sets the frame to a pose at once, with zero velocity."""
+        """Moves the base in one step so that the frame that follows the poses is at `pose`; sets the velocity to 0."""
         self._waiting = None
         self._begin(pose @ self._centre)
 
@@ -231,7 +231,7 @@ class TrackedBase(PoseFollower):
         self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
 
     def push(self, pose: Pose) -> None:
-        """Sets a new goal, which acts from the next tick on. The base is set to the first pose before that tick."""
+        """Sets a new goal for the next tick, which moves the base to the goal at once if the pose is the first one."""
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:

@@ -65,7 +65,7 @@ class RobotDynamics:
         """Returns the efforts that compensate gravity, Coriolis and centrifugal forces.
 
         Args:
-            base: Pose of the root link in the world.
+            base: Pose of the root link in the world frame.
             q: n joint positions [rad or m].
             velocity: n joint velocities [rad/s or m/s].
 
@@ -84,14 +84,14 @@ class RobotDynamics:
         return efforts_of_driven
 
     def gravity(self, base: Pose, q: Sequence[float]) -> Array:
-        """Returns the n efforts [N m or N] that compensate gravity at rest; arguments as of `bias`."""
+        """Returns the n efforts [N m or N] that compensate gravity at rest; for the arguments see `bias`."""
         return self.bias(base, q, [0.0] * len(self.joints))
 
     def jacobian(self, base: Pose, q: Sequence[float], link: int, point: Vector = (0.0, 0.0, 0.0)) -> Array:
         """Returns the Jacobian of a point of a link.
 
         Args:
-            base: Pose of the root link in the world.
+            base: Pose of the root link in the world frame.
             q: n joint positions [rad or m].
             link: PyBullet's index of the link.
             point: The point in the link's frame [m].
@@ -116,10 +116,10 @@ class RobotDynamics:
         return jacobian if self._by_driven is None else jacobian @ self._by_driven.factors
 
     def pose(self, base: Pose, q: Sequence[float], link: int) -> Pose:
-        """Returns the pose of a link's URDF frame in the world (forward kinematics).
+        """Returns the pose of a link's URDF frame in the world frame (forward kinematics).
 
         Args:
-            base: Pose of the root link in the world.
+            base: Pose of the root link in the world frame.
             q: n joint positions [rad or m].
             link: PyBullet's index of the link.
         """

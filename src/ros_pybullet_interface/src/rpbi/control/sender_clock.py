@@ -49,7 +49,7 @@ class SenderClock:
         """Newest stamp of the last full window whose stamps ran as fast as the world's time [ns]."""
 
     def restart(self) -> None:
-        """Allows stamps again, for a new stream."""
+        """Allows the use of stamps again, for a new stream."""
         self.is_right = self.is_right or None
 
     def ticks_between(self, first_ns: int, last_ns: int) -> float:

@@ -222,7 +222,7 @@ class BoundedMotion:
         Args:
             ways: Displacements from the previous target [rad or m], keyed by joint index.
             apart: Interval since the previous target, from stamps [ticks]; 0 to use the interval between arrivals.
-            corner: Duration of the plan's velocity change at the previous target [ticks]; 0 if this is the period.
+            corner: Duration of the plan's velocity change at the previous target [ticks]; 0 stands for the period.
         """
         period = max(self._period, EVERY_TICK)
         apart = apart or max(self._elapsed, EVERY_TICK)

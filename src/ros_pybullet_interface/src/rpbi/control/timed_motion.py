@@ -63,7 +63,7 @@ class TimedMotion(Motion):
         self._time_s, self._set_point = time_s, tuple(start)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Follows the plan. After its end, holds the goal until the joints rest there or `SETTLING_S` has passed."""
+        """Follows the plan. After the plan's end, holds the goal until the joints rest or `SETTLING_S` has passed."""
         if time_s > self._trajectory.end_s + 1e-9:
             missed = self._missed(measured)
             if not missed and self._rests(measured):
@@ -93,7 +93,7 @@ class TimedMotion(Motion):
         return all(abs(measured[index][1]) <= REST[self._model.joints[index].unit] for index in self._goal)
 
     def _residuals(self, measured: JointMotion, indices: list[int] | None = None) -> str:
-        """Returns position errors as text, for the joints in `indices`. If None, the largest error of each unit."""
+        """Returns position errors as text: of the joints in `indices`, or by default the largest in rad and in m."""
         errors = {index: abs(measured[index][0] - goal) for index, goal in self._goal.items()}
         joints = self._model.joints
         if indices is None:

@@ -117,9 +117,9 @@ class ChangeWatch:
     The methods of a world record their changes as commands. A direct call of a function in `CHANGING` is not recorded.
 
     Attributes:
-        recording: Number of recording methods that run at present.
-        unrecorded: Name of the first function called outside recording methods since the world was built or reset;
-            empty if there was no such call.
+        recording: Number of running methods that record their own changes as commands.
+        unrecorded: Name of the first function in `CHANGING` that was called while `recording` was 0, since the world
+            was built or reset; empty if there was no such call.
     """
 
     def __init__(self) -> None:
@@ -127,7 +127,7 @@ class ChangeWatch:
         self.unrecorded = ""
 
     def watched(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Wraps a PyBullet function so that the first call outside recording methods sets `unrecorded` to `name`."""
+        """Wraps a PyBullet function so that the first call while `recording` is 0 sets `unrecorded` to `name`."""
 
         def call(*arguments: Any, **options: Any) -> Any:
             if not self.recording and not self.unrecorded:

@@ -17,13 +17,13 @@ from rpbi.plain_values import as_tuple
 
 @dataclass(frozen=True)
 class Input:
-    """An input of a body or sensor.
+    """An input of a body or sensor, such as the target positions of a robot.
 
     Attributes:
-        check: Converts a received value for `apply`. Runs in the receiving thread and must not call PyBullet. Raises
-            ValueError or an InterfaceError to refuse the value.
-        apply: Applies the newest value. Runs on the simulation thread before the tick.
-        merge: Combines a waiting value with a newer value. If None, the newer value replaces the waiting one.
+        check: Function that converts a received value for `apply`. Runs in the receiving thread and must not call
+            PyBullet. Raises ValueError or an InterfaceError to refuse the value.
+        apply: Function that applies the newest value. Runs on the simulation thread before the next tick.
+        merge: Function that combines a waiting value with a newer value. None: newer values replace waiting ones.
         ros_topic: Import path `module:NAME` of the input's Topic, for an input from another package.
         owner: Text for `{name}` in the topic's name; if empty, the name of the body or sensor.
     """
@@ -37,7 +37,7 @@ class Input:
 
 @dataclass(frozen=True, kw_only=True)
 class PoseInput(Input):
-    """An input whose values are the poses of a TF frame in the world.
+    """An input whose values are the poses of a TF frame in the world frame.
 
     Attributes:
         tf_id: Name of the TF frame.
@@ -58,7 +58,7 @@ class PoseInput(Input):
 
         Args:
             object_tf: Configuration of the frame.
-            apply: Applies a pose, see `Input.apply`.
+            apply: Function that applies a pose, see `Input.apply`.
             is_tracked: See `PoseInput.is_tracked`.
         """
         tf = object_tf

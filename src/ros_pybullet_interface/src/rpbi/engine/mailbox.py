@@ -43,8 +43,8 @@ class Mailbox:
         Args:
             slot: Name of the slot.
             value: The value.
-            merge: Combines the value that waits in the slot with the new value. If None, the new value replaces the
-                waiting one.
+            merge: Function that combines the value that waits in the slot with the new value. If None, the new value
+                replaces the waiting one.
             generation: The mailbox's `generation` when the value was checked. If `drop` was called since then, the
                 value is ignored. None stores the value regardless of `drop`.
         """

@@ -82,8 +82,8 @@ class PoseAction:
     Args:
         controller: Name, as `ROBOT/CONTROLLER`. The controller needs a `point` on the link, and a pose as its `target`.
         link: Name of the controlled link.
-        low: Lower corner of the target's box-shaped workspace, in the world [m].
-        high: Upper corner of the workspace, in the world [m].
+        low: Lower corner of the target's box-shaped workspace, in the world frame [m].
+        high: Upper corner of the workspace, in the world frame [m].
         step: Maximum translation per action along each axis [m].
         turn: Maximum rotation per action about each axis [rad].
     """
@@ -130,10 +130,10 @@ class HandAction:
 
     Args:
         link: Name of the link, whose URDF frame moves.
-        axes: Axes along which the link moves, such as `xy`; along the remaining axes, the link keeps its start
-            position.
-        low: Lower corner of the target's box-shaped workspace, in the world [m].
-        high: Upper corner of the workspace, in the world [m].
+        axes: Axes of the world along which the link moves, such as `xy`. Along the remaining axes, the link keeps its
+            start position.
+        low: Lower corner of the target's box-shaped workspace, in the world frame [m].
+        high: Upper corner of the workspace, in the world frame [m].
         step: Maximum translation per action along each axis [m].
     """
 
@@ -161,7 +161,7 @@ class HandAction:
         self.size = len(axes)
 
     def reset(self) -> None:
-        """Sets the start pose and the target position to the link's present values."""
+        """Sets the start pose to the link's present pose, and the target position to the link's present position."""
         self._start = robot_of(self._world, self._robot).link_pose(self._link)
         self.goal = list(self._start.position)
 

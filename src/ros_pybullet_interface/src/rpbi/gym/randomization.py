@@ -87,7 +87,7 @@ class JointVariation(ConfigModel):
 
 
 class CameraVariation(ConfigModel):
-    """Random pose of a camera: offsets from the camera's first pose."""
+    """Random pose of a camera: offsets from the pose that the camera had when the environment was created."""
 
     camera: Name = Field(description="The camera.")
     position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")

@@ -34,8 +34,8 @@ class StepResult(NamedTuple):
         observation: Observation after the step; if the step reset the environment, the new episode's first observation.
         reward: Reward of the action.
         terminated: Whether the task has ended the episode.
-        truncated: Whether the episode was truncated.
-        info: Further information.
+        truncated: Whether the episode has ended at the maximum number of actions.
+        info: Information dictionary that belongs to `observation`.
         final: Last observation (`final_obs`) and information (`final_info`) of an episode that has just ended in mode
             `SAME_STEP`; otherwise None.
     """
@@ -112,7 +112,7 @@ class Worker:
         self._shared = shared
 
     def reset(self, seeds: Sequence[int | None], mask: Sequence[bool], options: Info | None) -> list[Info | None]:
-        """Starts episodes where the mask is true; returns the information from each reset, and None elsewhere."""
+        """Resets the environments whose `mask` is true. Returns the information of each reset; None for the others."""
         assert self._shared is not None
         infos: list[Info | None] = []
         for index, (slot, seed, is_reset) in enumerate(zip(self._slots, seeds, mask), self._first):

@@ -1,4 +1,4 @@
-"""Numerical methods of inverse kinematics, which move a link to a target or a solution towards a rest posture."""
+"""Numerical methods of inverse kinematics: they move a link to a target, or joints towards a rest posture."""
 
 import math
 import time
@@ -33,7 +33,9 @@ During a call, some 0.1 ms, PyBullet holds Python's global interpreter lock.
 
 
 class DampedLeastSquares:
-    """A `Step` by damped least squares, computed by PyBullet.
+    """Moves joints towards a link's target by damped least squares in PyBullet.
+
+    Instances are functions of type `Step`.
 
     Args:
         chain: Chain that moves the link.
@@ -76,7 +78,9 @@ LARGEST_STEP = np.pi / 4
 
 
 class SelectivelyDampedLeastSquares:
-    """A `Step` by selectively damped least squares. The arguments are as for `DampedLeastSquares`.
+    """Moves joints towards a link's target by selectively damped least squares.
+
+    Instances are functions of type `Step`. The arguments are those of `DampedLeastSquares`.
 
     After Buss and Kim, Selectively Damped Least Squares for Inverse Kinematics, Journal of Graphics Tools 10(3), 2005.
     PyBullet's own implementation crashes the process (bullet3 issue 4404).

@@ -99,7 +99,10 @@ def config_files(root: Path) -> dict[Path, str]:
 
 
 def _examples(root: Path) -> dict[str, str]:
-    """Returns an example per kind of file, without the first line, which tells editors the schema of the file."""
+    """Returns the text of an example for each kind of file.
+
+    Leaves out the first line, a comment that names the schema for editors.
+    """
     examples: dict[str, str] = {}
     paths = (root / "src/rpbi_examples/configs").rglob("*.yaml")
     for path in sorted(paths, key=lambda path: (path.parent.name != FIRST_EXAMPLES, len(path.parts), path)):

@@ -109,7 +109,7 @@ class ReplayResult(NamedTuple):
         agreed: Number of checkpoints at which the replayed state agreed with the recording.
         ticks: Number of replayed ticks.
         difference: The first difference from the recording, at which the replay ended; None without a difference.
-        left_out: A message for each section of the recording that could not be replayed. The message names the begin of
+        left_out: A message for each section of the recording that could not be replayed. The message names the start of
             the section and the reason.
     """
 
@@ -124,9 +124,10 @@ class Replay:
 
     Args:
         recording: The recording to replay.
-        progress: Called at each checkpoint, with the number of ticks replayed since the last call.
-        observe: Called after every tick, and whenever the replay begins with a built or reset world or with a recorded
-            keyframe. The arguments are the world, the number of resets so far in the recording, and the sensor samples.
+        progress: Function that is called at each checkpoint, with the number of ticks replayed since the last call.
+        observe: Function that is called after every tick, and whenever the replay begins with a built or reset world or
+            with a recorded keyframe. The arguments are the world, the number of resets so far in the recording, and the
+            sensor samples.
 
     Raises:
         ConfigError: If the world cannot be built on this machine.

@@ -14,8 +14,8 @@ class Momentum(NamedTuple):
     """Momentum of a subtree, in world axes.
 
     Attributes:
-        origin: Position of the origin of the first link's URDF frame in the world [m].
-        quat_xyzw: Orientation of the first link's URDF frame in the world.
+        origin: Position of the origin of the first link's URDF frame, in the world frame [m].
+        quat_xyzw: Orientation of the first link's URDF frame in the world frame.
         origin_velocity: Velocity of `origin` [m/s].
         linear: Linear momentum [kg m/s].
         angular: Angular momentum about `origin` [kg m^2/s].
@@ -87,7 +87,7 @@ class Subtree:
         PyBullet does not report rolling and spinning friction, nor contacts with soft bodies.
 
         Args:
-            origin: Reference point of the moment, in the world [m].
+            origin: Reference point of the moment, in the world frame [m].
         """
         force = moment = (0.0, 0.0, 0.0)
         body_id, links = self._body_id, self.links

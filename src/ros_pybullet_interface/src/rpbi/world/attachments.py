@@ -72,7 +72,7 @@ class _Attachment:
         return self.parent, self.child
 
     def force_and_torque(self, pb: Client) -> tuple[Vector, Vector]:
-        """Returns the force [N] and torque [N m] on the parent in the last step, in world axes."""
+        """Returns the force [N] and torque [N m] that acted on the parent body in the last step, in world axes."""
         state = pb.getConstraintState(self.constraint)
         force: Vector = state[:3]
         if len(state) == 3:  # ball joint: PyBullet returns the force on the child
@@ -178,7 +178,7 @@ class Attachments:
                     yield LinkWrench(end.link, scaled(sign, force), scaled(sign, torque), point)
 
     def clear(self) -> None:
-        """Removes all attachments, before all bodies are removed."""
+        """Removes all attachments; must be called before all bodies are removed."""
         for each in self._holding.values():
             self._pb.removeConstraint(each.constraint)
         if self._holding:

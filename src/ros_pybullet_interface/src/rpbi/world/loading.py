@@ -40,11 +40,11 @@ CAMERAS = "rgbd_sensors"
 
 
 class CameraConfig(NamedTuple):
-    """Configuration of a camera of a world, and its source.
+    """Configuration of a camera of a world, and the name of the configuration file.
 
     Attributes:
         config: Configuration of the camera.
-        file: Name of the file with the configuration, as the user wrote the name.
+        file: Name of the configuration file, as the user wrote the name.
     """
 
     config: RgbdSensorConfig

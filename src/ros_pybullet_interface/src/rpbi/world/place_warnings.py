@@ -123,7 +123,7 @@ def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _planes(world: World) -> Iterator[Problem]:
-    """Yields a warning for each plane on which bodies rest, or will rest after a fall: planes lose contact points."""
+    """Yields a warning for each plane on which bodies rest or will rest after a fall: contact points would be lost."""
     placed = [body for body in world.bodies.values() if _has_place(world, body)]
     for plane in placed:
         if _shape_kinds(plane) != {pybullet.GEOM_PLANE}:

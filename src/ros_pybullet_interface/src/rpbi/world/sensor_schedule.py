@@ -69,7 +69,7 @@ class SensorSchedule:
         return [each.sensor for each in self._scheduled[name]]
 
     def add(self, name: str, sensors: Sequence[Sensor]) -> None:
-        """Adds the sensors of a body, or a camera."""
+        """Adds a camera, or the sensors of a body; `name` is the camera's or body's name."""
         dt_ns, tick = self._clock.dt_ns, self._clock.tick
         self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
@@ -91,7 +91,7 @@ class SensorSchedule:
         self._rebuild()
 
     def remove(self, name: str) -> None:
-        """Removes the sensors of a body, or a camera."""
+        """Removes a camera, or the sensors of a body; `name` is the camera's or body's name."""
         del self._scheduled[name]
         self._rebuild()
 
@@ -130,7 +130,7 @@ class SensorSchedule:
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
     def act(self, method: str) -> None:
-        """Calls `before_step` or `after_step`, as named by `method`, of all sensors that override one of the two."""
+        """Calls `method` (`before_step` or `after_step`) of all sensors that override at least one of these methods."""
         for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)
@@ -140,7 +140,7 @@ class SensorSchedule:
 
     @property
     def idle_ticks(self) -> float:
-        """Number of ticks until a sensor has to be called or read, not counting that tick; inf without such sensors."""
+        """Number of ticks before the tick at which a sensor must next be called or read; inf if there is none."""
         if self.watching:
             return 0.0
         return self._queue[0][0] - self._clock.tick - 1 if self._queue else math.inf

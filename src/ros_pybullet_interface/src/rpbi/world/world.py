@@ -56,7 +56,10 @@ _Result = TypeVar("_Result")
 def _recorded(
     method: Callable[Concatenate[World, _Arguments], _Result],
 ) -> Callable[Concatenate[World, _Arguments], _Result]:
-    """Decorates a method that records its changes of PyBullet as commands, so that `ChangeWatch` ignores them."""
+    """Makes `ChangeWatch` ignore the changes that a method makes in PyBullet.
+
+    The decorated method records these changes itself, as commands.
+    """
 
     @wraps(method)
     def call(world: World, *arguments: _Arguments.args, **options: _Arguments.kwargs) -> _Result:
@@ -396,7 +399,7 @@ class World:
         return self._sensors[name]
 
     def frames(self) -> set[str]:
-        """Returns the names, without prefix, of the TF frames that the world publishes.
+        """Returns the names of the TF frames that the world publishes, without the configured `tf_prefix`.
 
         These are the world frame, the frames configured under `poses`, and the frames of sensors.
         """
@@ -412,7 +415,8 @@ class World:
     def apply_inputs(self) -> None:
         """Applies the inputs that arrived since the last call; inputs of removed bodies and cameras are ignored.
 
-        Every step calls this method first. While the world is stopped, a call still applies poses from TF.
+        Every step calls this method first. While the world is stopped, the simulation loop also calls this method, so
+        that bodies still follow poses from TF.
         """
         for slot, value in self.mailbox.drain().items():
             if slot in self.inputs:
@@ -420,7 +424,7 @@ class World:
 
     @_recorded
     def apply_input(self, slot: str, value: Any) -> None:
-        """Applies a checked value to an input, and records the value as a command."""
+        """Applies a value, which was already checked, to an input, and records the value as a command."""
         body = self.bodies.get(slot.split("/")[0])
         with plugin_errors(body or self, f"applying '{slot}' at tick {self.clock.tick}"):
             self.inputs[slot].apply(value)
@@ -552,7 +556,7 @@ class World:
 
         Args:
             rebuild: True: all bodies are loaded again, as new Python objects. False: bodies are kept if their states
-                can be restored exactly, which takes less than a millisecond; otherwise they are loaded again. Exact
+                can be restored exactly, which takes less than a millisecond; otherwise bodies are loaded again. Exact
                 restoring is possible, for instance, if robots without controllers have only followed targets, and
                 bodies were only moved or changed in their dynamics; see `StartState`.
 
@@ -862,7 +866,7 @@ class World:
         return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
-        """Makes waiting requests fail, ends the shadow, disconnects from PyBullet and closes all bodies."""
+        """Fails the requests waiting in `mailbox`, ends the shadow, disconnects from PyBullet and closes all bodies."""
         self.mailbox.close()
         self._end_shadow()
         try:

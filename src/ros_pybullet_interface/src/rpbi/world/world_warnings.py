@@ -94,7 +94,7 @@ def _moving_no_mass(document: UrdfDocument) -> list[str]:
 
 
 def _joints_below(document: UrdfDocument) -> dict[str, list[Edge]]:
-    """Returns the joints whose parent is a given link, indexed by the link's name."""
+    """Returns the joints below each link of a URDF, indexed by the name of the link that is the joints' parent."""
     below: dict[str, list[Edge]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge)
@@ -204,8 +204,8 @@ def _start_angles(world: World, item: ObjectConfig, config: RobotConfig) -> Iter
 def _are_radians(angles: Sequence[float]) -> bool:
     """Returns whether angles that should be degrees look like radians.
 
-    All angles, taken as radians, must be within a half turn. In addition, one of them must be a multiple of 15 degrees
-    (at least 30), or FRACTIONS of them must not be integers.
+    All angles, taken as radians, must be within a half turn. In addition, at least one angle must be a multiple of 15
+    degrees (30 or more), or at least FRACTIONS of the angles must not be integers.
     """
     if max(map(abs, angles), default=0.0) > HALF_TURN:
         return False

@@ -27,7 +27,7 @@ class PoseTarget(NamedTuple):
     """Target pose of a point of a link.
 
     Attributes:
-        pose: Position of the point and orientation of the link, in the world.
+        pose: Position of the point and orientation of the link, in the world frame.
         stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
     """
 
@@ -59,8 +59,8 @@ class CartesianImpedanceConfig(ControllerConfig):
 class CartesianImpedanceController(Controller):
     """Pulls a point of a link to a target pose by a spring and a damper, and compensates gravity and Coriolis forces.
 
-    The input `target` is a pose in the world. A redundant arm is pulled to the posture measured at the start, as far as
-    the target pose permits.
+    The input `target` is a pose in the world frame. A redundant arm is pulled to the posture that was measured when the
+    controller started, as far as the target pose permits.
     """
 
     Config = CartesianImpedanceConfig

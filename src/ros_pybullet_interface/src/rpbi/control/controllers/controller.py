@@ -30,10 +30,10 @@ class RobotState(NamedTuple):
     """The measured state of a robot before a tick.
 
     Attributes:
-        base: Pose of the root link in the world.
+        base: Pose of the root link in the world frame.
         position: Positions of all n driven joints [rad or m], in the order of `RobotDynamics.joints`.
         velocity: Velocities of the same joints, in the same order [rad/s or m/s].
-        base_twist: Twist of the root link in the world; zero for a fixed base.
+        base_twist: Twist of the root link in the world frame; zero for a fixed base.
     """
 
     base: Pose
@@ -53,11 +53,11 @@ class SetPoints(NamedTuple):
 
 
 class ControlledRobot(NamedTuple):
-    """The data about a robot that a controller gets, including which joints the controller drives.
+    """The data that a controller gets about its robot, including which joints the controller drives.
 
     Attributes:
         name: Name of the robot.
-        link_pose: Function from PyBullet's link index to the measured pose of the link's URDF frame in the world.
+        link_pose: Function from PyBullet's link index to the measured pose of the link's URDF frame in the world frame.
         model: Dynamics and kinematics of the robot.
         links: PyBullet's link indices, keyed by link name.
         chosen: Indices of the controller's m joints in `model.joints`, shape (m,).
@@ -125,7 +125,7 @@ class Controller(ABC):
 
         Args:
             state: State of the robot before the tick.
-            targets: Newest value of each input received since the start, keyed by the input's name.
+            targets: Newest value of each input received since the last call of `start`, keyed by the input's name.
             tick: Number of the simulation tick.
         """
 

@@ -91,7 +91,7 @@ class Disturbance:
 
         Args:
             velocity: n velocities before the tick [rad/s or m/s].
-            acceleration: n expected accelerations during the tick, the estimate included [rad/s^2 or m/s^2].
+            acceleration: n expected accelerations during the tick, including the estimate [rad/s^2 or m/s^2].
         """
         self._predicted = velocity + self._dt_s * acceleration
 
@@ -128,7 +128,7 @@ class JointImpedance:
             error: n position errors, desired minus measured [rad or m].
             velocity: n measured velocities [rad/s or m/s].
             wanted_velocity: n desired velocities [rad/s or m/s].
-            push: n efforts [N m or N] to add, or one for all joints.
+            push: n efforts to add, or one effort to add at all joints [N m or N].
         """
         self._disturbance.update(velocity)
         external = mass @ self._disturbance.estimate

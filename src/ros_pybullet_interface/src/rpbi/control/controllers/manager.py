@@ -263,7 +263,7 @@ class ControllerManager:
         self._drive_others(before)
 
     def _drive_others(self, before: frozenset[int]) -> None:
-        """Updates `driven`, whose previous value is `before`.
+        """Updates `driven`, the indices of the joints that controllers drive; `before` is the previous value.
 
         Joints that are no longer driven hold. PyBullet's motors of newly driven joints are disabled.
         """
@@ -306,7 +306,7 @@ def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.nda
 
 
 def _cause(controller: Controller, doing: str, error: Exception) -> str:
-    """Returns the message of a controller's error. If the class is from another package, the message names it."""
+    """Returns the message of a controller's error; the message names the class if it is from another package."""
     try:
         raise_plugin_error(controller, doing, error)
     except InterfaceError as named:

@@ -79,7 +79,7 @@ class TrajectoryFollower:
         Args:
             request: Result of `check`.
             clock: The world's clock.
-            feedback: Called with the follower's state at `action_monitor_rate` while the motion lasts.
+            feedback: Function that is called with the follower's state at `action_monitor_rate` while the motion lasts.
 
         Raises:
             TrajectoryRefusedError: If all points are in the past, a joint cannot reach the trajectory's next

@@ -26,7 +26,8 @@ class TrajectoryMotion(Motion):
         code: Error code of the outcome, as in control_msgs/FollowJointTrajectoryResult.
         preempted: Whether another request ended the motion.
         desired: Desired states at the end of the last tick, keyed by joint index.
-        on_advance: Called at each tick with the world's time [s] and the measured joint states; None for no call.
+        on_advance: Function that is called at each tick with the world's time [s] and the measured joint states; or
+            None.
     """
 
     can_wait = True

@@ -41,7 +41,7 @@ class LiftTask(HandTask):
         return [self.hand_action(), GripperAction(self.world, config.robot, config.fingers, config.finger_step)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the inherited parts, then the pose of the body."""
+        """Yields the parts of `HandTask.parts`, then the pose of the body to lift."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
 

@@ -45,7 +45,7 @@ class PegTask(HandTask):
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the inherited parts, then the vector from the tip to the hole's opening, in the world [m]."""
+        """Yields the parts of `HandTask.parts`, then the vector from peg tip to hole opening, in world axes [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 

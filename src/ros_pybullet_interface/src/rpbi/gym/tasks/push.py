@@ -41,7 +41,7 @@ class PushTask(HandTask):
         return [self.hand_action("xy")]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the inherited parts, then the pose of the body and the goal [m]."""
+        """Yields the parts of `HandTask.parts`, then the pose of the body, then x and y of the goal [m]."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
         yield ObservationPart("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)

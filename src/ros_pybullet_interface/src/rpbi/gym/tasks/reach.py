@@ -46,7 +46,7 @@ class ReachTask(WorldTask):
         return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the inherited parts, then the vector from the link to the goal, in the world [m]."""
+        """Yields the parts of `WorldTask.parts`, then the vector from the link to the goal, in world axes [m]."""
         yield from super().parts()
         yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
 
@@ -57,7 +57,7 @@ class ReachTask(WorldTask):
         super().reset(random)
 
     def position(self) -> Vector:
-        """Returns the position of the link in the world [m]."""
+        """Returns the position of the link in the world frame [m]."""
         position: Vector = self.world.bodies[self.config.robot].link_pose(self._link).position
         return position
 

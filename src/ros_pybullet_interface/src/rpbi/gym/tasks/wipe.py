@@ -52,7 +52,7 @@ class WipeTask(HandTask):
         return [self.hand_action()]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the inherited parts, then the force on the surface [N], and for each cell 1 if wiped, otherwise 0."""
+        """Yields the parts of `HandTask.parts`, the force on the surface [N], and for each cell 1 if wiped, else 0."""
         yield from super().parts()
         yield ObservationPart("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
         count = len(self.cells)

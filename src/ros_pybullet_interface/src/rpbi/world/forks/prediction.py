@@ -56,7 +56,7 @@ class Prediction(NamedTuple):
         cost: Sum of the costs after all ticks; inf if the prediction failed.
         state_hash: Hash of the state at the end, see `World.state_hash`.
         ticks: Ticks of the samples, counted from the start of the prediction, shape (n,).
-        poses: For each body, positions [m] and quaternions (x, y, z, w) of the base in the world, shape (n, 7).
+        poses: For each body, positions [m] and quaternions (x, y, z, w) of the base in the world frame, shape (n, 7).
         joints: For each robot, positions of the moving joints [rad or m] in the order of the joint model, shape
             (n, number of joints).
         contacts: For each body, sum of the normal forces of all contacts [N], shape (n,).

@@ -142,8 +142,8 @@ class _Copy:
 
     Args:
         call: Function to call in the fork.
-        keep: File descriptor that stays open in the fork, besides standard error. The fork redirects all others to
-            /dev/null, since a pipe that this process closes would stay open in the fork.
+        keep: File descriptor that stays open in the fork, besides standard error. The fork redirects all other file
+            descriptors to /dev/null. Otherwise pipes would stay open in the fork after this process closes them.
     """
 
     stdin = None

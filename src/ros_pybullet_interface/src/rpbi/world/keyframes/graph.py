@@ -41,7 +41,7 @@ NOTHING: Any = object()
 
 
 class GraphWriter:
-    """Converts objects to plain values for JSON.
+    """Converts objects to plain data that JSON can contain: None, booleans, numbers, text and lists.
 
     Args:
         fixed: Types whose objects are not written; the reader uses the corresponding objects of its own world.
@@ -56,7 +56,7 @@ class GraphWriter:
         """All written objects; the list keeps them alive, so that Python does not reuse their `id`."""
 
     def plain(self, value: Any, where: str = "") -> Any:
-        """Returns the plain form of a value, or a reference if the same object was written before.
+        """Returns a value as plain data, or a reference in plain data if the same object was written before.
 
         Args:
             value: Value to write.
@@ -86,7 +86,7 @@ class GraphWriter:
         return [*self._content(value, where), number]
 
     def _content(self, value: Any, where: str) -> list[Any]:
-        """Returns the kind of a value and its content in plain form."""
+        """Returns a list of plain data: the name of the value's kind, such as `array` or `dict`, then the content."""
         if isinstance(value, self._fixed):
             return ["fixed"]
         if isinstance(value, ConfigModel):
@@ -115,7 +115,9 @@ class GraphWriter:
         return ["object", full_name(type(value)), self.attributes(value, where)]
 
     def attributes(self, value: Any, where: str) -> list[list[Any]]:
-        """Returns name and plain value of each attribute of an object, except those that `not_in_keyframes` names.
+        """Returns each attribute of an object as a list of its name and its value as plain data.
+
+        Leaves out the attributes that `not_in_keyframes` of the object's class names.
 
         Args:
             value: The object.
@@ -162,7 +164,7 @@ def _attributes_of(value: Any) -> Iterator[tuple[str, Any]]:
 
 
 class GraphReader:
-    """Converts the plain values of a GraphWriter back to objects, and fills existing objects where possible.
+    """Converts plain data of a GraphWriter back to objects; where possible, sets attributes of existing objects.
 
     Args:
         fixed: Types whose objects were not written; must equal the writer's `fixed`.
@@ -189,15 +191,15 @@ class GraphReader:
         }
 
     def value(self, plain: Any, here: Any = NOTHING) -> Any:
-        """Returns the value for a plain form.
+        """Converts plain data back to a value.
 
         Args:
-            plain: Plain form from `GraphWriter.plain`.
-            here: Existing object to fill or to replace; NOTHING if there is no such object.
+            plain: Plain data from `GraphWriter.plain`.
+            here: Existing object whose attributes are set, or which the value replaces; NOTHING without such an object.
 
         Raises:
-            ValueError: If the plain form is not valid, or a class is missing or not trusted.
-            ConfigError: If a configuration in the plain form is not valid on this machine.
+            ValueError: If the plain data are not valid, or a class is missing or not trusted.
+            ConfigError: If a configuration in the plain data is not valid on this machine.
         """
         with _one_error():
             return self._value(plain, here)
@@ -207,7 +209,7 @@ class GraphReader:
 
         Args:
             owner: The object.
-            attributes: Pairs of name and plain value, from `GraphWriter.attributes`.
+            attributes: Pairs of name and plain data, from `GraphWriter.attributes`.
 
         Raises:
             ValueError: See `value`; also if a name is not a settable attribute.

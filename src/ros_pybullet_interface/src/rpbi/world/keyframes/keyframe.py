@@ -109,7 +109,7 @@ def _anchors(contents: WorldContents) -> dict[str, Any]:
 
 
 def _objects(world: Any, contents: WorldContents) -> dict[str, Any]:
-    """Returns the attributes of all anchors of a `World` as plain values, indexed by the anchors' names.
+    """Returns the attributes of all anchors of a `World` as plain data, indexed by the anchors' names.
 
     Raises:
         InterfaceError: If an attribute cannot be written.
@@ -135,7 +135,7 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 
 
 def difference(first: str, second: str) -> str:
-    """Returns the name of the first part in which two keyframes differ; empty if they are equal.
+    """Returns where two keyframes first differ: an anchor's name, `bodies` or `tick`; empty if they are equal.
 
     Sensors are not compared, since their state depends on whether their samples have receivers.
     """

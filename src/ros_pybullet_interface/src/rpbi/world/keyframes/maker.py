@@ -47,7 +47,10 @@ class KeyframeMaker:
         return asked
 
     def poll(self) -> None:
-        """If a keyframe is due, requested or in progress, makes its next part; does nothing while the world is busy."""
+        """If a keyframe is due, requested or in progress, makes its next part.
+
+        Does nothing while the world is busy, see `Mailbox.hold`.
+        """
         world = self._world
         if world.mailbox.is_held:
             return

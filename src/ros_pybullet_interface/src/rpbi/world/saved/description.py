@@ -59,7 +59,7 @@ def describe(loaded: LoadedWorld, start_hash: str) -> str:
 
 
 class _Object(ConfigModel):
-    """An object in a description; `config` is the configuration as text returned by `to_text`."""
+    """An object in the description of a saved world; `config` is the object's configuration as text from `to_text`."""
 
     type: str
     file: str
@@ -67,14 +67,14 @@ class _Object(ConfigModel):
 
 
 class _Camera(ConfigModel):
-    """A camera in a description; `config` is the configuration as text returned by `to_text`."""
+    """A camera in the description of a saved world; `config` is the camera's configuration as text from `to_text`."""
 
     file: str
     config: str
 
 
 class _Description(ConfigModel):
-    """Content of a description, without the key `format`. Older recordings do not have the key `cameras`."""
+    """Content of a world's description, without the key `format`. Older recordings lack the key `cameras`."""
 
     pybullet: str
     file: str
@@ -90,7 +90,7 @@ class WorldDescription:
     """A description of a world, which was read from its text.
 
     Args:
-        text: Result of `describe`.
+        text: Description that `describe` returned.
 
     Attributes:
         start_hash: Hash of the world's state after it was built.
@@ -118,7 +118,7 @@ class WorldDescription:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """A message for each file on this machine, and for PyBullet's version, that differs from the recorded one."""
+        """A message for each recorded file that differs on this machine, and one if PyBullet's version differs."""
         read, left, differences = self._read, MAX_COMPARED_BYTES, []
         for path, digest in read.files.items():
             if path in read.descriptions:

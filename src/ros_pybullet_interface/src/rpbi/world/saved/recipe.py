@@ -150,7 +150,7 @@ class FreshClient:
         self._bodies: dict[str, Body] = {}
 
     def build(self) -> Iterator[None]:
-        """Builds the bodies, and yields after each applied entry of the recipe.
+        """Builds the bodies from the recipe's load log entries; yields after applying each entry.
 
         Raises:
             ConfigError: If a body cannot be loaded again, for instance because its file is missing.
@@ -193,7 +193,7 @@ def _change(body: Body, link: str, values: dict[str, Any]) -> ChangeDynamics:
     Args:
         body: The present body.
         link: Name of the link; empty for the root link.
-        values: All changed values of the link so far.
+        values: All dynamics values of the link that were changed since the body was loaded.
     """
     if values.keys() & {"mass", "localInertiaDiagonal"}:
         index = next((index for index in body.joint_indices if body.link_name(index) == link), -1)

@@ -83,7 +83,7 @@ class WorldState(NamedTuple):
         """Reads a state from a file.
 
         Raises:
-            ConfigError: If the file does not exist, is too large, or is not from `write` of a compatible version.
+            ConfigError: If the file does not exist, is too large, or was not written by a compatible `write`.
         """
         try:
             packed = read_file(path, MAX_BYTES)
@@ -137,7 +137,7 @@ class WorldState(NamedTuple):
         return False
 
     def require_short(self, max_ticks: int) -> None:
-        """Checks the number of ticks to simulate until the state is reached: a forged file could demand days.
+        """Checks the number of ticks to simulate until the state is reached: a forged file could demand days of work.
 
         Raises:
             InterfaceError: If the number of ticks exceeds `max_ticks`.
