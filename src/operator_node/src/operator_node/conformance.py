@@ -68,7 +68,7 @@ class Reader:
 class DeviceConformance:
     """Base class with the tests that every device must pass.
 
-    A subclass names the device and implements how to move it. The motion must come from the real hardware or from an
+    A subclass names the device, and implements how it is moved. The motion must come from the real hardware or from an
     emulator of the hardware, not from the device's Python object. For abilities that the device lacks, the subclass
     keeps the defaults, for example of `moves`, `presses` or `garbage`.
 
@@ -130,7 +130,7 @@ class DeviceConformance:
 
     @pytest.fixture
     def reader(self, device: Device) -> Reader:
-        """Returns a reader with an open device that has reported its axes at rest."""
+        """Returns a reader whose device is open and has reported all axes in `moves` at rest."""
         reader = Reader(self.device_name, device)
         reader.until(lambda: bool(reader.readings), "the device is open")
         self.settle(reader)
@@ -236,7 +236,7 @@ class DeviceConformance:
         reader.until(lambda: reader.axis(axis) > 0.5, "it moves again")
 
     def test_garbage_is_refused_and_counted(self, reader: Reader) -> None:
-        """Invalid inputs neither raise exceptions nor cause invalid readings. The feed counts them, keyed by reason."""
+        """Invalid inputs neither raise exceptions nor cause invalid readings. The feed counts invalid inputs."""
         if type(self).garbage is DeviceConformance.garbage:
             pytest.skip(f"garbage cannot be sent to '{self.device_name}' from outside")
         generator = random.Random(1)

@@ -39,7 +39,7 @@ class TeleopParameters(StartParameters):
 class TeleopTf:
     """Moves a frame by `operator_node/signal`, and broadcasts the frame, while the teleoperation is switched on.
 
-    While it is switched off, the frame is broadcast after each reset, or always if `broadcast_always` is set.
+    While the teleoperation is off, the frame is broadcast only after resets, or always if `broadcast_always` is set.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.

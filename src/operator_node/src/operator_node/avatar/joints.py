@@ -39,13 +39,13 @@ class HumanJoint(NamedTuple):
 
     @property
     def hinges(self) -> tuple[str, str, str]:
-        """Names of the hinges from parent to child, such as `jRightElbow_rotz`."""
+        """Names of the hinges, such as `jRightElbow_rotz`, in the order from parent to child."""
         first, second, third = (f"{self.name}_rot{axis}" for axis in self.order)
         return first, second, third
 
     @property
     def limits(self) -> tuple[Range, Range, Range]:
-        """Lower and upper limits of the hinges from parent to child [rad]."""
+        """Lower and upper limit of each hinge [rad], in the order from parent to child."""
         first, second, third = ((math.radians(low), math.radians(high)) for low, high in map(self._range, self.order))
         return first, second, third
 

@@ -37,7 +37,7 @@ class AvatarPose(NamedTuple):
 
 
 class AvatarPlace(NamedTuple):
-    """Initial position of the avatar on the floor, x and y [m], and its rotation about z [rad]."""
+    """Initial position of the avatar on the floor, x and y [m], and rotation of the avatar about z [rad]."""
 
     x: float
     y: float
@@ -120,7 +120,7 @@ _FLIP = np.array((1.0, -1.0, 1.0))
 
 
 def _hinges(relative: Array, last: Array) -> Array:
-    """Returns the hinge angles of all joints (22 x 3) [rad]. Prefers angles within the limits, but does not clip them.
+    """Returns the hinge angles of all joints (22 x 3) [rad]. Prefers angles within the limits, without clipping.
 
     Args:
         relative: Orientation of each segment in its parent, as rotation matrices (22 x 3 x 3).
@@ -152,7 +152,7 @@ def _hinges(relative: Array, last: Array) -> Array:
 
 
 def _with_first(a: float, m: Array, sign: float, last: Array) -> Array:
-    """Returns the three hinge angles of one joint if its first hinge is held at the angle `a` [rad]."""
+    """Returns the three hinge angles of one joint whose first hinge is held at the angle `a` [rad]."""
     c, s = math.cos(a), math.sin(a)
     row_1, row_2 = c * m[1] + sign * s * m[2], c * m[2] - sign * s * m[1]
     angles = np.array((a, math.atan2(sign * m[0, 2], row_2[2]), math.atan2(sign * row_1[0], row_1[1])))

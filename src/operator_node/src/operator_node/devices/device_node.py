@@ -37,7 +37,7 @@ class DeviceParameters(ConfigModel):
 
 
 class CueConfig(ConfigModel):
-    """Scaling of forces that an input device renders, for example by rumbling."""
+    """Scale of the forces that an input device renders, for example by rumbling."""
 
     cue_full_scale: Positive = Field(
         20.0, description="Force that is rendered with the full strength of the device [N]."

@@ -38,7 +38,7 @@ class KeyboardConfig(ConfigModel):
 class Keyboard(Device):
     """A keyboard that is read through a separate window or through the terminal.
 
-    The events of its readings are of type `KeyEvent`. All keys count as released while the window does not have the
+    The events in a reading are of type `KeyEvent`. All keys count as released while the window does not have the
     focus.
 
     Raises:

@@ -51,7 +51,7 @@ def _places(frame: SegmentFrame) -> Array:
 
 
 class Mvn(Device):
-    """Hands of a person, whose motion is captured and streamed by Xsens MVN.
+    """Hands of a person whose motion Xsens MVN captures and streams.
 
     The axes are the displacements of the right and the left hand of person 0, forward, left and up, since the first
     frame. The displacements are relative to the pelvis and its heading, and are divided by the arm's length. The events

@@ -68,7 +68,7 @@ class VirtualJoystick:
         self.move([0.0] * 4 + [1.0] * 2 + [0.0] * 2)
 
     def move(self, axes: Sequence[float] = (), buttons: Sequence[int] = ()) -> None:
-        """Sets the first axes and buttons to the given values, and leaves the remaining ones unchanged.
+        """Sets the first axes and buttons to the given values. The remaining axes and buttons stay unchanged.
 
         Args:
             axes: Values in [-1, 1] of the first axes, in the order given in the class's docstring. The hat is set only

@@ -30,7 +30,7 @@ class Clutch:
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Updates the clutch with position [m] and buttons of the handle. Returns whether this call has engaged it."""
+        """Updates the clutch with the handle's position [m] and buttons. Returns whether the clutch was engaged now."""
         is_held = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if is_held and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
@@ -42,11 +42,11 @@ class Clutch:
         return False
 
     def release(self) -> None:
-        """Disengages the handle. The tool keeps its position. If the button is held, the next update engages both."""
+        """Disengages the clutch; the tool stays. If the button is held, the next update engages the clutch again."""
         self._kept, self.deviation, self.engaged = self.displacement, ZERO, False
 
     def set_displacement(self, displacement: Vector) -> None:
-        """Disengages the handle, and sets the tool's displacement [m]. The motion scale is not yet applied to it."""
+        """Disengages the clutch, and sets the tool's displacement before the motion scale is applied [m]."""
         self._kept, self.engaged, self.deviation = displacement, False, ZERO
 
 

@@ -163,7 +163,7 @@ class ToolFeed:
             WallTimer(TOOL_HZ, self._observe_tool)
 
     def _on_wrench(self, message: WrenchStamped) -> None:
-        """Sends the force on the tool to the loop."""
+        """Sends the force on the tool to the haptic loop."""
         f = message.wrench.force
         if not math.isfinite(f.x + f.y + f.z):
             self._warn("haptics/wrench", f"refused, expected finite numbers, got {f.x:g}, {f.y:g}, {f.z:g}")
@@ -208,7 +208,7 @@ class ToolFeed:
             return None
 
     def _observe_tool(self) -> None:
-        """Sends the displacement of the tool from its start to the loop, if TF has a new pose."""
+        """Sends the displacement of the tool from its start to the haptic loop, if TF has a new pose."""
         if self.start is None or (found := self._tool()) is None:
             return
         tool, stamp = found

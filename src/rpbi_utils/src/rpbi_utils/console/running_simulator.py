@@ -78,11 +78,11 @@ class RunningSimulator:
         return dict(zip(listed.names, listed.types))
 
     def require(self, body: str, name: str, what: str) -> str:
-        """Checks that a body subscribes to a topic or offers a service, and returns its name `rpbi/BODY/NAME`.
+        """Checks that a body subscribes to a topic or offers a service. Returns the topic's or service's name.
 
         Args:
             body: Name of the body.
-            name: Last part of the name of the topic or service.
+            name: Last part of the topic's or service's name, which is `rpbi/BODY/NAME`.
             what: Kind of body that has the topic or service, such as `a robot`; used in the error message.
 
         Raises:

@@ -19,7 +19,7 @@ def save(
     """Saves the state of the running world in a file; `restore` reproduces this state exactly, bit by bit.
 
     Args:
-        file: file on the simulator's computer, in your home folder, or in its ~state_folder if that is set
+        file: file on the simulator's computer, below ~state_folder of the simulator (default: your home)
         keyframe: makes a keyframe first, so that `restore` need not simulate again; the keyframe changes the
             further simulation a little
         ns: namespace of the simulator; default: ROS_NAMESPACE

@@ -66,7 +66,7 @@ class TranslationConfig(ConfigModel):
     translation_z_index: Count | None = optional("Row of z.")
 
     def axis(self, name: str) -> tuple[float | None, int | None]:
-        """Returns the constant coordinate [m] and the row index of axis `x`, `y` or `z`. Either one may be None."""
+        """Returns the constant coordinate [m] and the row index of axis `x`, `y` or `z`; None for a missing value."""
         return getattr(self, f"translation_{name}"), getattr(self, f"translation_{name}_index")
 
 
@@ -182,7 +182,7 @@ class MotionDimensions(ConfigModel):
 
         Args:
             scalars: Values of the rows `scalar_rows`.
-            quat_xyzw: Interpolated orientation; None to compute the orientation from `scalars` or constants.
+            quat_xyzw: Interpolated orientation; None to compute the orientation from `scalars` or the configuration.
         """
         assert self.trans is not None
         values = dict(zip(self.scalar_rows, scalars))

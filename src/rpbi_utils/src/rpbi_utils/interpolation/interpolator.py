@@ -69,7 +69,7 @@ class Added(NamedTuple):
 
     Attributes:
         peaks: Largest speeds and accelerations of the new motion.
-        stretch: Factor by which the motion's duration was extended to keep the limits; 1 if it was not extended.
+        stretch: Factor by which the motion was slowed down to keep the limits; 1 if the limits were kept anyway.
         excess: The limit that the motion exceeded most before it was slowed down.
     """
 

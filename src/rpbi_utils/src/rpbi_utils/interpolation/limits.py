@@ -1,4 +1,4 @@
-"""Computes the peak speeds and accelerations of a motion, and the factor that slows the motion down to its limits."""
+"""Computes a motion's peak speeds and accelerations, and the factor of slowing down that makes it keep its limits."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Peaks(NamedTuple):
 
     Attributes:
         velocity: Largest speed of each waypoint row that is interpolated as a number [m/s or rad/s], shape (S,).
-        acceleration: Largest acceleration of each of these rows [m/s^2 or rad/s^2], shape (S,).
+        acceleration: Largest acceleration of each such row [m/s^2 or rad/s^2], shape (S,).
         angular_velocity: Largest angular speed of the orientation path [rad/s]; 0 without a path.
         angular_acceleration: Largest angular acceleration of the orientation path [rad/s^2]; 0 without a path.
     """
@@ -112,7 +112,7 @@ class Peaks(NamedTuple):
         return cls(_largest(rates), _largest(bends), *_turning(path))
 
     def excess(self, limits: MotionLimitsConfig) -> Excess:
-        """Returns the limit that the peaks exceed most. If they keep all limits, returns the closest one."""
+        """Returns the limit that the peaks exceed most, or the closest limit if no limit is exceeded."""
         worst = Excess()
         for key, power in zip(self._fields, (1.0, 0.5, 1.0, 0.5)):
             limit, peaks = getattr(limits, key), np.atleast_1d(getattr(self, key))

@@ -129,9 +129,9 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
 def tag_poses(
     detector: TagDetector, grey: Image, camera_matrix: npt.NDArray[np.float64], sizes: Mapping[int, float]
 ) -> Iterator[tuple[int, Pose]]:
-    """Yields the id and the pose of each tag in an image whose id is a key of `sizes`.
+    """Yields the id and the pose of each tag in an image, except tags whose id is missing in `sizes`.
 
-    `sizes` has the side of the black square [m] for each id.
+    `sizes` has the side of the black square [m], keyed by id.
     """
     for tag in detector.detect(grey):
         if tag.id in sizes and (pose := tag_pose(tag, sizes[tag.id], camera_matrix)) is not None:

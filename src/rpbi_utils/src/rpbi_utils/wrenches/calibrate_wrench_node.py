@@ -184,7 +184,7 @@ class CalibrateWrenchNode:
             return TriggerResponse(True, f"pose {len(self._samples)}: gravity is {listed(gravity)} m/s^2 in the sensor")
 
     def _identify(self, _: TriggerRequest) -> TriggerResponse:
-        """Service callback that identifies payload and zero offset from the samples, and applies both from now on."""
+        """Service callback that identifies payload and zero offset from the samples, and starts to use both."""
         with self._lock:
             try:
                 found = identify_payload(self._samples, self._parameters)

@@ -135,7 +135,7 @@ class WrenchCalibration:
     """Subtracts a sensor's zero offset and a payload's weight from wrenches.
 
     Attributes:
-        offset: The sensor's zero offset [N, N m], shape (6,); None until it is set.
+        offset: The sensor's zero offset [N, N m], shape (6,); None before the first zeroing.
         payload: Payload whose weight is subtracted; None without a payload.
     """
 

@@ -30,7 +30,7 @@ class Panel(QGroupBox):
         self._needed: dict[QWidget, tuple[str, Condition]] = {}
 
     def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
-        """Runs a function in the background. The window shows the result and passes it to `then`.
+        """Runs a function in the background. The window shows the result, and calls `then` with the result.
 
         The result is an error after `limit_s` [s].
         """
