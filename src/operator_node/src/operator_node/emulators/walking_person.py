@@ -141,7 +141,10 @@ class WalkingPerson:
         return place + (0.0, 0.0, self._height_m * T_POSE["RightFoot"][2]), angle
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns position [m] and direction [rad] of an ankle at a time. For the arguments see `_footprint`."""
+        """Returns position [m] and direction [rad] of an ankle at the time `walking_s` [s].
+
+        For the other arguments see `_footprint`.
+        """
         number, part = divmod(walking_s / STRIDE_S - offset, 1.0)
         here, direction = self._footprint(number, sign, offset)
         if part < STANCE:

@@ -43,8 +43,8 @@ def move(
     Args:
         JOINT:=POSITION: goal of a joint [rad or m]; 30deg is an angle in degrees
         X Y Z: goal position in the world frame [m]
-        ROLL PITCH YAW: goal orientation about the world's fixed axes [rad], or 90deg; if omitted, a link may have any
-            orientation, and an object gets the identity
+        ROLL PITCH YAW: goal orientation about the world's fixed axes [rad]; 90deg is an angle in degrees; if omitted,
+            a link may have any orientation, and an object gets the orientation of the world frame
         duration_s: duration of the motion [s]; default: 2
         home: moves all joints to their start positions
         stop: ends the running motion; the joints hold their present positions

@@ -165,7 +165,7 @@ class RobotController:
         self._waiting.append((now_s + delay_s, self._planned_s + delay_s, motion))
 
     def refuse_command(self, what: str) -> None:
-        """Triggers a reflex for a malformed command, for example without a joint. `what` describes the fault."""
+        """Triggers a reflex for a malformed command, for example one that lacks a joint. `what` describes the fault."""
         if self.mode is Mode.REFLEX:
             self.counters.ignored += 1
         else:

@@ -32,7 +32,7 @@ class Panel(QGroupBox):
     def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
         """Runs a function in the background. The window shows the result, and calls `then` with the result.
 
-        The result is an error after `limit_s` [s].
+        If the function takes longer than `limit_s` [s], the result is an error.
         """
         self._requests.ask(name, function, then, limit_s)
 
