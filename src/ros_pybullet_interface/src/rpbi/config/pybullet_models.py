@@ -75,7 +75,7 @@ class PybulletModel(ConfigModel):
 
 
 class LoadURDF(PybulletModel):
-    """File of a robot description, and its placement in the world."""
+    """URDF file of a body, and the initial pose of the body."""
 
     fileName: RobotFile = Field(description="URDF file, or the word `robot_description` for the parameter.")
     basePosition: Position | None = optional("Position of the base in the world.")
@@ -158,7 +158,7 @@ class CreateCollisionShape(_CreateShape):
 
 
 class ChangeDynamics(PybulletModel):
-    """Behaviour of a body in contact and motion."""
+    """Dynamics of a body, such as mass, friction and damping."""
 
     mass: Kilograms | None = optional("Mass of the base link.")
     lateralFriction: NonNegative | None = optional("Coulomb friction coefficient.")
@@ -197,7 +197,7 @@ class ChangeDynamics(PybulletModel):
 
 
 class ResetBaseVelocity(PybulletModel):
-    """Velocity of a body at the start."""
+    """Initial velocity of a body."""
 
     linearVelocity: Annotated[Vec3, Unit("m/s")] | None = optional("Velocity in the world.")
     angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = optional("Rotation in the world.")

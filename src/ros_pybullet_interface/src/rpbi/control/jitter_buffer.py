@@ -114,7 +114,7 @@ class JitterBuffer:
         """Adds a target, and returns its schedule.
 
         Args:
-            tick: Number of the tick before which the target came.
+            tick: Number of the first tick after the target came.
             stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
             goal: Target positions [rad or m], keyed by joint index.
         """
@@ -179,7 +179,7 @@ class JitterBuffer:
         """Schedules the newest target as near to its planned time as the limits on delay changes permit.
 
         Args:
-            tick: Number of the tick before which the target came.
+            tick: Number of the first tick after the target came.
             planned: Time at which the target should be played according to the present estimates [ticks].
             interval: Estimated interval since the previous target was sent [ticks].
             period: Estimated period of the stream [ticks].

@@ -57,7 +57,7 @@ class JointCommand(NamedTuple):
 
         Args:
             quantity: `position`, `velocity` or `effort`.
-            reason: Why this quantity is needed, for the error message.
+            reason: Reason why the quantity is needed, for the error message.
 
         Raises:
             WrongQuantityError: If the command names joints, but has no values of the quantity.

@@ -80,7 +80,7 @@ class PosePath:
 
         Args:
             pose: The goal.
-            tick: Number of the tick before which the pose was received.
+            tick: Number of the first tick after the pose was received.
         """
         if self._taken_at is not None:
             self._intervals.append(min(tick - self._taken_at, LONGEST_GROWTH * self.period))

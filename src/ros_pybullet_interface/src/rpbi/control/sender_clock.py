@@ -1,4 +1,4 @@
-"""Estimates when streamed targets were sent: by their stamps if the stamps are plausible, else by their arrivals."""
+"""Estimates when streamed targets were sent: from stamps if these are plausible, otherwise from times of arrival."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Arrival(NamedTuple):
     """A received target.
 
     Attributes:
-        tick: Number of the tick before which the target came.
+        tick: Number of the first tick after the target came.
         stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
         goal: Target positions [rad or m], keyed by joint index.
         step: Number of periods since the previous target.

@@ -203,7 +203,7 @@ class BoundedMotion:
         do not count as a stream.
 
         Args:
-            tick: Number of the tick before which the target came.
+            tick: Number of the first tick after the target came.
         """
         longest = self._longest_stall if any(self._ways.values()) else self._longest_period
         if self._arrivals and tick - self._arrivals[-1] > longest:
@@ -248,7 +248,7 @@ class BoundedMotion:
         return max(latest, FADING * before) if is_off else latest or before
 
     def advance(self, planned: Mapping[int, float]) -> Mapping[int, float]:
-        """Advances the set points by one tick, and returns them.
+        """Advances the set points by one tick, and returns the new set points.
 
         Args:
             planned: Positions of the plan at the end of the tick [rad or m], keyed by joint index.

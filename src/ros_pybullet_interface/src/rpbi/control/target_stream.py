@@ -75,7 +75,7 @@ class TargetStream:
         """Adds a target.
 
         Args:
-            tick: Number of the tick before which the target came.
+            tick: Number of the first tick after the target came.
             goal: Target positions [rad or m], keyed by joint index.
             slopes: Velocities at the target positions [rad or m per tick], keyed by joint index; may be empty.
             stamp_ns: Time of sending by the sender's clock [ns]; 0 if unknown.
@@ -132,7 +132,7 @@ class TargetStream:
         return segments[-1]
 
     def advance(self, tick: float) -> Mapping[int, float]:
-        """Advances the set points to a time [ticks], and returns them [rad or m], keyed by joint index.
+        """Advances to a time [ticks], and returns the set points [rad or m], keyed by joint index.
 
         Set points are clipped to the joints' limits if targets have velocities or accelerations are bounded. Otherwise
         this is not needed, since set points lie between targets.

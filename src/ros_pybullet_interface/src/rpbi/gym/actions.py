@@ -33,7 +33,7 @@ class ActionPart(Protocol):
     size: int
 
     def reset(self) -> None:
-        """Takes the present state of the world, which was just reset, as the start of an episode."""
+        """Prepares an episode that starts from the present state of the world, which was just reset."""
 
     def apply(self, values: Values) -> None:
         """Applies the values of the part, in [-1, 1], shape (size,)."""

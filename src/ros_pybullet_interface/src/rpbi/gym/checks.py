@@ -57,7 +57,7 @@ class CheckedTask:
         return type(self.task).has_ended is not WorldTask.has_ended
 
     def after_tick(self) -> None:
-        """Lets the task evaluate the last tick."""
+        """Calls the task's `after_tick`."""
         self._call("after_tick", self.task.after_tick)
 
     def observation(self) -> Any:

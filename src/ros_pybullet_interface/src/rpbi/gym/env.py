@@ -217,9 +217,9 @@ class DelayLine:
 
         Args:
             action: New action, which is applied after its delay.
-            act: Applies an action to the world.
-            step: Advances the world by one tick.
-            observe: Returns the present observation.
+            act: Function that applies an action to the world.
+            step: Function that advances the world by one tick.
+            observe: Function that returns the present observation.
         """
         if not self._has_delay:
             act(action)

@@ -262,7 +262,7 @@ class _Process:
 
 
 def request(name: str, *arguments: Any) -> bytes:
-    """Serializes a request to a worker. Requests for steps contain only arrays, for which `pickle` is faster."""
+    """Serializes a request to a worker: for steps with `pickle`, which is faster, otherwise with `cloudpickle`."""
     dumps = pickle.dumps if name == "step" else cloudpickle.dumps
     return dumps((name, arguments), pickle.HIGHEST_PROTOCOL)
 

@@ -80,7 +80,7 @@ class _Managed:
         self.configure(config)
 
     def configure(self, config: ControllerConfig) -> None:
-        """Creates the controller anew from a configuration. An active controller starts again at the next tick."""
+        """Replaces the controller by a new one with `config`; if it was active, the new one starts at the next tick."""
         self.controller = CONTROLLERS.find(config.type)(self.robot, config)
         self.config = config
         self.has_begun = False

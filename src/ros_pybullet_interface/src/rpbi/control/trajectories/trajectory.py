@@ -99,7 +99,7 @@ class Trajectory:
     def sample(self, time_s: float) -> DesiredState:
         """Returns the desired state of the joints at a time [s].
 
-        Before the start, this is rest at the first knot. From the end on, it is rest exactly at the last knot.
+        Before the start, the joints rest at the first knot. From the end on, they rest exactly at the last knot.
         """
         if time_s >= self.end_s:
             return self._end

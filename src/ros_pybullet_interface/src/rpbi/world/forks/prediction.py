@@ -18,7 +18,7 @@ class PlannedInput(NamedTuple):
 
     Attributes:
         tick: Number of ticks after the start of the prediction; 0 means before the first step.
-        slot: The input, such as `kuka_lwr/target`, see `World.put`.
+        slot: Name of the input, such as `kuka_lwr/target`, see `World.put`.
         value: Value for the input.
     """
 
