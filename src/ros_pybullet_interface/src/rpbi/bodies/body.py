@@ -120,8 +120,8 @@ class Body:
         """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index.
 
         For a body in maximal coordinates, PyBullet returns the inertial frame, restitution, stiffness and damping of
-        another body. This method replaces the inertial frame by the body's frame, and the other values by configured
-        values.
+        another body. This method replaces the inertial frame by the identity pose, and the other values by the values
+        that were configured or set by `change_dynamics`.
         """
         info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
         if info[10] != MAXIMAL_COORDINATES:
@@ -148,9 +148,9 @@ class Body:
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
     ) -> None:
-        """If the base is fixed, makes it follow the TF frame; otherwise sets the start velocity of the base.
+        """Makes a fixed base follow the TF frame, if one is given; sets the start velocity of a base that is not fixed.
 
-        Logs a warning if one of the given keys has no effect.
+        Logs a warning if a velocity is given for a fixed base, or a TF frame for a base that is not fixed.
         """
         if is_fixed:
             self._follow(object_tf)
@@ -165,8 +165,8 @@ class Body:
     def _follow(self, object_tf: ObjectTf | None) -> None:
         """Makes a fixed base follow the poses of a TF frame, if a frame is given.
 
-        PyBullet ignores the velocity of a body in maximal coordinates. Such a body therefore has no `pose_follower`,
-        but is set to each pose, and does not carry other bodies.
+        PyBullet ignores the velocity of a body in maximal coordinates. Such a body therefore has no `pose_follower`:
+        `_jump` moves the body to each pose, and other bodies on top of the body do not move along.
         """
         self.object_tf = object_tf
         if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
@@ -220,7 +220,7 @@ class Body:
         """
 
     def detach(self, name: str | None = None) -> None:
-        """Detaches this body from another body, for instance before the removal of the other; does nothing by default.
+        """Detaches this body from another body, for instance before that body is removed; does nothing by default.
 
         Args:
             name: Name of the other body; None to remove all attachments.
@@ -258,7 +258,7 @@ class Body:
         return self.inertial_pose_in_base if index < 0 else Pose(*self.pb.getLinkState(self.body_id, index)[2:4])
 
     def link_pose(self, index: int) -> Pose:
-        """Returns the pose of a link's URDF frame in the world.
+        """Returns the pose of a link's URDF frame in the world frame.
 
         Args:
             index: PyBullet's index of the link, -1 for the base.
@@ -271,15 +271,15 @@ class Body:
         return self._base
 
     def base_pose(self) -> Pose:
-        """Returns the pose of the base link's URDF frame in the world."""
+        """Returns the pose of the base link's URDF frame in the world frame."""
         return self.link_pose(-1)
 
     def set_base_pose(self, pose: Pose) -> None:
-        """Sets the pose of the base link's URDF frame in the world."""
+        """Sets the pose of the base link's URDF frame in the world frame."""
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
 
     def _jump(self, pose: Pose) -> None:
-        """Sets the base to a pose of the TF frame, without a velocity; warns once if the body is in contact."""
+        """Moves the base to `pose` in one step, with zero velocity; logs a warning once if the body is in contact."""
         if self.has_physics and not self._has_jumped and self.pb.getContactPoints(self.body_id):
             self._has_jumped = True
             log.warning(
@@ -290,20 +290,20 @@ class Body:
         self.set_base_pose(pose)
 
     def base_twist(self) -> Twist:
-        """Returns the twist of the base link's URDF frame in the world."""
+        """Returns the twist of the base link's URDF frame, in the axes of the world frame."""
         linear, angular = self.pb.getBaseVelocity(self.body_id)  # of the centre of mass
         centre = self.pb.getBasePositionAndOrientation(self.body_id)[0]
         return Twist(plus(linear, cross(angular, minus(self.base_pose().position, centre))), angular)
 
     def teleport(self, pose: Pose) -> None:
-        """Puts the base link's URDF frame at a pose in the world, at rest."""
+        """Moves the base link's URDF frame to a pose in the world frame, and sets the base's velocity to zero."""
         self.set_base_pose(pose)
         self.pb.resetBaseVelocity(self.body_id, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         if self.pose_follower is not None:
             self.pose_follower.put(pose)
 
     def state(self) -> BodyState:
-        """Returns the pose of the base's inertial frame in the world, and the joint positions."""
+        """Returns the pose of the base's inertial frame in the world frame, and the joint positions."""
         position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
         joints = self.pb.getJointStates(self.body_id, self.joint_indices) if self.joint_indices else ()
         positions = [joint[0] for joint in joints]

@@ -50,7 +50,7 @@ def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dic
     Args:
         data: Content of the object's YAML file.
         file: Name of the YAML file.
-        context: Context of the keys, as for `load_object`.
+        context: Settings for resolving file names, as for `load_object`.
     """
     parts = {}
     for key, model in _PARTS.items():

@@ -80,6 +80,7 @@ class ShapeObject(Body):
     def restart(self) -> bool:
         """Returns True, since PyBullet has restored the body's whole state.
 
-        Returns False for a body that physics moves while its TF frame is out of date; the caller creates it anew.
+        Returns False for a body that physics moves while its TF frame is out of date; the caller creates that body
+        anew.
         """
         return not isinstance(self.pose_follower, TrackedBase)

@@ -70,7 +70,7 @@ def body_shapes(body: Body) -> list[BodyShape]:
 
 
 def link_pose(body: Body, link_index: int) -> Pose:
-    """Returns the pose of a link's URDF frame in the world; only the simulation thread may call this function.
+    """Returns the pose of a link's URDF frame in the world frame; only the simulation thread may call this function.
 
     Args:
         link_index: PyBullet's index of the link, -1 for the root.

@@ -64,9 +64,9 @@ class Intrinsics:
 def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
     """Derives the camera matrix K from a projection matrix P.
 
-    A point (x, y, z) in the optical frame is (x, -y, -z) in the eye frame. Dividing its clip coordinates by w = z gives
-    (P00 x / z - P02, -P11 y / z - P12). Both coordinates range from -1 to 1 between the outer edges of the image; the
-    second one points up.
+    A point (x, y, z) in the optical frame is (x, -y, -z) in the eye frame. Dividing the point's clip coordinates by
+    w = z gives (P00 x / z - P02, -P11 y / z - P12). Both results range from -1 to 1 between the outer edges of the
+    image; the second result increases upwards.
 
     Args:
         projection: 4x4 matrix from the eye frame to clip space; only P00, P11, P02 and P12 are used.
@@ -84,16 +84,16 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
 
 
 def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
-    """Returns the pose in the world of an optical frame that looks at a target, with a level horizon.
+    """Returns the optical frame's pose, in the world frame, for a camera that looks at a target with a level horizon.
 
     If the camera looks straight up or down, the world's x axis points to the right in the image.
 
     Args:
-        position: Position of the camera in the world, x, y, z [m].
-        target: Point in the world at the centre of the image, x, y, z [m].
+        position: Position of the camera in the world frame, x, y, z [m].
+        target: Point at the centre of the image, x, y, z in the world frame [m].
 
     Raises:
-        ValueError: If position and target are the same, or one of them is not three finite numbers.
+        ValueError: If position and target are the same, or one of them does not consist of three finite numbers.
     """
     eye = finite_vector(position, 3, "position")
     forward = finite_vector(target, 3, "target") - eye
@@ -110,10 +110,10 @@ def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
 
 
 def view_matrix(camera: geometry.Pose) -> Array:
-    """Returns the 4x4 OpenGL view matrix, from the world to the eye frame.
+    """Returns the 4x4 OpenGL view matrix, from the world frame to the eye frame.
 
     Args:
-        camera: Pose of the optical frame in the world.
+        camera: Pose of the optical frame in the world frame.
     """
     rotation = np.reshape(pybullet.getMatrixFromQuaternion(camera.quat_xyzw), (3, 3))
     optical_from_world = np.eye(4)
@@ -176,7 +176,7 @@ class DepthNoise(NamedTuple):
 
 
 class PointCloud:
-    """Converts the depth and colour images of one camera to points; each call overwrites the array of the last one."""
+    """Converts the images of one camera to points; each call of `of` overwrites the array that `of` returned before."""
 
     def __init__(self, intrinsics: Intrinsics) -> None:
         K = intrinsics.K

@@ -220,7 +220,7 @@ class RenderClient:
         self._send_log()
 
     def _watch(self, is_heard: bool) -> None:
-        """Logs a warning when the process has not sent messages for SILENT_AFTER_S, and when messages arrive again."""
+        """Logs when the process has been silent for SILENT_AFTER_S, and when messages arrive again (`is_heard`)."""
         now_s = time.monotonic()
         if is_heard:
             self._heard_s = now_s

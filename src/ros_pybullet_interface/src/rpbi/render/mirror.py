@@ -52,7 +52,7 @@ class SoftShapes:
         """Moves the nodes of soft bodies; the caller must set the poses of rigid bodies afterwards.
 
         Args:
-            nodes: Pairs of a soft body and the positions of all its simulated nodes in the world [m].
+            nodes: For each soft body, the body and the positions of all its simulated nodes in the world frame [m].
         """
         for body, places in nodes:
             self._pb.resetMeshData(body.body_id, places)
@@ -102,7 +102,7 @@ class Mirror:
         self._fine_shapes.close()
 
     def _as_drawn(self, entry: LogEntry) -> LogEntry:
-        """Returns a copy of an entry, with the mesh to draw in place of the body's visual shape; see `FineShapes`."""
+        """Returns an entry in which the mesh to draw replaces the visual shape of an added body; see `FineShapes`."""
         if entry.what != "add":
             return entry
         kind, config = entry.arguments
@@ -124,7 +124,7 @@ class Mirror:
                 self.pose(state)
 
     def frame(self, renderer: Renderer, scene: DrawnScene, camera: Camera, streams: Collection[str]) -> Frame:
-        """Sets the bodies to the states of a scene, draws the images of a camera, and returns them.
+        """Sets the bodies to the states of a scene, and returns the images that a camera sees.
 
         Args:
             renderer: Renderer of this world's client.

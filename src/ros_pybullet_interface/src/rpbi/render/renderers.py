@@ -113,7 +113,7 @@ class Renderer(Protocol):
 
         Args:
             intrinsics: Intrinsics of the camera.
-            camera: Pose of the camera's optical frame in the world.
+            camera: Pose of the camera's optical frame in the world frame.
             segmentation: Whether to draw body ids.
             transparent: All transparent shapes in the client.
         """
@@ -122,9 +122,9 @@ class Renderer(Protocol):
 class TinyRenderer:
     """PyBullet's software renderer.
 
-    PyBullet samples each pixel at its upper left corner instead of its centre, and in addition each row one pixel too
-    low. The image would therefore be shifted half a pixel to the right and half a pixel up from the image that K
-    describes. `draw` shifts the projection by the same amount in the opposite direction.
+    PyBullet samples each pixel at the pixel's upper left corner instead of the centre. In addition, PyBullet samples
+    each row one pixel too low. The image would therefore be shifted half a pixel to the right and half a pixel up from
+    the image that K describes. `draw` shifts the projection by the same amount in the opposite direction.
     """
 
     name = "TinyRenderer"

@@ -1,4 +1,4 @@
-"""Topic with the attachments between bodies, services that add and remove attachments, and one for wrenches."""
+"""Topic with all attachments between bodies, and services that add attachments, remove them or apply wrenches."""
 
 import math
 from typing import Any

@@ -23,14 +23,14 @@ An empty sequence means that the body does not have the topic or service."""
 
 
 class Answer(NamedTuple):
-    """Success and message, which most service handlers return; `serve` converts them to the service's response."""
+    """Result of most service handlers; `serve` copies both values to the response's fields of the same names."""
 
     success: bool
     message: str
 
 
 def of(body_type: type[Body]) -> Owners:
-    """Returns an `Owners` function for a topic or service that every body of a type has, under the body's name."""
+    """Returns a function that maps a body of the type to a tuple with its name, and other bodies to an empty tuple."""
     return lambda body: (body.name,) if isinstance(body, body_type) else ()
 
 
@@ -66,10 +66,10 @@ class Service(NamedTuple):
     Attributes:
         name: Name of the service, with `{name}` in place of the name of the body, sensor or controller.
         service_type: ROS type of the service.
-        handler: Takes a context and a request, and returns an Answer, the response, or the response's fields. To refuse
-            the request, the handler raises an InterfaceError or ValueError. The client gets `success=False` and the
-            error's message; if the response has no field `success`, the call fails. None if other code opens the
-            service.
+        handler: Takes the context that `serve` was given and a request. Returns an Answer, the response, or the
+            response's fields. To refuse the request, the handler raises an InterfaceError or ValueError. The client
+            then gets `success=False` and the error's message; if the response has no field `success`, the call fails.
+            None if other code opens the service.
         owners: Returns the names under which a body has the service, see `Owners`.
     """
 
@@ -91,7 +91,7 @@ _warn = ThrottledWarning()
 
 
 def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
-    """Subscribes to a topic and calls its handler with the context and each message.
+    """Subscribes to a topic; calls the topic's handler with `context` and the message, for each message.
 
     Refused messages are logged at a limited rate. The owner's name replaces `{name}` in the topic's name.
     """
@@ -110,7 +110,10 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
 
 
 def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
-    """Opens a service whose handler gets the context; the owner's name replaces `{name}` in the service's name."""
+    """Opens a service, whose handler is called with `context` and each request.
+
+    The owner's name replaces `{name}` in the service's name.
+    """
     response_type, handler = service.service_type._response_class, service.handler
     assert handler is not None  # rows of services to open have one
 
@@ -132,7 +135,7 @@ def find_topic(name: str, owner: Any) -> Topic:
 
     Args:
         name: Module and variable of the Topic, as `module:NAME`.
-        owner: Sensor or function of an input whose `ros_topic` is `name`; only used in the error message.
+        owner: Sensor, or function that applies an input, whose `ros_topic` is `name`; only used in the error message.
 
     Raises:
         ConfigError: If the module has no such Topic; the error names the owner.

@@ -33,7 +33,7 @@ def use_own_frames(frames: Container[str]) -> None:
 
 
 def named_frame(frame: str) -> str:
-    """Returns a frame's name from a YAML file, with the prefix in front if the frame belongs to this node's world."""
+    """Returns a name that a YAML file gives a frame, with the prefix if the frame belongs to this node's world."""
     return prefixed(frame) if frame in _own_frames else frame
 
 

@@ -27,7 +27,7 @@ from .tf_follower import TfFollower, refusal
 
 
 def _joint_target(message: JointState) -> JointCommand:
-    """Converts a message to a command with all its quantities; the robot's control mode selects those that are used."""
+    """Converts a message to a command; the robot's control mode selects which of the command's values are used."""
     return JointCommand(
         message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec()
     )

@@ -116,7 +116,7 @@ def _tables(owners: Mapping[Endpoint, list[str]], definitions: Mapping[str, str]
     """Yields a heading and a table for each kind of endpoint; kinds without endpoints are left out.
 
     Args:
-        owners: Types of bodies that have an endpoint, indexed by endpoint; `[""]` if it does not belong to a body.
+        owners: Types of bodies that have an endpoint, indexed by endpoint. For an endpoint without a body, `[""]`.
         definitions: Definitions of this workspace's message and service types, indexed by name.
     """
     for kind, heading in HEADINGS.items():

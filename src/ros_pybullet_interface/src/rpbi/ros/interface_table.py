@@ -84,7 +84,8 @@ class Endpoint(NamedTuple):
         kind: Action of the node: `publishes`, `subscribes`, `serves` or `listens to TF`.
         name: Relative ROS name, or name of the TF frame.
         type: ROS type; empty for a TF frame.
-        note: Rate in this world, name of the body, both, or that the endpoint belongs to PyBullet's window.
+        note: Remark: the rate in this world, the name of the body, or both; `action` for an action; `OF_WINDOW` for
+            an endpoint of PyBullet's window. May be empty.
         meaning: Purpose, in a sentence.
     """
 

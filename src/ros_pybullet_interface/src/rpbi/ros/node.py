@@ -87,7 +87,7 @@ def _wants_real_time_priority() -> bool:
 
 
 def parameter_above(name: str) -> Any:
-    """Returns a ROS parameter from the node's or the nearest enclosing namespace; None if the parameter is not set."""
+    """Returns a ROS parameter from the nearest namespace around the node that has the parameter, or else None."""
     found = rospy.search_param(name)
     if found is None:
         return None

@@ -85,7 +85,7 @@ class BodyContext(NamedTuple):
 
     @property
     def body(self) -> Any:
-        """The body that `name` refers to; a reset may replace the body by a new object.
+        """The `Body` object that has this name at present; a reset may replace this object by another.
 
         Only the simulation thread may read the body's PyBullet state.
 
@@ -105,12 +105,13 @@ class BodyContext(NamedTuple):
 
         Args:
             call: The function, without arguments.
-            body: The body that the function uses; by default the body that has this name when `ask_body` is called.
+            body: The `Body` object that the function uses. By default, the value of `self.body` at the start of
+                `ask_body`.
 
         Raises:
-            UnknownNameError: If the body was removed before the call.
-            InterfaceError: If a reset has replaced the body before the call, or the simulation has ended or makes no
-                progress.
+            UnknownNameError: If the body was removed before `call` could run.
+            InterfaceError: If a reset replaced the `Body` object before `call` could run, or the simulation has ended
+                or makes no progress.
         """
         asked = self.body if body is None else body
 
@@ -122,5 +123,5 @@ class BodyContext(NamedTuple):
         return self.ask(checked)
 
     def act(self, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
-        """Makes the simulation thread apply an action to the body and record it for replays; see `World.act`."""
+        """Makes the simulation thread call `World.act`, which applies an action to the body and records the action."""
         return self.ask_body(lambda: self.world.act(self.name, what, value, do))

@@ -145,7 +145,7 @@ class Simulation:
         return True
 
     def stop(self) -> bool:
-        """Stops the world, or aborts a request for ticks or a restoration.
+        """Stops a running world, aborts the ticks of a request, or aborts a restoration.
 
         All samples of the last tick are published. An aborted restoration resets the world.
 
@@ -209,13 +209,13 @@ class Simulation:
         return request.done
 
     def reset(self, refill: Callable[[], None] = lambda: None) -> None:
-        """Resets the world to its initial state; the world stays running or stopped, and stamps continue.
+        """Resets the world to its initial state. Stamps continue, and a running world continues to run.
 
         Args:
-            refill: Sends inputs to the world after the reset; by default none are sent.
+            refill: Function, called after the reset, that sends inputs to the world; the default does nothing.
 
         Raises:
-            InterfaceError: If an object can no longer be loaded. The world is stopped then.
+            InterfaceError: If an object can no longer be loaded; the world is then stopped.
         """
         self._interrupt_request()
         try:
@@ -264,7 +264,7 @@ class Simulation:
             restore.end(error)
 
     def _start_again(self) -> None:
-        """Applies waiting inputs to the world, and publishes its state after a reset or restoration."""
+        """After a reset or restoration, applies waiting inputs to the world and publishes the world's state."""
         self._failure = None
         self.world.apply_inputs()
         self._pacer.restart()
@@ -336,7 +336,7 @@ class Simulation:
         """Advances by ticks that do not publish anything, and returns their number.
 
         Args:
-            ticks: Largest number of ticks.
+            ticks: Maximum number of ticks.
             end_s: Latest end, as a time of the monotonic clock [s].
         """
         return self.world.run_idle(min(ticks, self._state.ticks_to_hash - 1), end_s)

@@ -52,7 +52,7 @@ class StateTopic(rospy.SubscribeListener):
         self._publisher.publish(message)
 
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Calls `last_message`, and sends the returned message to subscribers that have connected since `publish`."""
+        """Calls `last_message`, and sends the result to subscribers that have connected since the last `publish`."""
         while self._late:
             self._late.popleft()(last_message())
 
@@ -62,9 +62,9 @@ class StateTopic(rospy.SubscribeListener):
 
 
 class FastTopic(StateTopic):
-    """A topic of small messages, which `publish` buffers and `flush_buffered_sockets` sends in its caller's thread.
+    """A topic for small messages: `publish` buffers messages, and `flush_buffered_sockets` sends them.
 
-    Neither call waits for a slow subscriber.
+    `flush_buffered_sockets` sends in the calling thread. Neither function waits for a slow subscriber.
     """
 
     def __init__(self, topic: str, message_type: type) -> None:

@@ -47,7 +47,7 @@ class WatchedTf:
         self._listener = TfListener(self._buffer, self._note)
 
     def pose(self, parent: str, child: str) -> tuple[Pose, int] | None:
-        """Returns the newest pose of the child frame in the parent frame, and its stamp [ns]; None if TF has no pose.
+        """Returns the newest pose of frame `child` in frame `parent`, and its stamp [ns]; None if TF has no such pose.
 
         The stamp is 0 if all transforms between the two frames are static.
         """
@@ -105,12 +105,12 @@ class FollowedFrame:
     def due_s(self, came_s: float) -> float:
         """Returns the time of the next look-up on the monotonic clock [s].
 
-        If no transform has arrived since the last look-up, the next look-up is one period after the last. If a
-        transform has arrived less than LOOK_FROM periods after the stamp last changed, the next look-up waits for
-        another transform, until LOOK_UNTIL periods after the last look-up. Otherwise, it is due at the arrival.
+        If no transform has arrived since the last look-up, the next look-up is due one period after the last look-up.
+        If a transform has arrived less than LOOK_FROM periods after the stamp last changed, the next look-up is due
+        LOOK_UNTIL periods after the last look-up. A transform that arrives later makes a look-up due at once.
 
         Args:
-            came_s: Time of the last arrival on the monotonic clock [s].
+            came_s: Time of the last transform's arrival on the monotonic clock [s].
         """
         if came_s <= self.looked_s:
             return self.looked_s + self.period_s
@@ -120,7 +120,7 @@ class FollowedFrame:
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
         """Stores the stamp of the frame's newest pose [ns], and returns whether the stamp has changed.
 
-        `now_s` is the present time of the monotonic clock, `time_s` that of the world [s].
+        `now_s` is the present time of the monotonic clock [s], `time_s` the present time of the world [s].
         """
         self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
         if stamp_ns == self.last_stamp_ns:
@@ -208,7 +208,7 @@ class TfFollower:
                     self._warn(followed.slot, f"TF refused: {reason}")
 
     def _report_stale(self, followed: FollowedFrame, stamp_ns: int, now_s: float) -> None:
-        """Logs a warning when a frame becomes stale, and an info when its transforms arrive again.
+        """Logs a warning when a frame becomes stale, and an info message when the frame's transforms arrive again.
 
         Static frames are never stale.
         """

@@ -135,7 +135,7 @@ class VisualizerImage:
         self._numbers = rospy.Publisher(NUMBERS.name, Int64MultiArray, queue_size=2)
 
     def poll(self) -> None:
-        """Draws and publishes an image, if one is due and has subscribers."""
+        """Draws and publishes an image, if an image is due and a topic has subscribers."""
         if not self._rate.is_due():
             return
         start_s = time.monotonic()
@@ -174,7 +174,7 @@ class _Numbers(Int64MultiArray):
 
 
 class DebugCamera:
-    """Publishes and sets the window's camera.
+    """Publishes and sets the camera (the view) of PyBullet's window.
 
     Args:
         window: The window; without a window (None), the camera is neither published nor set.
@@ -187,20 +187,20 @@ class DebugCamera:
         self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
     def poll(self) -> None:
-        """Publishes the camera, if a message is due and has subscribers."""
+        """Publishes the window's camera, if a message is due and the topic has subscribers."""
         if self._window is None or self._publisher is None or not self._rate.is_due():
             return
         if self._publisher.get_num_connections():
             self._publisher.publish(_camera_message(self._window.camera()))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service that returns the camera and the topic that sets it."""
+        """Opens the service that returns the window's camera, and the topic that sets the window's camera."""
         self._ask = ask
         serve(GET, self)
         subscribe(RESET, self)
 
     def get(self, _: Any) -> CameraMessage:
-        """Returns the camera of the window; without a window, the configured one."""
+        """Returns the window's camera; without a window, the configured camera."""
         window = self._window
         return _camera_message(self._configured if window is None else self._ask(window.camera))
 
@@ -236,7 +236,7 @@ RESET = Topic(
 
 
 class WindowTopics:
-    """Opens the configured topics of the window; without a window, warns of configuration keys without effect."""
+    """Opens the configured topics of the window; without a window, logs which configured topics have no effect."""
 
     def __init__(self, world: World) -> None:
         self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)
@@ -248,7 +248,7 @@ class WindowTopics:
             self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service and the topic of the window's camera, whose requests go to the simulation thread."""
+        """Opens the service and the topic of the window's camera; `ask` makes the simulation thread handle requests."""
         self._camera.serve(ask)
 
 

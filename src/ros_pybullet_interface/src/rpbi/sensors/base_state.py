@@ -25,7 +25,7 @@ class BaseStateSensor(Sensor):
         self._frame = frame or f"rpbi/{body.name}/{body.root_link}"
 
     def read(self, tick: int) -> BaseStateSample:
-        """Reads the URDF frame's pose in the world, and the frame's twist in its own axes."""
+        """Reads the URDF frame's pose in the world frame, and the URDF frame's twist in its own axes."""
         pose = self._body.base_pose()
         twist = self._body.base_twist()
         if not math.isfinite(sum(pose.position) + sum(twist.linear) + sum(twist.angular)):

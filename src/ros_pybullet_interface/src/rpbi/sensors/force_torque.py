@@ -86,19 +86,22 @@ class ForceTorqueSensor(Sensor):
         return self._sample
 
     def _loads(self) -> Iterator[LinkWrench]:
-        """Yields the wrenches by attachments, and the external wrenches, on links below the joint in the last tick."""
+        """Yields the wrenches that acted in the last tick on links below the joint.
+
+        These are the wrenches that attachments exerted, and the external wrenches.
+        """
         for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
             if load.link in self._subtree.links:
                 yield load
 
     def zero(self, count: int) -> Zeroing:
-        """Starts zeroing the sensor to the mean of the next `count` samples, unless a zeroing is already running."""
+        """Starts and returns a `Zeroing` over the next `count` samples; if one is already running, returns that one."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing
 
     def cancel_zeroing(self) -> None:
-        """Cancels a running zeroing; the old zero stays."""
+        """Cancels a running zeroing; the sensor keeps its old zero."""
         self._zeroing = None
 
     def _measure(self, before: LinkStates, tick: int) -> WrenchSample:

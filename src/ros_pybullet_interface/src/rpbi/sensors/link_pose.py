@@ -22,7 +22,7 @@ def index_of_link(body: SensedBody, link: str | None) -> int | None:
 
 
 class LinkPoseSensor(Sensor):
-    """Measures the poses of the URDF frames of a body's links in the world.
+    """Measures the poses of a body's links (their URDF frames) in the world frame.
 
     Args:
         links: Whether to report all links, with TF frames `rpbi/NAME/LINK`; if not, only the root link is reported.

@@ -1,4 +1,4 @@
-"""RGB-D cameras in the world, whose samples are scenes from which the renderer process draws images."""
+"""Simulated RGB-D cameras. Their samples are scenes, from which the renderer process draws images."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ class RgbdSensor(Sensor):
 
     Attributes:
         topic_name: Name of the camera in topics.
-        pose: Pose of the camera's optical frame in the world; None while it is unknown.
+        pose: Pose of the camera's optical frame in the world frame; None while the pose is unknown.
     """
 
     Config = RgbdSensorConfig
@@ -38,7 +38,7 @@ class RgbdSensor(Sensor):
         self._clock = clock
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns the only input `pose`, which sets the pose of the camera's optical frame in the world."""
+        """Returns the only input `pose`, which sets the pose of the camera's optical frame in the world frame."""
         return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
 
     def read(self, tick: int) -> SceneSample | None:

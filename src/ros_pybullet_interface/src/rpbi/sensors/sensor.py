@@ -40,10 +40,10 @@ class SensedBody(Protocol):
         """Returns the result of PyBullet's `getDynamicsInfo` for the link with a given index."""
 
     def base_pose(self) -> Pose:
-        """Returns the pose of the root link's URDF frame in the world."""
+        """Returns the pose of the root link's URDF frame in the world frame."""
 
     def base_twist(self) -> Twist:
-        """Returns the twist of the root link in the world."""
+        """Returns the twist of the root link's URDF frame, in the axes of the world frame."""
 
     def state(self) -> BodyState:
         """Returns the pose and joint positions that the renderer process needs; for soft bodies, also the nodes."""

@@ -122,7 +122,9 @@ class JointedBody(Body):
         return reported
 
     def set_joint_state(self, target: JointCommand) -> None:
-        """Sets positions [rad or m] and velocities [rad/s or m/s] of joints at once; missing velocities are set to 0.
+        """Sets positions [rad or m] and velocities [rad/s or m/s] of joints at once.
+
+        If the target has no velocities, the velocities are set to 0.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.

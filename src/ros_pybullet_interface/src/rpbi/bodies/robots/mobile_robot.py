@@ -50,17 +50,17 @@ class MobileRobot(Robot):
         self.planar_base.before_step(tick)
 
     def base_pose(self) -> Pose:
-        """Returns the pose of the root link's URDF frame in the world."""
+        """Returns the pose of the root link's URDF frame in the world frame."""
         return super().base_pose() @ self.planar_base.pose_in_plane()
 
     def base_twist(self) -> Twist:
-        """Returns the twist of the root link's URDF frame in the world."""
+        """Returns the twist of the root link's URDF frame, in the axes of the world frame."""
         plane = super().base_pose().quat_xyzw
         x, y, yaw = self.planar_base.velocity_in_plane()
         return Twist(rotated(plane, (x, y, 0.0)), rotated(plane, (0.0, 0.0, yaw)))
 
     def set_base_pose(self, pose: Pose) -> None:
-        """Puts the root link's URDF frame at a pose in the world, at rest.
+        """Moves the root link's URDF frame to a pose in the world frame, and stops the base's motion.
 
         From then on, the base drives in the x-y plane of that pose.
         """

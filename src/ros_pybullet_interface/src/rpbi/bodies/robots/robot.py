@@ -188,8 +188,8 @@ class Robot(JointedBody):
         """Makes the motors hold the start position again, after a reset.
 
         Returns:
-            False, without a change, if the robot has controllers, a trajectory follower or force-torque sensors. The
-            caller then creates the robot anew.
+            True after success. False, without a change, if the robot has controllers, a trajectory follower or
+            force-torque sensors; the caller then creates the robot anew.
         """
         if self.controllers.names or self.follower is not None or self.force_torque_sensors:
             return False
@@ -213,7 +213,7 @@ class Robot(JointedBody):
             self.motors.disable(self.controllers.driven)
 
     def set_joint_state(self, target: JointCommand) -> None:
-        """Sets joint positions at once, makes the motors hold them, and ends the running motion."""
+        """Sets joint states at once, makes the motors hold the new positions, and ends the running motion."""
         super().set_joint_state(target)
         self.halt("its joints were set to other positions")
         positions = self.model.resolve(target.names, target.position)
@@ -222,7 +222,7 @@ class Robot(JointedBody):
         self.motors.disable(self.controllers.driven & positions.keys())
 
     def teleport(self, pose: Pose) -> None:
-        """Puts the base link's URDF frame at a pose in the world, at rest, and ends the running motion."""
+        """Moves the base link's URDF frame to a pose in the world frame with zero velocity; ends the running motion."""
         self.halt("the robot was moved to another pose")
         super().teleport(pose)
 
@@ -230,7 +230,7 @@ class Robot(JointedBody):
         """Returns the motor efforts [N m or N] of all joints.
 
         Args:
-            reported: Efforts that PyBullet reports for all joints, without efforts that this class has applied itself.
+            reported: Efforts that PyBullet reports for all joints. They lack efforts that this class has applied.
         """
         applied = self.motors.applied_efforts
         if not applied:

@@ -51,7 +51,7 @@ class ImagePublisher:
         self._cameras.pop(name).close()
 
     def demands(self) -> Mapping[str, Demand]:
-        """Returns the streams that have subscribers, indexed by camera name.
+        """Returns the demand for each camera's images, indexed by camera name.
 
         Raises:
             SystemExit: If the node was shut down from outside, for instance by `rosnode kill`.

@@ -46,7 +46,7 @@ class ScenePublisher:
         )
 
     def poll(self) -> None:
-        """Updates the cameras and exchanges messages with the renderer process.
+        """Takes over added and removed cameras from the world, and exchanges messages with the renderer process.
 
         Call this method in every pass of the simulation loop.
         """
@@ -59,8 +59,8 @@ class ScenePublisher:
     def before_tick(self) -> None:
         """Waits until all synchronous cameras are ready for the next tick.
 
-        A camera is ready if the renderer has reported that it has no subscribers, or that it has subscribers and its
-        pose is known.
+        A camera is ready if the renderer has reported whether the camera's topics have subscribers. If they have
+        subscribers, the camera's pose must also be known.
 
         Raises:
             PhysicsError: If a camera is not ready after LONGEST_WAIT_S.
@@ -82,7 +82,7 @@ class ScenePublisher:
             self._awaited.append(sample)
 
     def flush(self) -> None:
-        """Waits until the renderer process has published the images of the scenes of synchronous cameras.
+        """Waits until the renderer process has published the images of all synchronous cameras' scenes.
 
         Raises:
             PhysicsError: If an image is not published in time, or the renderer has ended.
@@ -99,7 +99,7 @@ class ScenePublisher:
             )
 
     def serve_late(self) -> None:
-        """Sends the last images to new subscribers."""
+        """Makes the renderer process send the last images to new subscribers."""
         self._renderer.serve_late()
 
     def restart(self) -> None:
@@ -115,7 +115,7 @@ class ScenePublisher:
         return {"camera_renderer": self._renderer.renderer or "starting"} if self._sensors else {}
 
     def fault(self) -> str:
-        """Returns why the renderer does not answer; an empty text if it answers."""
+        """Returns why the renderer process does not answer; an empty text if the process answers."""
         return self._renderer.fault
 
     def close(self) -> None:

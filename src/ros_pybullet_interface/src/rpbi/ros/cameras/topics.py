@@ -57,10 +57,10 @@ CLOUD_TOPIC = (
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
-    """Returns a camera's streams and topics, indexed by ROS name.
+    """Returns a pair of stream and topic for each topic of a camera, indexed by the topic's ROS name.
 
     Args:
-        topic_name: Name of the camera in the ROS names.
+        topic_name: Name of the camera within the names of topics.
         pointcloud: Whether the camera has a point cloud topic.
     """
     rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS

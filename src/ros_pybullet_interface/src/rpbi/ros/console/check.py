@@ -21,7 +21,7 @@ from rpbi.world.world_warnings import world_warnings
 def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
     """Reports all problems of a world, or lists the topics and services of a valid world; needs no ROS master.
 
-    The exit code is 1 if there are problems. `{package}/PATH` is resolved.
+    The exit code is 1 if there are problems. The path may begin with the name of a ROS package, as `{package}/PATH`.
     """
     warnings = _Warnings()
     logging.getLogger().addHandler(warnings)

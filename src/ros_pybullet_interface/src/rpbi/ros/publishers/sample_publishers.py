@@ -155,7 +155,7 @@ class TickPublisher:
     """Publishes the time of a tick on /clock, then the samples of the tick.
 
     Args:
-        idle_ticks: Number of ticks that fit between two calls of `publish_idle`, at the pace of a running world.
+        idle_ticks: Number of ticks whose total length is the period between two calls of `publish_idle`.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
@@ -186,7 +186,7 @@ class TickPublisher:
         """Publishes the last tick before a stop: the time and the samples of all sensors, due or not.
 
         Args:
-            samples: The samples that were due; the other sensors are read here.
+            samples: Samples of the sensors that were due; this method reads the other sensors.
         """
         self.publish_last_time()
         self._publishers.publish(samples + self._world.read_rest(), self._world.clock.stamp_ns)
@@ -203,10 +203,11 @@ class TickPublisher:
             self._clock.repeat()
 
     def publish_idle(self) -> None:
-        """Publishes the samples of a stopped world, without publishing a stamp twice.
+        """Publishes the samples of a stopped world, without sending a subscriber two samples with the same stamp.
 
-        In simulated time, sensors that were not read at this tick are read and published, and new subscribers get the
-        last samples. In wall time, sensors are published at their rates with new stamps.
+        If stamps are simulated time, this method reads and publishes sensors that were not read at this tick, and sends
+        the last samples to new subscribers. If stamps are wall time, sensors are published at their rates with new
+        stamps.
         """
         if self._clock is not None:
             self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)

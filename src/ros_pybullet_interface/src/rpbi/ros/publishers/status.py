@@ -54,7 +54,7 @@ takes 10 µs."""
 
 
 def _warn_of_rivals() -> None:
-    """Logs a warning if another node publishes /clock too, since ROS time would jump between the two times."""
+    """Logs a warning if another node publishes /clock too, since ROS time would jump between both nodes' times."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
     rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
@@ -133,7 +133,7 @@ class StatusPublisher:
         world: The world.
         pacer: Times the ticks of the world.
         facts: Returns further values for the diagnostics.
-        fault: Returns a fault outside of the world, for a warning in the diagnostics; an empty text without a fault.
+        fault: Returns why the camera renderer does not answer, for a warning in the diagnostics; otherwise empty.
         priority: Adapts the scheduling priority of the node's threads to the load; None if it is never changed.
     """
 
@@ -226,7 +226,8 @@ class StatusPublisher:
 class StatePublisher:
     """Publishes the state of the simulation on `rpbi/state`.
 
-    Messages without a hash of the state have a rate in wall time, messages with a hash a rate in the world's time.
+    Messages without a hash of the state are sent at a rate in wall time. Messages with a hash are sent at a rate in the
+    world's time.
     """
 
     def __init__(self, world: World, pacer: Pacer) -> None:

@@ -134,7 +134,7 @@ class WorldMarkers:
         self._check = None
 
     def _check_all(self) -> Iterator[None]:
-        """Builds the markers of all shapes, and yields after each; then publishes all markers if one has changed."""
+        """Builds the markers of all shapes, yielding after each shape; then publishes all markers if one changed."""
         self._markers, self._loose, self._shown = {}, [], {}
         for body in self._world.bodies.values():
             for number, shape in enumerate(body_shapes(body)):

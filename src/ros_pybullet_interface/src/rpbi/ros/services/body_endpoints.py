@@ -66,7 +66,7 @@ LONGEST_ZEROING_S = 60.0
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
-    """Puts the base link's URDF frame at a pose in the world, at rest, even if other bodies are in the way.
+    """Moves the base link's URDF frame to a pose in the world frame, even into other bodies, and stops the base.
 
     Raises:
         ValueError: If the pose is not finite, or the body follows a TF frame.
@@ -86,11 +86,11 @@ def force_torque_sensors(body: Body) -> list[str]:
 
 
 def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
-    """Zeroes a force-torque sensor to the mean of its next 100 samples.
+    """Sets the zero of a force-torque sensor to the mean of the sensor's next 100 samples.
 
     Raises:
         InterfaceError: If the simulation is stopped, the sensor is off, the robot is removed, or the samples take more
-            than a minute. The old zero stays then.
+            than a minute. The sensor then keeps its old zero.
     """
     body = context.body
     sensor = next(each for each in body.force_torque_sensors if each.name == context.owner)

@@ -207,7 +207,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
-    """Reads YAML text: the keys of an object, or the key `file` and keys that override the file's.
+    """Reads YAML text: the keys of an object, or the key `file` and keys that override keys in that file.
 
     Returns the same values as `_read_object`. `key` is the request's field that contains the text, for error messages.
     """
@@ -223,7 +223,7 @@ def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], 
 
 
 def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Adds a camera from YAML text: the keys of `rgbd_sensor`, or the key `file` and keys that override the file's."""
+    """Adds a camera from YAML text: the keys of `rgbd_sensor`, or `file` and keys that override keys in that file."""
     data, file, _ = _read_text(node, request.data, "data")
     config = RgbdSensorConfig.parse(data, file)
     node.objects.add_camera(config, file)
@@ -231,7 +231,7 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:
-    """Finds a YAML file and returns its path; refuses other types of files, so that services do not reveal them.
+    """Finds a YAML file and returns its path; refuses other files, so that clients cannot read them through services.
 
     `key` is the request's field that contains the file's name, for error messages.
     """

@@ -90,7 +90,7 @@ class ObjectLifecycle:
     def reset(self, to: WorldState | None = None) -> None:
         """Resets the world or restores a saved state, and waits until the reset or restoration is complete.
 
-        If a body exists both before and after, its topics and services stay open.
+        Topics and services of bodies that the reset or restoration keeps stay open.
 
         Args:
             to: The saved state to restore; None resets the world to its initial state.
@@ -122,7 +122,7 @@ class ObjectLifecycle:
                 raise error
 
     def end(self, timeout_s: float) -> None:
-        """Waits at most `timeout_s` [s] until the running operation ends; later operations wait forever."""
+        """Waits at most `timeout_s` [s] until the running operation ends; operations called later never start."""
         self._lock.acquire(timeout=timeout_s)
 
     def _prepare(self, kind: str, config: Any, file: str) -> None:

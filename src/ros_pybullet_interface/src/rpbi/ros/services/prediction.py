@@ -41,13 +41,13 @@ class Predictor:
     """Predicts motion from the present state of a running world.
 
     A second process, the shadow, repeats the simulation of the world up to the present tick and predicts from there.
-    The first prediction simulates all ticks since the last start, reset or keyframe. Later predictions simulate only
-    the ticks since the previous prediction.
+    The first prediction simulates all ticks since the world was built or reset, or since its last keyframe. Later
+    predictions simulate only the ticks since the previous prediction.
 
     Args:
         simulation: The loop that runs the world.
         ask: Makes the simulation thread call a function.
-        max_ticks: Largest number of ticks in a request, summed over all candidates.
+        max_ticks: Maximum number of ticks in a request, summed over all candidates.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, max_ticks: int = MAX_TICKS) -> None:

@@ -105,7 +105,7 @@ def set_motor_gains(context: BodyContext, request: SetMotorGainsRequest) -> Answ
 
 
 def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answer:
-    """Sets the named joints to positions at once, within their limits.
+    """Sets positions and velocities of the named joints at once; without velocities in the request, sets them to 0.
 
     Raises:
         UnknownNameError: If the robot lacks one of the joints.

@@ -28,7 +28,7 @@ _warn = ThrottledWarning()
 
 
 def moved_by_ik(body: Body) -> tuple[str, ...]:
-    """Returns the body's name if the body subscribes to `rpbi/NAME/ik`, otherwise an empty tuple."""
+    """Returns a tuple with the body's name if the body subscribes to `rpbi/NAME/ik`, otherwise an empty tuple."""
     return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
@@ -79,7 +79,7 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
 
 
 def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) -> tuple[bool, str]:
-    """Compares the present pose of a problem's link with the problem's target pose, both in the world.
+    """Compares the present pose of a problem's link with the problem's target pose, both in the world frame.
 
     Returns:
         Whether the errors are within the tolerances NEAR_M and NEAR_RAD, and a text with the errors.

@@ -15,7 +15,7 @@ from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
-    """Returns the body's name if the body has a trajectory follower, otherwise an empty tuple."""
+    """Returns a tuple with the body's name if the body has a trajectory follower, otherwise an empty tuple."""
     return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
 
 
@@ -51,7 +51,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Returns desired positions, velocities and accelerations of the trajectory follower's joints at a given time."""
+    """Returns the trajectory follower's desired joint positions, velocities and accelerations at the given time."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 

@@ -10,7 +10,7 @@ from .mean import MeanContactsSensor
 
 
 class ContactArrowsSensor(Sensor):
-    """Returns an arrow for each contact force on a body in the last tick.
+    """Reports the contact forces that acted on a body in the last tick, as arrows.
 
     Args:
         metres_per_newton: Length of the arrow for a force of 1 N [m/N].

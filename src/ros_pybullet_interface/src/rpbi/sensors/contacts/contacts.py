@@ -33,7 +33,7 @@ class ContactReader:
         self._touches = None
 
     def sample(self, body: SensedBody, tick: int) -> ContactsSample:
-        """Returns the contacts of a body in the last tick, including contacts between its own links.
+        """Returns the contacts of a body in the last tick, including contacts between the body's own links.
 
         Raises:
             PhysicsError: If a number in the contacts is no longer finite.

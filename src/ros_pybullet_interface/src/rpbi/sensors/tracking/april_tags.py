@@ -133,7 +133,7 @@ class AprilTagsSensor(BodySensor):
                 yield SeenTag(tag.id, tag.size, self._noise[tag.id].on(in_camera, tick))
 
     def _pose_of(self, tag: TagConfig) -> tuple[Pose, int] | None:
-        """Returns a tag's pose in the world and PyBullet's id of its body; None if the body or link does not exist."""
+        """Returns a tag's pose in the world frame and its body's PyBullet id; None if body or link do not exist."""
         body = self.body if tag.body is None else self._world.bodies.get(tag.body)
         if body is None:
             self._warn_once(str(tag.body), f"no body '{tag.body}' for tag {tag.id}; it is not seen")

@@ -92,7 +92,7 @@ class Delay(Generic[Measured]):
     """Buffers measurements until they have a given age.
 
     Args:
-        ticks: Smallest age of a returned measurement [ticks].
+        ticks: Minimum age of a returned measurement [ticks].
     """
 
     def __init__(self, ticks: int) -> None:

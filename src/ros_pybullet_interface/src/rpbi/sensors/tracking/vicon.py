@@ -22,7 +22,7 @@ class ViconConfig(TrackingSensorConfig):
 
 
 class ViconSensor(BodySensor):
-    """Measures the pose of a link in the world as a motion capture system does, without samples during occlusions.
+    """Measures a link's pose in the world frame as motion capture does, without samples during occlusions.
 
     Attributes:
         tf_frames: The name of the TF frame whose pose is reported, as a tuple of one element.
