@@ -197,7 +197,7 @@ class BagFile:
         return count
 
     def _unfold(self, chunk: Chunk) -> bytes:
-        """Returns the uncompressed data of a chunk; raises a ValueError if their size exceeds `chunk.size`."""
+        """Returns the uncompressed data of a chunk; raises a ValueError if the data are larger than `chunk.size`."""
         self._file.seek(chunk.start)
         data = self._read(chunk.compressed_size)
         if chunk.compression == "none":

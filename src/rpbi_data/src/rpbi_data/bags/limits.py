@@ -61,7 +61,7 @@ class LimitError(ValueError):
 
     @classmethod
     def over(cls, limit: str, got: str) -> LimitError:
-        """Returns an error about a limit with its unit, such as `1,000 bytes`, and the actual size."""
+        """Returns an error that states the limit with its unit, such as `1,000 bytes`, and the actual size."""
         return cls(f"expected at most {limit}, got {got}")
 
 

@@ -89,7 +89,7 @@ class MessageType:
 
 
 class _Builder:
-    """Builds the message types in a definition, each only once.
+    """Builds the message types of a definition. Each type is built only once.
 
     Args:
         declared: Name, type name and length of each field, indexed by the name of the message type.

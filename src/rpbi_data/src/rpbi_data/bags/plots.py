@@ -103,7 +103,7 @@ def _by_last_name(table: pd.DataFrame) -> Lines:
 
 
 def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
-    """Returns the columns `PREFIX/x` to `PREFIX/z` for the first prefix in the table; empty if there is none."""
+    """Returns columns `PREFIX/x` to `PREFIX/z` for the first prefix that the table has; empty if it has none of them."""
     for prefix in prefixes:
         if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
             return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}

@@ -55,7 +55,7 @@ class Recorder:
         topics: Topics to record; relative names are resolved in the namespace of this process.
         timeout_s: Longest time to wait for the subscriptions, and for the bag to be closed [s].
         min_space_mb: Free disk space below which the recording ends [MB].
-        handles: File handles that the recording process inherits, such as the handle of a lock.
+        handles: File descriptors that the recording process inherits, such as the descriptor of a lock.
 
     Attributes:
         missing: Number of messages that were sent to the recording process before the stop but never arrived.

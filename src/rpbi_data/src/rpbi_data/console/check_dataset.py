@@ -27,9 +27,9 @@ def check_dataset(
 ) -> int:
     """Checks a data set of LeRobot, robomimic or rosbag2, and prints a line for each fault.
 
-    The exit code is 1 if there are faults; see docs/datasets.md. The data set may be written by another tool; only its
-    values cannot be compared with exported values then. No ROS master is needed. All formats except robomimic need
-    `./rpbi setup data` first.
+    The exit code is 1 if there are faults; see docs/datasets.md. Data sets of other tools are checked, too, except for
+    the comparison with exported values. No ROS master is needed. All formats except robomimic need `./rpbi setup data`
+    first.
 
     Args:
         folder: the data set

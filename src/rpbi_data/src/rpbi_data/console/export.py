@@ -65,7 +65,7 @@ def export(
             pose: the end effector's pose at the next row instead of a command;
             deltas: changes from the values measured at the row;
             TOPIC ...: topics of commands; default: the targets of all joints
-        images: topics of images; default: all cameras; without TOPIC, no images
+        images: topics of images; default: all cameras; `--images` without a topic exports no images
         features: observations in addition to the state, such as velocity 'pose.*' contact_force.box; default: all
         end_effector: adds the pose of this link, which must be on TF, to the observations
         gripper: joints of the gripper, which become a separate observation and the last numbers of the action

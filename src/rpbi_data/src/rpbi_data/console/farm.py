@@ -46,7 +46,7 @@ def farm(
         episodes: makes the episodes 0 to N - 1
         out: folder of the episodes; default: farm
         seed: seed of the farm; the seed of episode n is (N, n); default: 0
-        seconds: simulated time after which an episode ends if its policy has not ended it [s]; default: 10
+        seconds: simulated time after which an episode ends if the policy has not ended it [s]; default: 10
         ticks: number of ticks after which an episode ends, instead of a time
         images: also records the colour images of all cameras, as JPEG
         jobs: number of processes, each of which makes one episode at a time; default: the number of processors

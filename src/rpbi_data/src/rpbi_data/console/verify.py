@@ -25,9 +25,9 @@ def verify(
 ) -> int:
     """Simulates episodes again with their stored files, and compares states and messages with the recordings.
 
-    Prints a line for each episode: that it is the same, or the first tick that differs, and stored files that were
-    changed. Notes list original files that were changed after the recording. The exit code is 0 if all episodes are the
-    same. No ROS master is needed.
+    Prints a line for each episode: whether the simulation equals the recording, the first tick that differs, and stored
+    files that were changed. Notes list original files that were changed after the recording. The exit code is 0 only if
+    all episodes equal their recordings. No ROS master is needed.
 
     Args:
         folder: the folder of the episodes

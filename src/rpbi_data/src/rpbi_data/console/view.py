@@ -31,7 +31,7 @@ def view(
 ) -> str:
     """Writes an HTML file that shows an episode: the world in 3-D with a time line, and forces as arrows and plots.
 
-    A browser shows the file without access to the internet. `./rpbi setup html` is needed first, a ROS master is not.
+    A browser shows the file without access to the internet. Run `./rpbi setup html` first. No ROS master is needed.
 
     Args:
         DIR|BAG: a folder of episodes, or a bag with the topic rpbi/world_description

@@ -87,7 +87,7 @@ class RowOptions(NamedTuple):
         features: Wildcard patterns for the names of further observations, without `observation.`; None for all.
         end_effector: Frame of the end effector, such as `arm/tool`; empty for none.
         gripper: Names of the gripper's joints. They are a separate observation, and come last in actions.
-        timing: NEXT or PREVIOUS: the action is the newest command before the next row, or at the time of the row.
+        timing: NEXT: actions are the newest commands before the next row. PREVIOUS: the newest commands at the row.
         is_pose: Whether actions are the end effector's pose at the next row instead of commands.
         is_delta: Whether actions, except those of the gripper, are changes from the values measured at the row.
     """

@@ -68,7 +68,7 @@ class VideoWriter:
 
 
 class VideoFacts:
-    """Reads frame rate `fps`, size and codec of a video file.
+    """Reads the frame rate, the image size and the codec of a video file.
 
     Args:
         path: The video file, an MP4.

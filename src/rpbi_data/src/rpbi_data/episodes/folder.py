@@ -157,7 +157,7 @@ class EpisodeFolder:
         return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
-        """Yields all finished episodes. If a description cannot be read, the state is `UNREADABLE`, with a note."""
+        """Yields all finished episodes. An episode without a readable description has the state `UNREADABLE`."""
         for number in self.numbers():
             try:
                 yield read_facts(self.folder_of(number))
@@ -325,7 +325,7 @@ def hold(part: Path, wait_s: float = 0.0) -> int:
         wait_s: Longest time to wait until another process releases the lock [s].
 
     Returns:
-        A file handle. The lock ends when all processes that have the handle, including child processes, have closed it.
+        A file descriptor. The lock ends when this process and all child processes that inherited it have closed it.
 
     Raises:
         BlockingIOError: If another process holds the lock.

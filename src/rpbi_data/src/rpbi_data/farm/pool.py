@@ -31,8 +31,8 @@ class Child:
     """A child process that makes episodes. The child process is killed when this process ends.
 
     Args:
-        module: Module that the child process runs. Its first command-line argument is the file handle from which the
-            child process reads the job.
+        module: Module that the child process runs. Its first command-line argument is the file descriptor from which
+            the child process reads the job.
         job: Job that determines the episodes.
         folder: Folder of the episodes.
         slots: Maximum number of episodes requested from the child process at the same time.

@@ -48,7 +48,7 @@ def links_of(
     """Returns all links that have visible shapes.
 
     Args:
-        world: The world, with all bodies that were in it at any time of the recording.
+        world: The world, with all bodies that occur in the recording.
         at_start: Names of the bodies that were in the world at the start of the recording.
         commands: The recorded commands.
         states: Table of `rpbi/state`, which contains the times of ticks; None if the topic is not recorded.

@@ -44,7 +44,7 @@ class Poses(NamedTuple):
         return cls(numbers[:, :3], Rotation.from_quat(numbers[:, 3:]))
 
     def __matmul__(self, other: Poses) -> Poses:
-        """Composes the poses at each time with other poses at the same time, which are relative to this frame."""
+        """Composes these poses with poses that are relative to this frame, at each of the n times."""
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 

@@ -103,7 +103,7 @@ def lerobot_faults(folder: Path) -> Iterator[str]:
 
 
 class _Check:
-    """Checks a data set. The methods must be called in the order of definition, since each uses results of others."""
+    """Checks a data set. Methods use results of previous methods, and must be called in the order of definition."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -1,6 +1,6 @@
 """Process that connects a farm to a Ray cluster, started as `python -m rpbi_data.farm.ros.cluster FD ADDRESS`.
 
-FD is the file handle of the connection to the farm.
+FD is the file descriptor of the connection to the farm.
 
 This process is separate from the farm because Ray ends the client process when the head node of the cluster ends.
 """

@@ -1,7 +1,7 @@
 """Makes the episodes of a job, in a child process of the farm or on a node of a Ray cluster.
 
 The child process is started with `python -m rpbi_data.farm.ros.maker FD`. It makes the episodes that are requested over
-the connection with the file handle FD.
+the connection with the file descriptor FD.
 """
 
 from __future__ import annotations
