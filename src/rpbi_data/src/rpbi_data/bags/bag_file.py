@@ -161,7 +161,7 @@ class BagFile:
         return _uint32(header, b"conn"), Connection(header[b"topic"].decode(), *texts)
 
     def _chunk_info(self) -> tuple[int, int]:
-        """Reads a record about a chunk; returns the chunk's offset in the file and its number of connections."""
+        """Reads a record about a chunk; returns the offset of the chunk and the number of connections in the chunk."""
         header = self._record_header(_CHUNK_INFO)
         (size,) = _UINT32.unpack(self._read(4))
         count = _uint32(header, b"count")

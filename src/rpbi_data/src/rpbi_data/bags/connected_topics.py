@@ -19,9 +19,9 @@ _OUTBOUND = "o"
 def find_unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
     """Returns the topics to which a node has not subscribed yet, and the publishers that are not connected to the node.
 
-    Subscriptions are read from the master. When the node has subscribed to all topics, the publishers are queried: only
-    they know whether a subscriber is connected. A publisher is listed as `"/publisher (/topic)"`. Publishers that
-    do not answer are listed, too, unless their process has ended.
+    Subscriptions are read from the master. When the node has subscribed to all topics, the publishers are queried,
+    since only publishers know whether a subscriber is connected. A publisher is listed as `"/publisher (/topic)"`.
+    Publishers that do not answer are listed, too, unless their process has ended.
 
     Args:
         node: Full name of the subscribing node.

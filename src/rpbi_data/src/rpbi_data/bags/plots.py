@@ -63,7 +63,7 @@ Lines = Mapping[str, pd.Series]
 
 
 def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
-    """Yields, for each figure of a table, the end of its file name, and its panels, indexed by y-axis label."""
+    """Yields, for each figure of a table, a suffix for the file name, and the panels, indexed by y-axis label."""
     if {"link", "other_body", "normal_force"} <= set(table.columns):
         forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
         every = forces.reindex(table.index.unique(), fill_value=0.0)
@@ -103,7 +103,7 @@ def _by_last_name(table: pd.DataFrame) -> Lines:
 
 
 def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
-    """Returns columns `PREFIX/x` to `PREFIX/z` for the first prefix that the table has; empty if it has none of them."""
+    """Returns columns `PREFIX/x` to `PREFIX/z` for the first prefix that the table has; empty if it has none."""
     for prefix in prefixes:
         if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
             return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}

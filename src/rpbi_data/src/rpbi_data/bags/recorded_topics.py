@@ -40,8 +40,9 @@ _log = logging.getLogger(__name__)
 class Recorder:
     """Context manager that records all messages published inside the context to a bag with LZ4 compression.
 
-    A separate recording process writes the bag. It buffers all messages until they are written, even if it gets no
-    processor time for a while. When this process is killed, the recording process closes the bag and ends, too.
+    A separate recording process writes the bag. The recording process buffers all messages until they are
+    written, even if it gets no processor time for a while. When the process of the `Recorder` is killed, the recording
+    process closes the bag and ends, too.
 
     On entry, the context waits until the recording process has subscribed to every topic, and is connected to every
     existing publisher. On exit, the context stops the recording process, and waits until the bag is closed. All waiting
@@ -185,8 +186,8 @@ class Recorder:
     def _wait_until_received(self) -> None:
         """Waits until all messages sent so far have arrived, and sets `missing`.
 
-        Waits at most `_MOST_GRACE_S` without progress, or `timeout_s` if the recorder never answers. TCP may pause for
-        seconds after the recorder got no processor time.
+        Gives up after `_MOST_GRACE_S` without progress, or after `timeout_s` if the recorder never answers. TCP may
+        pause for seconds after the recorder got no processor time.
         """
         wanted, last = self.published(), -1
         answer_end = time.monotonic() + self._timeout_s

@@ -1,4 +1,4 @@
-"""Resamples tables that have different rates at common times."""
+"""Resamples tables with different rates, so that the rows of all tables have the same times."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
 
 
 def _snapped(times: Array, known: Array, resolution: int) -> Array:
-    """Replaces each time that differs from a known time by at most `resolution` by the known time [ns]."""
+    """Rounds times that differ by at most `resolution` from a known time to the known time [ns]."""
     if not len(known):
         return times
     newest = known[np.searchsorted(known, times + resolution, side="right") - 1]

@@ -76,7 +76,7 @@ def _one_row(layout: Layout, raw: bytes) -> Plan:
 
 
 def _joint_state(layout: Layout, raw: bytes) -> Plan:
-    """Makes one row whose column names contain the joint name, or the index if the message has no joint names."""
+    """Makes one row whose column names contain the joint name, or the joint index if the message has no joint names."""
     leaves, counts, notes = layout.leaves, layout.counts, []
     names = [leaves[f"name/{index}"] for index in range(counts["name"])]
     columns = {path: leaf for path, leaf in leaves.items() if path.startswith("header/")}

@@ -268,7 +268,7 @@ def _text(cell: Array) -> str:
 
 
 def _join(pieces: list[_Piece], rows: int) -> Array:
-    """Returns a column joined from its pieces, shape (rows,); missing values are NaN, or None in text and bool."""
+    """Joins the pieces of a column, shape (rows,). Missing values are NaN, or None in columns of text and bool."""
     dtypes = {values.dtype for _, values in pieces}
     is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
     dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
@@ -360,7 +360,7 @@ _WRITERS = {".parquet": _write_parquet, ".csv": _write_csv, ".hdf5": _write_hdf5
 
 
 def _rows_of(cells: list[Array]) -> Array:
-    """Converts a list of arrays with different lengths to an array of objects, shape (rows,)."""
+    """Converts a list of arrays with different lengths to an array of n objects, shape (n,)."""
     rows: Array = np.empty(len(cells), object)
     rows[:] = cells
     return rows

@@ -1,4 +1,4 @@
-"""Report on the topics of a bag: number, size, rate and gaps of the messages."""
+"""Measures the topics of a bag: number, size, rate and gaps of the messages."""
 
 import struct
 from pathlib import Path

@@ -116,7 +116,7 @@ def _path_to_root(edges: Mapping[str, _Edge], frame: str) -> list[str]:
     """Returns a frame and all frames above it in the tree, up to the root.
 
     Raises:
-        ValueError: If the frames form a circle.
+        ValueError: If the frames form a cycle.
     """
     path = [frame]
     while path[-1] in edges:

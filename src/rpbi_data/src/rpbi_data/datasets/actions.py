@@ -44,7 +44,7 @@ def derive_actions(
     """Returns a list that contains the feature `action`, or an empty list if the recording has no commands.
 
     Args:
-        tables: Tables of a recording; the table of TF is split by frame, see `by_frame`.
+        tables: Tables of a recording, as returned by `by_frame`.
         types: Message types, indexed by topic.
         fixed: Names of joints that cannot move, which are left out.
         row_options: The user's choice of topics, and whether actions are poses or changes.

@@ -44,7 +44,7 @@ class ExportOptions(NamedTuple):
         disk_reserve_mb: Free disk space below which no further episode is exported [MB].
         any_size: Whether bags may exceed the limits of `BagReader`.
         max_time_error_s: Largest time between a row and the nearest message of an observation [s]. Episodes that exceed
-            it are not exported.
+            this time are not exported.
     """
 
     fps: int

@@ -125,7 +125,7 @@ class ExportedEpisode(ABC):
 
     @abstractmethod
     def values(self, image_stamps: Mapping[str, Array]) -> dict[str, Array]:
-        """Returns the numbers of all features, indexed by key, each of shape (n, number of names).
+        """Returns the values of all numeric features, indexed by key, each of shape (n, number of names).
 
         Args:
             image_stamps: Times of the images in the rows, indexed by camera key, int64, shape (n,) [ns].

@@ -301,7 +301,7 @@ def joint_of(column: Column) -> str:
 
 
 def joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> list[str]:
-    """Returns the names of a kind's columns, such as `position`, except for fixed joints and columns without values."""
+    """Returns the names of the columns `KIND/JOINT`, except for fixed joints and columns without values."""
     names = [name for name in table.columns if name.startswith(f"{kind}/")]
     return [name for name in names if name.partition("/")[2] not in fixed and table[name].notna().any()]
 

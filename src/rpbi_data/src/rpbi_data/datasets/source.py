@@ -388,7 +388,7 @@ def _rgb(pixels: Array) -> Array:
 
 
 def _make_continuous(values: Array, feature: Feature) -> None:
-    """Flips signs of quaternions in place, so that successive ones have similar components and the first has w >= 0."""
+    """Flips signs of quaternions in place: each becomes nearest to the previous one, and the first gets w >= 0."""
     names = feature.names
     for first in range(len(names) - 3):
         if names[first : first + 4] == QUATERNION:

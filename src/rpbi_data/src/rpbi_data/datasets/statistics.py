@@ -46,7 +46,7 @@ class ImageStatistics:
         self._counts = np.zeros((3, LEVELS), int)
 
     def add(self, pixels: Array) -> None:
-        """Adds an image, shape (height, width, 3), uint8, of which the statistics use at most every k-th."""
+        """Adds an image, shape (height, width, 3), uint8. Only a sample of the added images is evaluated."""
         if self._seen % self._every == 0:
             step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
             for channel, counts in enumerate(self._counts):

@@ -79,8 +79,8 @@ class Compared(NamedTuple):
 class Comparison:
     """Compares the messages of an episode with the samples of a replay. Used as a context manager that closes the bag.
 
-    Messages are compared if topic and stamp are the same, and transforms if child frame and stamp are the same. Not
-    compared are images, messages without a header, and messages whose stamp does not occur in the replay.
+    Messages are compared if topic and stamp are the same, and transforms if child frame and stamp are the same.
+    Images, messages without a header, and messages whose stamp does not occur in the replay are not compared.
 
     Args:
         bag: Path of the recorded bag.

@@ -145,7 +145,7 @@ class _Copies:
         """Copies the meshes of a URDF.
 
         Args:
-            urdf: Path of the URDF in the world's description. Relative mesh names are relative to its folder.
+            urdf: Path of the URDF in the world's description. Relative mesh names are relative to the URDF's folder.
             source: Path of the file from which the URDF is read.
         """
         meshes: dict[str, str] = {}

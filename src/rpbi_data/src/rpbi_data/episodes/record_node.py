@@ -213,7 +213,7 @@ class RecordNode:
             return f"episode {self._episode.number}: {label}"
 
     def end(self) -> None:
-        """Ends an episode that is being recorded as incomplete. Called when the node shuts down."""
+        """Ends the current episode, if there is one, with the state `incomplete`. Called when the node shuts down."""
         with self._lock:
             if self._recorder is not None:
                 self._end("incomplete", "the node was ended while it was recorded")

@@ -46,7 +46,7 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
 
 
 def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> PageScene:
-    """Returns the scene of a bag with the topic `rpbi/world_description`. The world is built from its original files.
+    """Returns the scene of a bag with the topic `rpbi/world_description`. The world is built from files on the disk.
 
     Raises:
         BagError: If the bag cannot be read, or lacks the topic.

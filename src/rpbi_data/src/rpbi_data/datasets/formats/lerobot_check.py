@@ -1,4 +1,4 @@
-"""Names of files and columns in LeRobot data sets, version 3.0, and the check of such data sets."""
+"""Defines the file and column names of LeRobot data sets, version 3.0, and checks such data sets."""
 
 from __future__ import annotations
 

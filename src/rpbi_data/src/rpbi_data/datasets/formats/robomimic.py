@@ -199,7 +199,7 @@ def observation_key(key: str) -> str:
 
 
 def scaled(actions: Array, low: Array, high: Array) -> Array:
-    """Scales actions to [-1, 1], and returns the result. Columns without different values become 0.
+    """Scales actions to [-1, 1], and returns the result. Columns whose values are all equal become 0.
 
     Args:
         actions: Actions, shape (n, columns).
