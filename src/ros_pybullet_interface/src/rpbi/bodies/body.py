@@ -228,7 +228,7 @@ class Body:
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Returns whether an object's YAML keys describe this type; called if several types share a section."""
+        """Returns whether an object's YAML keys describe this type; only called if several types share a `section`."""
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:

@@ -22,7 +22,7 @@ class LinkDynamics(NamedTuple):
         lateral_friction: Coulomb friction coefficient.
         local_inertia_diagonal: Principal moments of inertia [kg m^2].
         local_inertia_pos: Centre of mass in the link's frame [m].
-        local_inertia_orn: Principal axes in the link's frame, x, y, z, w.
+        local_inertia_orn: Orientation of the principal axes in the link's frame, quaternion x, y, z, w.
         restitution: Coefficient of restitution.
         rolling_friction: Coefficient of rolling friction.
         spinning_friction: Coefficient of friction about the contact normal.

@@ -38,8 +38,8 @@ class TransparentShape(NamedTuple):
 class Transparency:
     """Lists the transparent shapes of the bodies in a client, while bodies are added and removed.
 
-    For a body whose id was used before, PyBullet's EGL plugin first reports the shapes of the removed body, then the
-    shapes of the new body. This class skips the shapes of the removed body.
+    For a new body that got the id of a removed body, PyBullet's EGL plugin first reports the shapes of the removed
+    body, then the shapes of the new body. This class skips the shapes of the removed body.
     """
 
     def __init__(self, pb: Client) -> None:

@@ -117,9 +117,9 @@ def topic_input(key: str, taken: Input) -> Topic:
 
 
 def input_messages(world: World, slot: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Converts an input back to ROS messages, and yields each with its topic.
+    """Converts the value of an input to ROS messages, and yields pairs of a topic's name and a message.
 
-    Yields nothing for inputs other than joint targets and base velocities.
+    Only joint targets and base velocities are converted; for other inputs, there are no pairs.
 
     Args:
         world: The world, whose present stamp the messages of joint targets get.

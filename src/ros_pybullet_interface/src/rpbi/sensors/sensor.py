@@ -46,7 +46,7 @@ class SensedBody(Protocol):
         """Returns the twist of the root link's URDF frame, in the axes of the world frame."""
 
     def state(self) -> BodyState:
-        """Returns the pose and joint positions that the renderer process needs; for soft bodies, also the nodes."""
+        """Returns the pose and joint positions for the renderer process; for soft bodies, also the nodes' positions."""
 
 
 class SensedRobot(SensedBody, Protocol):

@@ -70,7 +70,7 @@ class ImagePublisher:
 
 
 def camera_node(simulator: str) -> str:
-    """Returns the name of the node that publishes the images: the simulator's node name and `_camera`."""
+    """Returns the name of the node that publishes the images: the simulator's node name, followed by `_camera`."""
     return f"{simulator}_camera"
 
 

@@ -46,7 +46,7 @@ class _CommandTopic(FastTopic):
 
 
 class CommandPublisher:
-    """Publishes the description of a world once, and the world's commands in small messages, one for each `spin`."""
+    """Publishes the description of a world once, and the world's commands in small messages, one per call of `spin`."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -58,7 +58,7 @@ class CommandPublisher:
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends one message of new commands to all subscribers, and one of earlier commands to each new subscriber."""
+        """Sends a message with new commands to all subscribers, and one with earlier ones to each new subscriber."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())

@@ -71,7 +71,7 @@ def state_message(world: World, with_hash: bool, **pace: Any) -> SimulationState
 
     Args:
         world: The world.
-        with_hash: Whether to compute the hash of the state; otherwise that field is empty.
+        with_hash: Whether to compute the hash of the state; otherwise the message's `state_hash` is empty.
         pace: Further fields of the message that describe the simulation loop, such as `running`.
     """
     message = SimulationState(

@@ -175,7 +175,7 @@ class BodyEndpoints:
         self._open: dict[str, ExitStack] = {}
 
     def open(self, body: Body) -> None:
-        """Opens all interfaces of a body; if one cannot be opened, those opened before are closed again."""
+        """Opens all ROS interfaces of a body; if one cannot be opened, closes those that were opened before."""
 
         def contexts(owners: Sequence[str]) -> list[BodyContext]:
             return [BodyContext(body.name, owner, self._simulation, self._ask) for owner in owners]

@@ -161,7 +161,7 @@ def switch_controllers(context: BodyContext, request: SwitchControllersRequest) 
 
 
 def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
-    """Changes keys of a controller, such as `{stiffness: 200}`; its other keys stay the same.
+    """Changes keys of a controller, such as `{stiffness: 200}`; the controller's other keys stay the same.
 
     An active controller starts again from the robot's present state.
 
