@@ -236,7 +236,7 @@ RESET = Topic(
 
 
 class WindowTopics:
-    """Opens the configured topics of the window; without a window, logs which configured topics have no effect."""
+    """Opens the configured topics of the window; without a window, logs which configured keys have no effect."""
 
     def __init__(self, world: World) -> None:
         self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)
