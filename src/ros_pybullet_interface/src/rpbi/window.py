@@ -94,7 +94,7 @@ class Window:
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
 
     def seconds_per_call(self) -> float:
-        """Measures the mean duration of a PyBullet call [s], which includes the wait for the window's present frame."""
+        """Measures the mean duration of a PyBullet call [s], including the wait for the frame that the window draws."""
         begin_s = time.monotonic()
         for _ in range(MEASURED_CALLS):
             self._pb.getPhysicsEngineParameters()

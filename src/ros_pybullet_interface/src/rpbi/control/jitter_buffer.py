@@ -48,7 +48,7 @@ class Playout(NamedTuple):
         start: Time at which set points leave the previous target [ticks].
         end: Time at which set points reach this target [ticks].
         period: Period of the stream [ticks]; 0 if the target does not belong to a stream.
-        speed: Interval between sending the previous target and this one, divided by the interval between playing them.
+        speed: Interval between sending the previous target and this one, divided by the interval between playing both.
         pace: Mean interval between the arrivals of recent targets [ticks].
         gap: Time from the end of extrapolation to this target's arrival [ticks]; 0 if the target came before that end.
         apart: Interval from the previous target to this one, by stamps or arrivals [ticks]; 0 if unknown.

@@ -84,7 +84,7 @@ class StreamSegment(NamedTuple):
     def velocity(self, tick: float) -> Mapping[int, float]:
         """Returns velocities at a time [rad or m per tick], keyed by joint index.
 
-        Before the segment, returns the velocities at the segment's start. After the segment, returns those at the end.
+        Before the segment, returns the velocities at its start. After the segment, returns the velocities at its end.
 
         Args:
             tick: The time [ticks].

@@ -132,7 +132,7 @@ class TargetStream:
         return segments[-1]
 
     def advance(self, tick: float) -> Mapping[int, float]:
-        """Advances to a time [ticks], and returns the set points [rad or m], keyed by joint index.
+        """Advances the stream to a time [ticks], and returns the set points [rad or m], keyed by joint index.
 
         Set points are clipped to the joints' limits if targets have velocities or accelerations are bounded. Otherwise
         this is not needed, since set points lie between targets.

@@ -16,7 +16,7 @@ _PER_JOINT = (*_NULL_SPACE, "jointDamping", "currentPosition")
 class PybulletProblem:
     """Target pose of a link of a robot, and parameters of the search for joint positions.
 
-    The fields equal those of the message `CalculateInverseKinematicsProblem`, without the frame. Lists per joint have
+    The fields are those of the message `CalculateInverseKinematicsProblem`, except `header`. Lists per joint have
     one value for each of the n joints that motors can move, in the robot's order. The solver replaces fields that are
     empty or 0 by defaults. `lowerLimits`, `upperLimits`, `jointRanges` and `resetPoses` must be given together.
 

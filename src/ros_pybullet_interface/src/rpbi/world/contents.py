@@ -217,7 +217,7 @@ class WorldContents:
             camera.pose = self._configured_pose(camera)
 
     def rebuild(self, recipe: Recipe, changed: Iterable[str]) -> None:
-        """Replaces bodies and cameras by the contents of a recipe, in a fresh PyBullet client if there is no window.
+        """Replaces bodies and cameras by the contents of a recipe, in a fresh client unless PyBullet has a window.
 
         Args:
             recipe: Recipe of the new contents.

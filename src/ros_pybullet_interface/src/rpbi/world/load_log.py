@@ -175,7 +175,7 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
 def change_physics(pb: Client, bodies: Iterable[Body], change: PhysicsChange) -> None:
     """Changes gravity, or parameters of the engine.
 
-    A change of gravity wakes sleeping bodies, which would otherwise not react to it. Bodies in maximal coordinates are
+    A change of gravity wakes sleeping bodies, which would otherwise not react. Bodies in maximal coordinates are
     not woken, since PyBullet would then let these bodies sleep later even if their sleep is disabled.
     """
     arguments = change.kwargs()

@@ -38,7 +38,7 @@ def kind_of(section: str) -> str:
 
 
 def file_schemas() -> dict[str, Schema]:
-    """Returns the schemas indexed by kind of file (`world`, `robot`, `dynamic_object` and so on), without old keys.
+    """Returns the schemas indexed by kind of file (`world`, `robot` and so on), without keys of older worlds.
 
     A schema accepts everything that the model of the same files accepts. Only the model checks rules that a schema
     cannot express, such as unique names or existing files.

@@ -409,7 +409,7 @@ class World:
 
     @property
     def is_connected(self) -> bool:
-        """Whether PyBullet is still connected; closing its window or ending its server disconnects it."""
+        """Whether PyBullet is still connected. Closing PyBullet's window or ending its server ends the connection."""
         return bool(self.pb.isConnected())
 
     def apply_inputs(self) -> None:

@@ -94,7 +94,7 @@ def _moving_no_mass(document: UrdfDocument) -> list[str]:
 
 
 def _joints_below(document: UrdfDocument) -> dict[str, list[Edge]]:
-    """Returns the joints below each link of a URDF, indexed by the name of the link that is the joints' parent."""
+    """Returns the joints whose parent is the link, for each link with such joints; indexed by the link's name."""
     below: dict[str, list[Edge]] = {}
     for edge in document.edges:
         below.setdefault(edge.parent, []).append(edge)

@@ -80,7 +80,7 @@ class _Managed:
         self.configure(config)
 
     def configure(self, config: ControllerConfig) -> None:
-        """Replaces the controller by a new one with `config`; if it was active, the new one starts at the next tick."""
+        """Replaces the controller by a new one, which starts at the next tick if the old controller was active."""
         self.controller = CONTROLLERS.find(config.type)(self.robot, config)
         self.config = config
         self.has_begun = False
@@ -110,7 +110,7 @@ class ControllerManager:
     """Runs the active controllers of one robot. At most one controller drives a joint.
 
     Args:
-        robot: The robot; `chosen` is replaced for each controller by the joints in its configuration.
+        robot: The robot. For each controller, the field `chosen` is replaced by the joints in the configuration.
         configs: Configurations, keyed by the controller's name.
         motors: The robot's motors.
 
@@ -306,7 +306,7 @@ def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.nda
 
 
 def _cause(controller: Controller, doing: str, error: Exception) -> str:
-    """Returns the message of a controller's error; the message names the class if it is from another package."""
+    """Returns the message of an error; names the controller's class if this class is from another package."""
     try:
         raise_plugin_error(controller, doing, error)
     except InterfaceError as named:

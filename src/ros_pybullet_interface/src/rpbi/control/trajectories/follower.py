@@ -137,7 +137,7 @@ class TrajectoryFollower:
         )
 
     def desired(self, time_s: float) -> DesiredState:
-        """Returns the desired state of the follower's joints at a time of the world [s].
+        """Returns the desired state of the follower's joints at a given time of the world's clock [s].
 
         The desired position of a joint without a trajectory is the motor's target under position control, and the
         measured position in other modes.

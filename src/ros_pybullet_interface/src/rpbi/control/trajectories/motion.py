@@ -105,7 +105,10 @@ class TrajectoryMotion(Motion):
             self.end(True, "reached the end" if self._tolerances is None else "reached the goal within its tolerances")
 
     def _break_off(self, code: ErrorCode, fault: str, time_s: float, measured: JointMotion) -> JointMotion:
-        """Replaces the trajectories by stops. If the duration of the stop is 0, ends the motion at once."""
+        """Replaces the trajectories by trajectories on which the joints stop, and returns the set points of the tick.
+
+        If the duration of the stop is 0, ends the motion at once.
+        """
         self.code, self._fault = code, f"{fault}; the joints stop and hold where they are"
         self.trajectories = {i: stopping(self._joints[i], measured[i], self._time_s, self._stop_s) for i in self.joints}
         self.end_s, self._tolerances = self._time_s + self._stop_s, None

@@ -177,7 +177,7 @@ class _Copy:
 
 
 class Shadow:
-    """A process that repeats a world's commands, and is forked to make copies of the world and predictions.
+    """A process that repeats a world's commands, and is forked to copy the world and to make predictions.
 
     The shadow has no ROS node, no window and a single thread, so it can be forked safely. The shadow starts while this
     process continues; the first request waits until the shadow has reached the world's state.

@@ -1,10 +1,10 @@
-"""Writes Python objects as plain values for JSON, and reads them back into objects of the same structure.
+"""Writes Python objects as plain data for JSON, and converts the data back to objects of the same structure.
 
-The Python part of a world's state consists of the attributes of bodies, sensors, controllers and target streams. They
-are written as a graph: repeated occurrences of an object are written as references to the first occurrence. Objects
-that exist in every world of the same build, such as bodies, are called anchors and referred to by name. Reading sets
-the attributes of existing objects, and creates the objects that a freshly built world does not have yet. The text
-contains class names, but no code, and only classes of trusted packages are instantiated.
+The Python part of a world's state consists of the attributes of bodies, sensors, controllers and target streams. These
+attributes are written as a graph: repeated occurrences of an object are written as references to the first occurrence.
+Objects that exist in every world of the same build, such as bodies, are called anchors and referred to by name.
+Reading sets the attributes of existing objects, and creates the objects that a freshly built world does not have yet.
+The text contains class names, but no code, and only classes of trusted packages are instantiated.
 """
 
 from __future__ import annotations
