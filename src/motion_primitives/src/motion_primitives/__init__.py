@@ -1,4 +1,4 @@
-"""Movement primitives: learned from demonstrations, then executed with different starts, goals and durations."""
+"""Movement primitives, which are learned from demonstrations and executed with new starts, goals and durations."""
 
 from .coupling import ForceCoupling as ForceCoupling
 from .coupling import ObstacleCoupling as ObstacleCoupling
@@ -11,4 +11,4 @@ from .primitive import ViaPoint as ViaPoint
 from .primitives import PRIMITIVES
 
 make_primitive = PRIMITIVES.make
-"""Makes a primitive of a type given by name, see `PluginTable.make`."""
+"""Makes a primitive whose type is given by name, see `PluginTable.make`."""

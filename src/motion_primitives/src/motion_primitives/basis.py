@@ -1,4 +1,4 @@
-"""Basis functions of phase or time, and a least-squares fit of their weights to samples."""
+"""Basis functions of phase or time, and a least-squares fit of basis function weights to samples."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from custom_ros_tools.transforms import Array
 LAST_PHASE = 0.01
 """Phase at the end of a discrete primitive; the phase at the start is 1."""
 DECAY = -math.log(LAST_PHASE)
-"""Decay rate of the phase, per duration: phase = exp(-DECAY * time / duration)."""
+"""Decay rate of the phase: phase = exp(-DECAY * time / duration)."""
 OVERLAP = 0.8
-"""Value of a basis function at the centre of the next basis function, before normalisation."""
+"""Value of a Gaussian at the centre of the next Gaussian, before normalisation."""
 RIDGE = 1e-10
-"""Factor of the squared weights in the cost of `fitted` without `roughness`, relative to the largest basis function."""
+"""Factor of the squared weights in the cost of `fitted` without `roughness`, relative to the sum of a basis function's
+squared values."""
 SMOOTHING = 1e-9
-"""Factor of the roughness in the cost of `fitted` with `roughness`, relative to the largest basis function."""
+"""Factor of the roughness in the cost of `fitted` with `roughness`, relative to the sum of a basis function's squared
+values."""
 
 
 class GaussianBasis(NamedTuple):
-    """Normalised Gaussians of a phase that decays from 1 (Ijspeert 2013, equation 2.3).
+    """Normalised Gaussians over a phase that decays from 1 (Ijspeert 2013, equation 2.3).
 
     Attributes:
-        centers: k centres, as phases.
+        centers: Phases at the k centres.
         widths: k factors w in exp(-w * (phase - centre)^2).
     """
 
@@ -41,7 +43,7 @@ class GaussianBasis(NamedTuple):
         return cls(centers, np.append(widths, widths[-1]))
 
     def values(self, progress: Array) -> Array:
-        """Returns the k basis functions times the phase, shape (m, k).
+        """Returns the values of the k basis functions, multiplied by the phase, shape (m, k).
 
         Args:
             progress: m times, as fractions of the duration.
@@ -52,7 +54,7 @@ class GaussianBasis(NamedTuple):
 
 
 class PeriodicBasis(NamedTuple):
-    """Normalised von Mises functions of an angle (Ijspeert 2013, equation 2.9).
+    """Normalised von Mises functions over an angle (Ijspeert 2013, equation 2.9).
 
     Attributes:
         centers: k centres [rad].
@@ -69,7 +71,7 @@ class PeriodicBasis(NamedTuple):
         return cls(centers, -math.log(OVERLAP) / (1.0 - math.cos(2.0 * math.pi / count)))
 
     def values(self, cycles: Array) -> Array:
-        """Returns the k basis functions, shape (m, k).
+        """Returns the values of the k basis functions, shape (m, k).
 
         Args:
             cycles: m times, as numbers of periods since the start.
@@ -80,7 +82,7 @@ class PeriodicBasis(NamedTuple):
 
 
 class TimeBasis(NamedTuple):
-    """Normalised Gaussians of time, as a fraction of the duration (Paraschos 2013, equation 6).
+    """Normalised Gaussians over time, which is a fraction of the duration (Paraschos 2013, equation 6).
 
     Attributes:
         centers: k centres, from 0 to 1.
@@ -96,7 +98,7 @@ class TimeBasis(NamedTuple):
         return cls(np.linspace(0.0, 1.0, count), -1.0 / (8.0 * count**2 * math.log(0.7)))
 
     def values(self, progress: Array) -> Array:
-        """Returns the k basis functions, shape (m, k).
+        """Returns the values of the k basis functions, shape (m, k).
 
         Args:
             progress: m times, as fractions of the duration.
@@ -113,7 +115,7 @@ class TimeBasis(NamedTuple):
 
     @property
     def roughness(self) -> Array:
-        """Matrix R of shape (k, k): w R w is the sum of squared second differences of weights w."""
+        """Matrix R of shape (k, k), such that w^T R w is the sum of squared second differences of the weights w."""
         bends = np.diff(np.eye(len(self.centers)), n=2, axis=0)
         return np.asarray(bends.T @ bends)
 
@@ -123,14 +125,14 @@ class TimeBasis(NamedTuple):
 
 
 def fitted(values: Array, samples: Array, conditions: Array | None = None, roughness: Array | None = None) -> Array:
-    """Fits weights of basis functions to samples, with least squared error.
+    """Fits weights of basis functions to samples by least squares.
 
     Args:
-        values: The k basis functions at m samples, shape (m, k).
+        values: Values of the k basis functions at m samples, shape (m, k).
         samples: Samples of d signals, shape (m, d).
         conditions: Linear constraints, shape (c, k): `conditions @ w` is 0 for the weights w of each signal.
-        roughness: Matrix of a smoothness prior, see `TimeBasis.roughness`; it determines weights that the samples do
-            not determine. By default, small weights are preferred instead.
+        roughness: Matrix of a smoothness prior, see `TimeBasis.roughness`. The prior determines weights that the
+            samples do not determine. By default, small weights are preferred instead.
 
     Returns:
         Weights, shape (d, k).

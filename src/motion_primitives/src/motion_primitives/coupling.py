@@ -13,17 +13,17 @@ from custom_ros_tools.transforms import Array, finite_vector
 from .dynamics import MotionState, SpringDamper
 
 STEEPNESS = 20.0 / math.pi
-"""Decay rate of the avoidance over the angle between velocity and obstacle [1/rad] (Hoffmann 2009)."""
+"""Rate at which the avoidance decays with the angle between velocity and obstacle [1/rad] (Hoffmann 2009)."""
 SLOWEST_M_S = 1e-6
 """Speed below which the direction of a motion counts as undefined [m/s]."""
 
 
 @dataclass
 class ForceCoupling:
-    """Yields to a force like a spring: a constant force shifts the motion by force / stiffness.
+    """Lets a motion yield to a force like a spring: a constant force shifts the motion by force / stiffness.
 
     Attributes:
-        stiffness: Stiffness for each velocity coordinate, shape (dof,), or one number for all [N/m or N m/rad].
+        stiffness: Stiffness in each coordinate, shape (dof,), or one number for all coordinates [N/m or N m/rad].
         force: Measured force on the moved object, shape (dof,) [N or N m]. Callers update it at each measurement.
     """
 
@@ -42,7 +42,7 @@ class ForceCoupling:
 
 @dataclass
 class ObstacleCoupling:
-    """Steers a motion around a ball, in the space of its first three positions (Hoffmann 2009, equation 8).
+    """Steers the first three positions of a motion around a ball (Hoffmann 2009, equation 8).
 
     The velocity is turned away from the ball. The avoidance decays with the angle between the velocity and the ball's
     edge, and with the distance from the ball's surface.

@@ -1,4 +1,4 @@
-"""Demonstrations: points over time, which are checked when they are made from arrays or from tables of a bag."""
+"""Demonstrations: points over time, made from arrays or from tables of a bag, and checked for errors."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ MIN_SAMPLES = 10
 MAX_GAP_SHARE = 0.1
 """Largest time between two samples, as a fraction of the duration. A longer gap is rejected as a jump in time."""
 MAX_TURN_RAD = 1.5
-"""Largest rotation between two samples [rad]. A larger rotation is rejected as a jump."""
+"""Largest rotation between two successive samples [rad]. A larger rotation is rejected as a jump."""
 SPIKE_SHARE = 0.05
-"""Least size of a spike, as a fraction of the extent of the positions. Smaller outliers are accepted."""
+"""Smallest deviation that counts as a spike, as a fraction of the extent of the positions."""
 SPIKE_TO_STEPS, SPIKE_TO_NOISE = 5.0, 10.0
-"""Least size of a spike, as a multiple of the steps around it, and as a multiple of all samples' median deviation.
+"""Smallest deviation that counts as a spike, as a multiple of the steps around it and of the median deviation.
 
 The deviation of a sample is its distance from the line between the samples before and after it.
 """
@@ -40,7 +40,7 @@ JOINT_PREFIX = "position/"
 
 @dataclass(frozen=True)
 class Demonstration:
-    """A demonstrated motion. Make it with the class methods, such as `of`, which check the numbers.
+    """A demonstrated motion. Make demonstrations with the class methods, such as `of`, which check the numbers.
 
     Attributes:
         space: Names of the n positions, and whether points have an orientation.
@@ -70,12 +70,12 @@ class Demonstration:
         Args:
             times: m times [s].
             positions: m x n positions [m or rad].
-            quats_xyzw: m quaternions x, y, z, w; signs are arbitrary. By default the motion has no orientations.
+            quats_xyzw: m quaternions x, y, z, w with any sign. By default, the motion does not include orientations.
             names: Names of the n positions. By default x, y, z for n = 3, otherwise q0, q1, ...
 
         Raises:
-            DemonstrationError: If sizes differ, a number is not finite, or there are fewer than 10 samples. Also if
-                times do not increase or have a long gap, or if positions or orientations jump.
+            DemonstrationError: If array lengths differ, a number is not finite, or there are fewer than 10 samples.
+                Also if times do not increase or have a long gap, or if positions or orientations jump.
         """
         stamps = checked_array(times, "times", 1)
         where = checked_array(positions, "positions", 2)
@@ -94,7 +94,7 @@ class Demonstration:
 
     @classmethod
     def of_points(cls, space: Space, times: ArrayLike, points: ArrayLike) -> Demonstration:
-        """Returns a checked demonstration of m points of a space at m times [s]; raises the same errors as `of`."""
+        """Returns a checked demonstration, made from m points of a space and m times [s]; raises errors like `of`."""
         values, n = checked_array(points, "positions", 2), len(space.names)
         return cls.of(times, values[:, :n], values[:, n:] if space.has_orientation else None, space.names)
 
@@ -189,10 +189,10 @@ def _check_rows(subject: str, array: Array, times: Array) -> None:
 
 
 def check_increasing(times: Array, min_samples: int) -> None:
-    """Checks that there are at least `min_samples` times, and that they increase strictly [s].
+    """Checks that there are at least `min_samples` times, and that the times increase strictly [s].
 
     Raises:
-        DemonstrationError: If there are fewer times, or a time is not after the time before.
+        DemonstrationError: If there are fewer times, or a time is not greater than the previous time.
     """
     if len(times) < min_samples:
         raise DemonstrationError("times", f"at least {min_samples} samples", f"{len(times)}")
@@ -214,8 +214,8 @@ def _check_no_jump(times: Array) -> None:
 
 
 def _check_no_spike(times: Array, positions: Array) -> None:
-    """Rejects a motion with a spike: a sample far from the line between its neighbours, while the steps around the
-    three samples are small."""
+    """Raises a DemonstrationError if there is a spike: a sample that is far from the line between its neighbours, while
+    the steps before and after these three samples are small."""
     share = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
     line = positions[:-2] + share * (positions[2:] - positions[:-2])
     off = np.linalg.norm(positions[1:-1] - line, axis=1)

@@ -1,5 +1,5 @@
-"""Dynamics of movement primitives: a motion follows a path like a spring-damper, and a forcing term and couplings push
-the motion off the path.
+"""Dynamics of movement primitives: a spring-damper pulls a motion to a path, and a forcing term and couplings push the
+motion off the path.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from .space import Space, angular_velocity, turned
 TOLERANCE = 1e-3
 """Largest difference of a position from the goal at which the goal counts as reached [m or rad]."""
 TOLERANCE_RAD = math.radians(0.1)
-"""Largest angle between the orientation and the goal at which the goal counts as reached [rad]."""
+"""Largest angle between the orientation and the goal's orientation at which the goal counts as reached [rad]."""
 FROM_START = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
-"""Coefficients (powers 0 to 5) of the quintic from 0 to 1 that starts and ends at rest."""
+"""Coefficients (powers 0 to 5) of the quintic polynomial from 0 to 1 that starts and ends at rest."""
 COASTING = (0.0, 1.0, 0.0, -6.0, 8.0, -3.0)
-"""Coefficients (powers 0 to 5) of the quintic from 0 to 0 that starts with velocity 1 and ends at rest. Its second
-derivative is 0 at both ends."""
+"""Coefficients (powers 0 to 5) of the quintic polynomial from 0 to 0 that starts with velocity 1 and ends at rest. The
+second derivative is 0 at both ends."""
 MIN_CHANGE_SHARE = 0.25
 """Least duration of the transition to a new goal, as a fraction of the motion's duration."""
 
 
 class MotionState(NamedTuple):
-    """State of a motion.
+    """State of a motion at a time.
 
     Attributes:
         time_s: Time since the start of the motion [s].
-        point: Present point, see `Space`.
-        velocity: Present velocity, shape (dof,) [m/s or rad/s].
+        point: Point at this time, see `Space`.
+        velocity: Velocity at this time, shape (dof,) [m/s or rad/s].
     """
 
     time_s: float
@@ -47,7 +47,7 @@ class SpringDamper(NamedTuple):
     """Critically damped spring, whose time scale is the duration of the motion.
 
     Attributes:
-        alpha: Damping for a duration of 1 s. The stiffness for a duration of 1 s is `alpha**2 / 4`.
+        alpha: Damping for a duration of 1 s [1/s]. The stiffness for a duration of 1 s is `alpha**2 / 4` [1/s^2].
         duration_s: Duration of the motion [s].
     """
 
@@ -66,7 +66,7 @@ class SpringDamper(NamedTuple):
 
 
 Coupling = Callable[[MotionState, SpringDamper], Array]
-"""Function of the motion's state and spring that returns an acceleration to add, shape (dof,) [m/s^2 or rad/s^2]."""
+"""Function of a motion's state and spring-damper; returns an acceleration to add, shape (dof,) [m/s^2 or rad/s^2]."""
 
 
 class Execution(ABC):
@@ -74,7 +74,7 @@ class Execution(ABC):
 
     Attributes:
         space: Space of the motion's points.
-        state: Present state.
+        state: Current state.
         goal: Point where the motion should end; None for a motion without goal.
     """
 
@@ -101,11 +101,11 @@ class Execution(ABC):
         """Changes the goal of the running motion.
 
         Raises:
-            PlanError: If `goal` is not a point of the space, or the primitive cannot change its goal any more.
+            PlanError: If `goal` is not a point of the space, or it is too late to change the goal.
         """
 
     def miss(self) -> tuple[float, float]:
-        """Returns the present error to the goal; 0 and 0 for a motion without goal.
+        """Returns the current distance from the goal; both values are 0 for a motion without goal.
 
         Returns:
             Largest difference of a position [m or rad], and angle between the orientations [rad].
@@ -113,11 +113,11 @@ class Execution(ABC):
         return (0.0, 0.0) if self.goal is None else self.space.distance(self.state.point, self.goal)
 
     def is_at_goal(self, tolerance: float = TOLERANCE, tolerance_rad: float = TOLERANCE_RAD) -> bool:
-        """Returns whether the planned duration has passed, and the goal is reached.
+        """Returns whether the planned duration has passed and the goal is reached.
 
         Args:
             tolerance: Largest difference of a position from the goal that counts as reached [m or rad].
-            tolerance_rad: Largest angle from the goal that counts as reached [rad].
+            tolerance_rad: Largest angle between the orientations that counts as reached [rad].
         """
         distance, angle_rad = self.miss()
         is_over = self.state.time_s >= self.end_s * (1.0 - 1e-9)
@@ -131,10 +131,10 @@ class Path(Protocol):
     """Time from which the path is at rest [s]."""
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,), at a time since the start."""
+        """Returns the point and the velocity, shape (dof,), at a time since the start [s]."""
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the path from `time_s` on such that it ends at a new goal."""
+        """Changes the path from `time_s` [s] on so that the path ends at a new goal."""
 
 
 class QuinticOffset(NamedTuple):
@@ -142,7 +142,7 @@ class QuinticOffset(NamedTuple):
 
     Attributes:
         start_s: Time at which the polynomial starts [s].
-        duration_s: Duration of the polynomial [s]. Before and after it, the value at its start or end applies.
+        duration_s: Duration of the polynomial [s]. Before its start, its first value is used; after its end, its last.
         difference: The difference, shape (dof,).
         quintic: Coefficients (powers 0 to 5) of the polynomial, whose argument runs from 0 to 1 over the duration.
     """
@@ -162,9 +162,9 @@ class QuinticOffset(NamedTuple):
 
 
 class QuinticPath:
-    """A path from start to goal along a quintic, which arrives after the duration (cf. Muelling 2013, equation 6).
+    """A path along a quintic polynomial, from start to goal in a given duration (cf. Muelling 2013, equation 6).
 
-    A new goal adds another quintic, so that velocity and acceleration stay continuous.
+    A new goal adds another polynomial, so that velocity and acceleration stay continuous.
 
     Args:
         space: Space of the points.
@@ -182,17 +182,17 @@ class QuinticPath:
             self._moves.append(QuinticOffset(0.0, duration_s, velocity * duration_s, COASTING))
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the goal at `time_s` [s].
+        """Changes the goal at the time `time_s` [s].
 
-        The path arrives at the new goal after the duration, or a quarter of the duration after `time_s` if that is
-        later.
+        The path arrives at the new goal at the end of the duration, or a quarter of the duration after `time_s`,
+        whichever is later.
         """
         left_s = max(self._duration_s - time_s, MIN_CHANGE_SHARE * self._duration_s)
         self._moves.append(QuinticOffset(time_s, left_s, self._space.minus(goal, self._goal)))
         self._goal, self.end_s = goal, max(self.end_s, time_s + left_s)
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,), at a time since the start [s]."""
+        """Returns the point and the velocity, shape (dof,), at a time since the start [s]."""
         point, velocity = self._start, np.zeros(self._space.dof)
         for move in self._moves:
             value, rate = move.at(time_s)
@@ -201,20 +201,20 @@ class QuinticPath:
 
 
 class PathExecution(Execution):
-    """A motion that deviates from a path: a spring pulls it to the path, a forcing term and couplings push it away.
+    """A motion that a spring-damper pulls to a path, while a forcing term and couplings push it off the path.
 
-    The deviation follows the same linear equation for all signals (Ijspeert 2013, equation 2.1, with the path in place
-    of the goal). Deviations of orientations are rotation vectors.
+    All components of the deviation from the path follow the same linear equation (Ijspeert 2013, equation 2.1, with the
+    path in place of the goal). Deviations of orientations are rotation vectors.
 
     Args:
         space: Space of the points.
-        spring: The spring that pulls to the path.
+        spring: The spring-damper.
         path: The path.
         forcing: Function of the time since the start [s] that returns an acceleration, shape (dof,) [m/s^2 or rad/s^2].
         goal: Point where the path ends; None for a motion without goal.
 
     Attributes:
-        deviation: Present deviation from the path, and its rate, both of shape (dof,).
+        deviation: Current deviation from the path as the point, and its time derivative as the velocity, shape (dof,).
     """
 
     def __init__(
@@ -256,12 +256,12 @@ class PathExecution(Execution):
         self.goal = checked
 
     def start_at(self, point: Array, velocity: Array) -> None:
-        """Sets the initial state to a point that need not be on the path, with a velocity, shape (dof,)."""
+        """Sets the initial state to a point and a velocity, shape (dof,). The point need not be on the path."""
         shift = self.space.minus(point, self.path.at(0.0)[0])
         self.start_beside(shift, self.space.shift_rate(shift, velocity))
 
     def start_beside(self, shift: Array, rate: Array) -> None:
-        """Sets the initial state to an offset from the path, and the offset's rate, both of shape (dof,)."""
+        """Sets the initial offset from the path, and the offset's time derivative, both of shape (dof,)."""
         self.deviation = MotionState(0.0, shift, rate)
         self.state = self._moved(self.deviation)
 

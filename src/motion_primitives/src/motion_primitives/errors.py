@@ -7,12 +7,12 @@ from custom_ros_tools.errors import InterfaceError
 
 @dataclass(eq=False)
 class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
-    """Base of the errors about invalid input.
+    """Base class of the errors about invalid input.
 
     Attributes:
         subject: Name of the invalid argument or part.
-        expected: Words for the valid input.
-        got: Words for the given input.
+        expected: Description of valid input.
+        got: Description of the given input.
     """
 
     subject: str
@@ -26,12 +26,12 @@ class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
 class DemonstrationError(_UnexpectedInput):
     """A primitive cannot learn from a demonstration, or from a set of demonstrations.
 
-    The subject is `times`, `positions`, `orientations` or `demonstrations`.
+    The attribute `subject` is `times`, `positions`, `orientations` or `demonstrations`.
     """
 
 
 class PlanError(_UnexpectedInput):
-    """A motion cannot be planned as requested. The subject is the argument that does not fit the primitive."""
+    """A motion cannot be planned as requested. `subject` is the argument that does not fit the primitive."""
 
 
 @dataclass(eq=False)
@@ -40,10 +40,10 @@ class GoalNotReachedError(InterfaceError):
 
     Attributes:
         distance: Largest difference of a position from the goal [m or rad].
-        angle_rad: Angle between the orientation and the goal [rad].
+        angle_rad: Angle between the orientation and the goal's orientation [rad].
         duration_s: Duration of the motion when planning stopped [s].
-        tolerance: Largest difference that counts as reached [m or rad].
-        tolerance_rad: Largest angle that counts as reached [rad].
+        tolerance: Largest `distance` at which the goal counts as reached [m or rad].
+        tolerance_rad: Largest `angle_rad` at which the goal counts as reached [rad].
     """
 
     distance: float

@@ -1,4 +1,4 @@
-"""Saves learned primitives as readable YAML files, and loads and checks such files."""
+"""Saves learned primitives in YAML files, and loads and checks these files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PrimitiveFile(ConfigModel):
 def save(primitive: Primitive, path: str | Path) -> None:
     """Writes a learned primitive to a file.
 
-    An existing file is replaced atomically; if writing fails, it stays unchanged.
+    An existing file is replaced atomically; if writing fails, the existing file does not change.
 
     Raises:
         NotLearnedError: If the primitive has not learned yet.
@@ -53,7 +53,7 @@ def load(path: str | Path) -> Primitive:
     """Reads a learned primitive from a file.
 
     Raises:
-        ConfigError: If the file cannot be read or is invalid; the error names file and key of each fault.
+        ConfigError: If the file cannot be read or is invalid; the message names the file and the key of each fault.
         UnknownNameError: If the file names an unknown type of primitive.
     """
     file = str(path)

@@ -30,7 +30,7 @@ Bounds = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class FrameSource(ConfigModel):
-    """A TF frame whose pose is the signal of demonstrations."""
+    """A TF frame whose pose over time is used as a demonstration."""
 
     parent: FrameId = Field(description="The reference frame of the poses.")
     child: FrameId = Field(description="The moving frame.")
@@ -38,14 +38,14 @@ class FrameSource(ConfigModel):
 
 
 class JointSource(ConfigModel):
-    """Joints whose positions are the signals of demonstrations."""
+    """Joints whose positions over time are used as a demonstration."""
 
     topic: TopicName = Field("joint_states", description="Topic of the joint states, in bags too.")
     names: ListOf[Text] = Field(min_length=1, description="The joints, in the order of points.")
 
 
 class SourceConfig(ConfigModel):
-    """Source of the signals in demonstrations: either a TF frame or joints."""
+    """Source of demonstrations: either a TF frame or joints."""
 
     tf: FrameSource | None = optional("A TF frame.")
     joints: JointSource | None = optional("Joints of a robot.")
@@ -58,7 +58,7 @@ class SourceConfig(ConfigModel):
 
     @property
     def space(self) -> Space:
-        """Space of the source's points."""
+        """Space of the points that the source provides."""
         if self.joints is not None:
             return Space(tuple(self.joints.names))
         return Space(POSE, self.tf is not None and self.tf.orientation)
@@ -87,7 +87,7 @@ class SignalOutput(ConfigModel):
 
 
 class OutputConfig(ConfigModel):
-    """Outputs of executed motions; several outputs can be used at the same time."""
+    """Topics and TF frame to which executed motions are published; several can be used at the same time."""
 
     tf: FrameOutput | None = optional("A TF frame, if the source is one.")
     joints: JointOutput | None = optional("Joint targets, if the source are joints.")
@@ -108,7 +108,7 @@ class ObstacleConfig(ConfigModel):
 
 
 class CouplingConfig(ConfigModel):
-    """How an executed motion yields to forces and avoids obstacles."""
+    """Couplings with which an executed motion yields to forces and avoids obstacles."""
 
     force_stiffness: Annotated[Positive, Unit("N/m")] | None = optional(
         "Stiffness with which positions yield to forces on `primitive/wrench`, in the axes of the source's parent."
@@ -119,7 +119,7 @@ class CouplingConfig(ConfigModel):
     obstacles: ListOf[ObstacleConfig] = Field((), description="Balls to avoid.")
 
     def force(self, space: Space) -> ForceCoupling | None:
-        """Makes the coupling to forces; returns None if no `force_stiffness` is configured."""
+        """Makes the coupling to forces; returns None if `force_stiffness` is not configured."""
         if self.force_stiffness is None:
             return None
         stiffness = [self.force_stiffness] * len(space.names)

@@ -23,9 +23,9 @@ from .space import Space
 DT_S = 0.01
 """Default time between two points of a plan [s]."""
 MAX_LONGER = 3.0
-"""Multiple of the planned duration after which a goal that is still not reached counts as unreachable."""
+"""Multiple of the planned duration after which a goal that has not been reached counts as unreachable."""
 MIN_STEPS, MAX_STEPS = 20, 1_000_000
-"""Least and largest number of steps within a plan's duration. Time steps that give fewer steps are reduced; time
+"""Smallest and largest number of steps within a plan's duration. Time steps that give fewer steps are reduced, and time
 steps that give more steps are rejected."""
 
 
@@ -35,7 +35,7 @@ class ViaPoint(NamedTuple):
     Attributes:
         progress: Time at which the motion passes the point, as a fraction of the duration.
         point: The point, see `Space`.
-        std: Standard deviation of the passing motions from the point [m or rad].
+        std: Standard deviation from the point that is allowed when the motion passes it [m or rad].
     """
 
     progress: float
@@ -87,11 +87,11 @@ class PrimitiveConfig(ConfigModel):
 
 
 class Primitive(ABC):
-    """Base class of primitives, which learn a motion from demonstrations and repeat it with other starts and goals.
+    """Base class of primitives, which learn a motion from demonstrations and repeat it with new starts and goals.
 
     Attributes:
         Config: Pydantic model of the options.
-        Learned: Pydantic model of the learned data, for files.
+        Learned: Pydantic model of the learned data in files.
         config: The options.
         space: Space of the motion's points; available after `learn` or `restore`.
     """
@@ -120,7 +120,7 @@ class Primitive(ABC):
         return self._space
 
     def learn(self, demonstrations: Demonstration | Sequence[Demonstration]) -> Primitive:
-        """Learns from demonstrations, replaces all data learned before, and returns the primitive itself.
+        """Learns from demonstrations, which replaces all data learned before, and returns the primitive itself.
 
         Raises:
             DemonstrationError: If the demonstrations have different spaces, or are unsuitable for the primitive.
@@ -143,8 +143,8 @@ class Primitive(ABC):
 
         Args:
             start: First point; by default the demonstrations' mean first point.
-            goal: Last point, or centre of a rhythmic motion; by default the demonstrations' mean.
-            duration_s: Duration [s]; by default the demonstrations' mean.
+            goal: Last point, or centre of a rhythmic motion; by default the mean of the demonstrations' goals.
+            duration_s: Duration [s]; by default the demonstrations' mean duration.
             via_points: Points that the motion passes through, for primitives that support via-points.
             velocity: Velocity at the start, shape (dof,) [m/s or rad/s]; by default 0.
 
@@ -176,16 +176,16 @@ class Primitive(ABC):
         tolerance: float = TOLERANCE,
         tolerance_rad: float = TOLERANCE_RAD,
     ) -> MotionPlan:
-        """Plans a whole motion, from start to goal; for the first five arguments see `begin`.
+        """Plans a whole motion, from start to goal.
 
-        The plan lasts longer than the duration if the goal is reached later, because of couplings or of the type of the
-        primitive.
+        For the arguments from `start` to `velocity`, see `begin`. The plan is longer than the duration if the goal is
+        reached later, which may be caused by couplings or by the type of the primitive.
 
         Args:
             dt_s: Largest time between two points [s]. The actual time divides the duration into equal steps.
             couplings: Functions that return accelerations to add, see `Coupling`.
             tolerance: Largest difference of a position from the goal that counts as reached [m or rad].
-            tolerance_rad: Largest angle from the goal that counts as reached [rad].
+            tolerance_rad: Largest angle between the orientations that counts as reached [rad].
 
         Raises:
             NotLearnedError: If the primitive has not learned yet.
@@ -207,7 +207,7 @@ class Primitive(ABC):
         return MotionPlan(self.space, times, points, velocities)
 
     def learned(self) -> ConfigModel:
-        """Returns the learned data, for files.
+        """Returns the learned data, to be saved in a file.
 
         Raises:
             NotLearnedError: If the primitive has not learned yet.
@@ -217,14 +217,14 @@ class Primitive(ABC):
         return self._learned()
 
     def restore(self, space: Space, learned: Any) -> None:
-        """Sets the learned data to the content of a file.
+        """Replaces the learned data by the content of a file.
 
         Args:
             space: Space of the motion's points.
             learned: The learned data, an instance of `Learned`.
 
         Raises:
-            ValueError: If sizes in the data do not fit the space or the options.
+            ValueError: If array sizes in the data do not fit the space or the options.
         """
         self._restore(space, learned)
         self._space = space
@@ -244,7 +244,7 @@ class Primitive(ABC):
         via_points: Sequence[ViaPoint],
         velocity: Array,
     ) -> Execution:
-        """Begins a motion; `begin` has checked the arguments."""
+        """Begins a motion with arguments that `begin` has checked."""
 
     @abstractmethod
     def _learned(self) -> ConfigModel:
@@ -260,8 +260,8 @@ def check_shape(values: Any, shape: Mapping[str, int], subject: str) -> Array:
 
     Args:
         values: The numbers.
-        shape: Expected size of each array dimension, by the dimension's name for messages.
-        subject: Name of the numbers in messages.
+        shape: Expected size of each array dimension, indexed by the dimension's name in error messages.
+        subject: Name of the numbers in error messages.
 
     Raises:
         ValueError: If the shape differs.

@@ -1,7 +1,7 @@
 """Dynamic movement primitives as in the original `dmp` package, for old clients; one primitive for each dimension.
 
-The forcing term is stored as samples over time, as a fraction of the duration, and interpolated linearly. New code
-should use `PRIMITIVES`, whose motions are smooth, end on time, and may include orientations.
+The forcing term is stored as samples at fractions of the duration, and interpolated linearly. New code should use
+`PRIMITIVES`, whose motions are smooth, end on time, and may include orientations.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .demonstration import check_increasing, checked_array
 from .errors import DemonstrationError, PlanError
 
 MIN_SAMPLES = 3
-"""Least number of samples of a demonstration."""
+"""Smallest number of samples in a demonstration."""
 LONGEST_S = 1000.0
 """Duration after which a plan ends, even if the goal is not reached [s]."""
 MAX_STEPS = 1_000_000
@@ -34,11 +34,11 @@ class ReleaseDMP:
     """A primitive of one dimension.
 
     Attributes:
-        k_gain: Stiffness.
-        d_gain: Damping.
+        k_gain: Stiffness for a duration of 1 s [1/s^2].
+        d_gain: Damping for a duration of 1 s [1/s].
         weights: Weights of Gaussians that approximate the forcing term; used if `f_domain` is empty.
         f_domain: Increasing times of the forcing term's samples, as fractions of the duration.
-        f_targets: Samples of the forcing term at these times, divided by the phase.
+        f_targets: Samples of the forcing term at the times `f_domain`, divided by the phase.
     """
 
     k_gain: float
@@ -143,17 +143,18 @@ def plan(
 ) -> ReleasePlan:
     """Plans a motion by integration with Euler's method.
 
-    By default, the plan ends when the time tau has passed and the goal is reached, but after 1000 s at the latest.
+    Without `seg_length`, the plan ends when the time tau has passed and the goal is reached, but after 1000 s at the
+    latest.
 
     Args:
         primitives: One primitive for each of n dimensions.
         x_0: n start positions.
         x_dot_0: n start velocities, per second.
-        t_0: Time within the primitives at which the motion starts [s].
+        t_0: Time within the primitives' duration at which the motion starts [s].
         goal: n goal positions.
-        goal_thresh: For each dimension, the largest distance from the goal that counts as reached. Dimensions with an
-            entry of 0 or less are ignored.
-        seg_length: Duration of the plan [s]; 0 or less to plan until the goal is reached.
+        goal_thresh: n largest distances from the goal that count as reached. Dimensions with a value of 0 or less are
+            ignored.
+        seg_length: Duration of the plan [s]. With 0 or less, the plan ends when the goal is reached.
         tau: Duration of the primitives [s].
         dt: Time between two points [s].
         integrate_iter: Number of integration steps between two points.

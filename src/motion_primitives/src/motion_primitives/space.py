@@ -1,9 +1,9 @@
 """Spaces of motions: n positions, and optionally one orientation.
 
-A point is an array of n positions. In a space with an orientation, the unit quaternion x, y, z, w follows. A difference
-between two points has n numbers, and a rotation vector if there is an orientation. A velocity has n numbers, and an
-angular velocity if there is an orientation. Rotation vectors and angular velocities are about the fixed axes. So the
-same formulas hold for positions and orientations.
+A point is an array of n positions. In a space with an orientation, a unit quaternion x, y, z, w follows the positions.
+A difference between two points has n numbers, followed by a rotation vector if there is an orientation. A velocity has
+n numbers, followed by an angular velocity if there is an orientation. Rotation vectors and angular velocities are in
+the axes of the fixed frame. So the same formulas hold for positions and orientations.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from robot_model.geometry import normalized, quaternion_of, quaternion_product, 
 from .errors import PlanError
 
 QUATERNION = ("qx", "qy", "qz", "qw")
-"""Names of the four numbers of an orientation."""
+"""Names of an orientation's four numbers."""
 POSE = ("x", "y", "z")
 """Names of the three positions of a pose."""
 ROUNDING = 1e-12
 MIN_NORM, MAX_NORM = 0.9, 1.1
-"""A quaternion with a length in this range is normalised; other quaternions are rejected."""
+"""Range of quaternion lengths that are accepted and normalised to 1."""
 
 
 class Space(NamedTuple):
@@ -58,8 +58,8 @@ class Space(NamedTuple):
             subject: Name of the point in messages, such as `goal`.
 
         Raises:
-            PlanError: If there are too many or too few numbers, a number is not finite, or the quaternion's length is
-                not about 1.
+            PlanError: If the count of numbers is wrong, a number is not finite, or the quaternion's length is not
+                about 1.
         """
         try:
             point = finite_vector(values, len(self.point_names), subject).copy()
@@ -77,7 +77,7 @@ class Space(NamedTuple):
         return point
 
     def minus(self, end: Array, start: Array) -> Array:
-        """Returns the difference from `start` to `end`, shape (dof,), with the shorter rotation for orientations."""
+        """Returns the difference from `start` to `end`, shape (dof,). The rotation takes the shorter way."""
         if not self.has_orientation:
             return end - start
         n = len(self.names)
@@ -85,7 +85,7 @@ class Space(NamedTuple):
         return np.array([*(end[:n] - start[:n]).tolist(), *rotation])
 
     def plus(self, start: Array, difference: Array) -> Array:
-        """Returns the point at the difference `difference`, shape (dof,), from `start`; inverts `minus`."""
+        """Adds a difference, shape (dof,), to the point `start`, and returns the resulting point; inverts `minus`."""
         if not self.has_orientation:
             return start + difference
         n = len(self.names)
@@ -94,13 +94,13 @@ class Space(NamedTuple):
         return np.array([*(start[:n] + difference[:n]).tolist(), *quat])
 
     def shift_rate(self, shift: Array, velocity: Array) -> Array:
-        """Converts a velocity to the time derivative of a difference, both of shape (dof,).
+        """Converts the velocity of a point to the time derivative of the point's difference, both of shape (dof,).
 
-        The two differ for orientations: the derivative of a rotation vector is not the angular velocity.
+        They differ for orientations, since the derivative of a rotation vector is not the angular velocity.
 
         Args:
-            shift: Difference from a fixed point to the present point.
-            velocity: Velocity of the present point.
+            shift: Difference from a fixed point to the moving point.
+            velocity: Velocity of the moving point.
         """
         n = len(self.names)
         if not self.has_orientation or not shift[n:].any():
@@ -118,8 +118,10 @@ class Space(NamedTuple):
         return np.asarray(np.gradient(path, times, axis=0))
 
     def distance(self, a: Array, b: Array) -> tuple[float, float]:
-        """Returns the largest position difference of two points [m or rad], and the angle between their orientations
-        [rad]. The angle is 0 for a space without orientation."""
+        """Returns the largest position difference [m or rad] and the angle between orientations [rad] of two points.
+
+        In a space without orientation, the angle is 0.
+        """
         difference, n = self.minus(a, b), len(self.names)
         return float(np.abs(difference[:n]).max(initial=0.0)), math.hypot(*difference[n:].tolist())
 
@@ -132,7 +134,7 @@ class Space(NamedTuple):
 
 
 MEAN_ITERATIONS = 10
-"""Number of iterations for the mean of orientations. Each iteration reduces the error by a large factor, unless
+"""Number of iterations to compute the mean of orientations. Each iteration reduces the error by a large factor, unless
 orientations are half a turn apart."""
 
 

@@ -1,4 +1,4 @@
-"""The table of primitives. To add a primitive, write a class in a file of its own, and add a line to the table."""
+"""The table of primitives. To add a primitive, write a class in a new file, and add a line to the table."""
 
 from custom_ros_tools.plugin_table import PluginTable
 from motion_primitives.primitive import Primitive

@@ -30,7 +30,7 @@ from motion_primitives.space import Space
 QUADRATURE_POINTS = 4001
 """Number of points for numerical integration with Simpson's rule, see `DMP._rest_at_end`."""
 MAX_DEVIATION_RAD = 0.95 * math.pi
-"""Largest angle between a demonstrated orientation and the path [rad]. Near pi, the shorter rotation is ambiguous."""
+"""Largest rotation from the path to a demonstrated orientation [rad]. Near pi, its direction is ambiguous."""
 
 
 class DMPConfig(PrimitiveConfig):
@@ -54,17 +54,17 @@ class LearnedDMP(ConfigModel):
 
 
 def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: MotionState) -> Array:
-    """Returns the acceleration of the spring-damper that pulls to the goal, shape (dof,) [m/s^2 or rad/s^2].
+    """Returns the acceleration of a spring-damper that pulls a motion to its goal, shape (dof,) [m/s^2 or rad/s^2].
 
-    Positions follow Ijspeert 2013, equation 2.1; orientations follow Ude 2014, equation 16. The goal pulls weakly at
-    first (Hoffmann 2009, equation 7), so that a different goal does not cause a jump at the start.
+    Positions follow Ijspeert 2013, equation 2.1; orientations follow Ude 2014, equation 16. At first, the pull is weak
+    (Hoffmann 2009, equation 7), so that a goal other than the demonstrated goal does not cause a jump at the start.
 
     Args:
         space: Space of the points.
         spring: The spring-damper.
         start: First point.
         goal: Last point.
-        state: Present state of the motion.
+        state: Current state of the motion.
     """
     phase = math.exp(-DECAY * state.time_s / spring.duration_s)
     distance = space.minus(goal, state.point) - phase * space.minus(goal, start)
@@ -97,7 +97,7 @@ class FixedGoalExecution(Execution):
 
     @property
     def end_s(self) -> float:
-        """Planned duration [s]. The goal is reached some time after it."""
+        """Planned duration [s]. The goal is reached some time after this duration."""
         return self._spring.duration_s
 
     def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
@@ -113,15 +113,15 @@ class FixedGoalExecution(Execution):
         return self.state
 
     def set_goal(self, goal: ArrayLike) -> None:
-        """Changes the goal, which causes a jump of the acceleration."""
+        """Changes the goal, which makes the acceleration jump."""
         self.goal = self.space.point(goal, "goal")
 
 
 class DMP(Primitive):
     """A discrete dynamic movement primitive, which keeps the demonstrated shape for every start and goal.
 
-    The option `attractor` selects the equation. With `moving`, the motion is a `PathExecution`. With `fixed`, it is a
-    `FixedGoalExecution`, as in Ijspeert 2013 and Ude 2014. Positions and orientations have the same phase.
+    The option `attractor` selects the equation of motion. With `moving`, the motion is a `PathExecution`. With `fixed`,
+    the motion is a `FixedGoalExecution`, as in Ijspeert 2013 and Ude 2014. Positions and orientations share one phase.
     """
 
     Config = DMPConfig
@@ -143,12 +143,12 @@ class DMP(Primitive):
         self._duration_s = float(np.mean([each.duration_s for each in demonstrations]))
 
     def _forces_beside_path(self, space: Space, demonstration: Demonstration, name: str) -> Array:
-        """Computes the forcing term for the moving attractor at each of m samples, for a duration of 1 s.
+        """Computes the forcing term at each of m samples, with the attractor `moving` and a duration of 1 s.
 
         Args:
             space: Space of the points.
             demonstration: The demonstration.
-            name: Name of the demonstration in messages.
+            name: Name of the demonstration in error messages.
 
         Returns:
             Accelerations, shape (m, dof).
@@ -166,7 +166,7 @@ class DMP(Primitive):
         return np.asarray(np.gradient(rates, progress, axis=0) + spring.stiffness * shifts + spring.damping * rates)
 
     def _forces_to_goal(self, space: Space, demonstration: Demonstration) -> Array:
-        """Computes the forcing term for the fixed attractor at each of m samples, for a duration of 1 s.
+        """Computes the forcing term at each of m samples, with the attractor `fixed` and a duration of 1 s.
 
         Returns:
             Accelerations, shape (m, dof).
@@ -181,9 +181,9 @@ class DMP(Primitive):
     def _rest_at_end(self, basis: GaussianBasis) -> Array:
         """Returns four linear constraints on the weights, shape (4, k), see `fitted`.
 
-        The deviation from the path is the response of a critically damped spring to the forcing term. The constraints
-        make the deviation and its rate 0 at the end, and the forcing term 0 at start and end. Deviation and rate at the
-        end are integrals over the forcing term.
+        The constraints make the deviation from the path and its time derivative 0 at the end, and the forcing term 0 at
+        start and end. The deviation is the response of a critically damped spring to the forcing term. So deviation and
+        derivative at the end are integrals over the forcing term.
         """
         u = np.linspace(0.0, 1.0, QUADRATURE_POINTS)
         simpson = np.where(np.arange(len(u)) % 2, 4.0, 2.0)

@@ -20,19 +20,19 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space, angular_velocity
 
 MAX_ANGLE_RAD = 0.95 * math.pi
-"""Largest angle between a demonstrated orientation and the mean [rad]. Near pi, rotation vectors are ambiguous."""
+"""Largest rotation from the mean orientation to a demonstrated orientation [rad]. Near pi, its axis is ambiguous."""
 PRIOR_SHARE = 0.1
 """Standard deviation of the prior, as a fraction of the motion's extent."""
 PRIOR_LENGTH = 0.2
 """Correlation length of the prior over time, as a fraction of the duration."""
 MIN_EXTENT = 0.01
-"""Least extent of a motion; smaller extents are replaced by this value [m or rad]."""
+"""Smallest extent of a motion that is used; smaller extents are replaced by this value [m or rad]."""
 SAMPLES_OF_MEAN = 50
-"""Approximate number of samples of each demonstration that the mean orientation is computed from."""
+"""Approximate number of samples from each demonstration that are used to compute the mean orientation."""
 END_WEIGHT = 100.0
-"""Weight of the error at the first and the last sample of a fit, so that the demonstrated start and goal are kept."""
+"""Factor of the errors at the first and last sample in a fit, so that the demonstrated start and goal are kept."""
 EXACT_STD = 1e-6
-"""Standard deviation of exactly known points, such as start and goal [m or rad]."""
+"""Standard deviation of points that are known exactly, such as start and goal [m or rad]."""
 LAST_CHANGE = 0.9
 """Time up to which the goal can be changed, as a fraction of the duration."""
 LOOKS = np.linspace(0.0, 1.0, 201)
@@ -73,18 +73,20 @@ class WeightDistribution(NamedTuple):
     """Normal distribution of the weights of d signals with k basis functions each.
 
     Attributes:
-        mean: Mean of the weights, shape (d k,): first the k weights of the first signal, and so on.
-        covariance: Covariance of the weights, shape (d k, d k).
+        mean: Mean of the weights, shape (d * k,): k weights of the first signal, k weights of the second, and so on.
+        covariance: Covariance of the weights, shape (d * k, d * k).
     """
 
     mean: Array
     covariance: Array
 
     def given(self, rows: Array, values: Array, variances: Array) -> WeightDistribution:
-        """Conditions the distribution on c observations, linear functions of the weights (Paraschos 2013, equation 5).
+        """Returns the distribution after conditioning on c observations (Paraschos 2013, equation 5).
+
+        The observations are linear functions of the weights.
 
         Args:
-            rows: Coefficients of the linear functions, shape (c, d k).
+            rows: Coefficients of the linear functions, shape (c, d * k).
             values: Observed values, shape (c,).
             variances: Variances of the observations, shape (c,).
         """
@@ -95,10 +97,10 @@ class WeightDistribution(NamedTuple):
 
 
 class Known(NamedTuple):
-    """A known point of a motion, or a known time derivative, to condition a distribution on.
+    """A known point of a motion, or its known time derivative, on which a distribution is conditioned.
 
     Attributes:
-        subject: Name for messages.
+        subject: Name for error messages.
         progress: Time at which the point is known, as a fraction of the duration.
         values: Coordinates of the point, or their time derivatives for a duration of 1 s, shape (dof,).
         std: Standard deviation of each value [m or rad].
@@ -113,7 +115,7 @@ class Known(NamedTuple):
 
 
 class MeanPath:
-    """The path of a ProMP: the mean motion of its distribution, conditioned on known points and on the goal.
+    """The path of a ProMP: the mean motion of the ProMP's distribution, conditioned on known points and on the goal.
 
     Args:
         primitive: The primitive.
@@ -130,7 +132,7 @@ class MeanPath:
         self._distribution = self._to(self._known, goal)
 
     def _to(self, known: Sequence[Known], goal: Array | None, progress: float = 0.0) -> WeightDistribution:
-        """Conditions the distribution on known points and on a goal, and checks the mean motion from `progress` on."""
+        """Conditions the distribution on known points and a goal, and checks the new mean motion from `progress` on."""
         primitive = self._primitive
         to_goal = [] if goal is None else [Known("goal", 1.0, primitive.coordinates(goal))]
         distribution = primitive.given(primitive.distribution, [*known, *to_goal])
@@ -138,12 +140,12 @@ class MeanPath:
         return distribution
 
     def at(self, time_s: float) -> tuple[Array, Array]:
-        """Returns point and velocity, shape (dof,), at a time since the start [s]."""
+        """Returns the point and the velocity, shape (dof,), at a time since the start [s]."""
         point, velocity = self._primitive.mean_at(self._distribution, time_s / self.end_s)
         return point, velocity / self.end_s
 
     def set_goal(self, goal: Array, time_s: float) -> None:
-        """Changes the goal: conditions the distribution on the mean motion's present state and on the new goal.
+        """Changes the goal by conditioning the distribution on the mean motion's current state and on the new goal.
 
         Raises:
             PlanError: If more than 90 % of the duration have passed, or the new mean motion is invalid.
@@ -193,7 +195,7 @@ class ProMP(Primitive):
 
         Args:
             space: Space of the points.
-            origin: Point with the mean orientation; its positions are 0.
+            origin: Point with the demonstrations' mean orientation, and positions 0.
             duration_s: Mean duration of the demonstrations [s].
             weights: Weights of N demonstrations with k basis functions, shape (N, dof, k).
         """
@@ -215,7 +217,7 @@ class ProMP(Primitive):
     def _prior_stds(self, space: Space, weights: Array) -> Array:
         """Returns the prior's standard deviation for each signal, shape (dof,).
 
-        All positions have the same value, and so have all components of the rotation vector.
+        All positions share one value, and all components of the rotation vector share another value.
         """
         extents, n = np.ptp(weights, axis=1), len(space.names)
         parts = (part for part in (extents[:n], extents[n:]) if len(part))
@@ -252,7 +254,7 @@ class ProMP(Primitive):
         return PathExecution(self.space, spring, path, lambda _: rest, path.at(duration)[0] if goal is None else goal)
 
     def given(self, distribution: WeightDistribution, known: Sequence[Known]) -> WeightDistribution:
-        """Conditions a distribution of weights on known points and rates."""
+        """Returns a distribution of weights after conditioning on known points and time derivatives."""
         rows = np.vstack([self.rows(each.progress, each.is_rate) for each in known])
         stds = np.array([max(each.std, EXACT_STD) for each in known])
         return distribution.given(rows, np.concatenate([each.values for each in known]), np.repeat(stds**2, self._dof))
@@ -264,7 +266,7 @@ class ProMP(Primitive):
 
         Args:
             distribution: Distribution of the weights.
-            known: Points that the motion should pass through; rates are ignored.
+            known: Points that the motion should pass through; known time derivatives are ignored.
             duration_s: Duration of the motion [s].
             progress: Time at which the check begins, as a fraction of the duration.
 
@@ -293,7 +295,7 @@ class ProMP(Primitive):
                 raise PlanError(each.subject, expected, f"a miss by {distance:.3g} and {angle:.3g} rad")
 
     def _check_reach(self, subject: str, path: Array, times_s: Array) -> None:
-        """Rejects positions, shape (n, m), at m times if they are too far from the demonstrated positions."""
+        """Raises a PlanError if positions at m times, shape (n, m), are too far from the demonstrated positions."""
         least, most, reach = self._least[: len(path)], self._most[: len(path)], self.config.reach
         room = reach * max(float((most - least).max()), MIN_EXTENT)
         beyond = np.maximum(least[:, None] - path, path - most[:, None])
@@ -304,7 +306,7 @@ class ProMP(Primitive):
             raise PlanError(subject, expected, f"{path[index, at]:.3g} at {times_s[at]:.3g} s")
 
     def rows(self, progress: float, is_rate: bool = False) -> Array:
-        """Returns the matrix from all weights to the coordinates at a time, shape (dof, dof k).
+        """Returns the matrix that maps all weights to the coordinates at a time, shape (dof, dof * k).
 
         Args:
             progress: The time, as a fraction of the duration.
@@ -314,7 +316,7 @@ class ProMP(Primitive):
         return np.kron(np.eye(self._dof), basis(np.array(progress)))
 
     def coordinates(self, point: Array) -> Array:
-        """Converts a point to coordinates (dof,): positions, and rotation vector from the mean orientation."""
+        """Converts a point to coordinates, shape (dof,): positions, and rotation vector from the mean orientation."""
         return self.space.minus(point, self._origin)
 
     def mean_at(self, distribution: WeightDistribution, progress: float) -> tuple[Array, Array]:
@@ -338,7 +340,7 @@ class ProMP(Primitive):
 
         Args:
             progress: m times, as fractions of the duration.
-            distribution: Distribution of the weights, such as `conditioned` returns; by default the learned one.
+            distribution: Distribution of the weights, such as `conditioned` returns. None: the learned distribution.
         """
         k = len(self._basis.centers)
         covariance = (distribution or self.distribution).covariance.reshape(self._dof, k, self._dof, k)
@@ -347,7 +349,7 @@ class ProMP(Primitive):
         return np.asarray(np.sqrt(np.maximum(np.einsum("mk,dkl,ml->md", values, blocks, values), 0.0)))
 
     def conditioned(self, via_points: Sequence[ViaPoint]) -> WeightDistribution:
-        """Returns the distribution of the weights of motions that pass through via-points.
+        """Returns the distribution of the weights after conditioning on via-points.
 
         Raises:
             PlanError: If a via-point is not a point of the space.

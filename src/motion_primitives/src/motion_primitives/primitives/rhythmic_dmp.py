@@ -21,9 +21,9 @@ from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, ch
 from motion_primitives.space import Space
 
 MIN_CORRELATION = 0.7
-"""Least autocorrelation, at a lag of one period, of a motion that counts as periodic."""
+"""Smallest autocorrelation, at a lag of one period, at which a motion counts as periodic."""
 MIN_CYCLES = 1.5
-"""Least number of periods in a demonstration if the option `period_s` is not set."""
+"""Smallest number of periods in a demonstration if the option `period_s` is not set."""
 SETTLING_CYCLES, STEPS_PER_CYCLE = 2, 100
 """Number of periods until a motion has settled on its limit cycle, and number of integration steps per period."""
 
@@ -47,7 +47,7 @@ class LearnedRhythmicDMP(ConfigModel):
 
 
 class RhythmicExecution(PathExecution):
-    """A rhythmic motion, which ends after a duration.
+    """A rhythmic motion that ends after a given duration.
 
     Args:
         primitive: The primitive.
@@ -55,7 +55,7 @@ class RhythmicExecution(PathExecution):
         duration_s: Duration of the motion [s].
 
     Attributes:
-        amplitude: Amplitude, as a multiple of the demonstrated amplitude. Callers may set it at any time.
+        amplitude: Amplitude, as a multiple of the demonstrated amplitude. Callers may change the amplitude at any time.
         cycles: Number of periods since the start.
     """
 
@@ -73,7 +73,7 @@ class RhythmicExecution(PathExecution):
 
     @property
     def period_s(self) -> float:
-        """Period of the motion [s]. Callers may set it at any time."""
+        """Period of the motion [s]. Callers may change the period at any time."""
         return self.spring.duration_s
 
     @period_s.setter
@@ -89,7 +89,7 @@ class RhythmicExecution(PathExecution):
     def set_goal(self, goal: ArrayLike) -> None:
         """Moves the centre of the motion to `goal`.
 
-        The centre arrives at the end of the first period, or a quarter of a period after the call if that is later.
+        The centre arrives at the end of the first period, or a quarter of a period after the call, whichever is later.
         """
         super().set_goal(goal)
         self.goal = None
@@ -102,10 +102,10 @@ class RhythmicExecution(PathExecution):
 
 
 def checked_period(period_s: float) -> float:
-    """Checks a period [s], and returns it.
+    """Checks and returns a period [s].
 
     Raises:
-        PlanError: If the period is not finite and above 0.
+        PlanError: If the period is not a finite number above 0.
     """
     if not 0.0 < period_s < math.inf:
         raise PlanError("period", "a finite time above 0 s", f"{period_s}")
@@ -118,7 +118,7 @@ class RhythmicDMP(Primitive):
     The motion is a limit cycle, see Ijspeert 2013, equations 2.7 to 2.9.
 
     Attributes:
-        period_s: Period of motions that begin later [s]; after learning, the period of the demonstrations.
+        period_s: Period of motions that begin later [s]. Learning sets the value to the demonstrations' period.
         amplitude: Amplitude of motions that begin later, as a multiple of the demonstrated amplitude.
     """
 
@@ -172,7 +172,7 @@ class RhythmicDMP(Primitive):
         self._find_start(space)
 
     def _find_start(self, space: Space) -> None:
-        """Finds start and initial velocity of the limit cycle: integrates the motion until it has settled."""
+        """Computes start and initial velocity of the limit cycle by integrating the motion until it has settled."""
         self._space = space
         settling = RhythmicExecution(self, self._learned_center, self._period_s)
         settling.amplitude = 1.0
@@ -217,7 +217,7 @@ class RhythmicDMP(Primitive):
 
 
 def _period_of(space: Space, demonstration: Demonstration, center: Array) -> float:
-    """Estimates the period of a demonstration [s]: the first peak of its autocorrelation, refined by a fit.
+    """Estimates the period of a demonstration [s] from the first peak of the autocorrelation, refined by a fit.
 
     Raises:
         DemonstrationError: If the demonstration is not periodic.
@@ -247,12 +247,12 @@ def _period_of(space: Space, demonstration: Demonstration, center: Array) -> flo
 
 
 def _shift_of(basis: PeriodicBasis, cycle: Array, cycles: Array, path: Array) -> float:
-    """Finds the phase shift with which a learned cycle fits best to a demonstration.
+    """Finds the phase shift with which a learned cycle best fits a demonstration.
 
     Args:
         basis: The basis functions.
         cycle: Weights of the learned cycle, shape (dof, k).
-        cycles: m times of the demonstration, as numbers of periods since its start.
+        cycles: m times of the demonstration, as numbers of periods since the demonstration's start.
         path: m deviations of the demonstration from its centre, shape (m, dof).
 
     Returns:

@@ -43,7 +43,7 @@ class DMPDataCollector:
             self._times, self._samples = [], []
 
     def start(self) -> None:
-        """Starts recording, and keeps earlier samples."""
+        """Starts recording without deleting earlier samples."""
         self.is_on = True
 
     def stop(self) -> None:
@@ -55,7 +55,7 @@ class DMPDataCollector:
 
         Args:
             time_s: Time of the sample [s].
-            sample: The numbers.
+            sample: The numbers of the sample, shape (dims,).
         """
         with self._lock:
             if not self._times or time_s > self._times[-1]:
@@ -92,7 +92,7 @@ class TFPositionDMPDataCollector(DMPDataCollector):
     Args:
         parent: Name of the reference frame.
         child: Name of the frame whose position is recorded.
-        hz: Rate at which TF is read [Hz]. Transforms are skipped until their stamp increases.
+        hz: Rate at which TF is read [Hz]. A transform is recorded only if its stamp has increased.
         zero_time: See `DMPDataCollector`.
         collect_x: Whether x is recorded.
         collect_y: Whether y is recorded.

@@ -26,14 +26,14 @@ from motion_primitives.errors import DemonstrationError
 from motion_primitives.release_dmp import ReleaseDMP, learn, plan
 
 Gains = float | Sequence[float]
-"""One gain for each dimension, or one number for all dimensions."""
+"""One gain for each dimension, or one gain for all dimensions."""
 
 
 class DMPServer:
-    """Learns primitives of one dimension each, and plans motions with the active primitives.
+    """Learns one primitive for each dimension, and plans motions with the active primitives.
 
-    If a request is invalid, the service call fails with a message that names the field, and the active primitives do
-    not change. Only `set_active_dmp` logs the message instead, and answers `success=False`.
+    If a request is invalid, the active primitives do not change, and the service call fails with a message that names
+    the field. `set_active_dmp` does not fail: it logs the message and responds with `success=False`.
     """
 
     def __init__(self) -> None:
@@ -107,8 +107,8 @@ class DMPProcessor:
         Args:
             t: N times [s].
             traj: Positions, shape (dims, N).
-            k: Stiffness.
-            d: Damping.
+            k: Stiffness, see `ReleaseDMP`.
+            d: Damping, see `ReleaseDMP`.
             num_bases: Number of Gaussians to fit, see `release_dmp.learn`.
 
         Returns:
@@ -136,14 +136,16 @@ class DMPProcessor:
         dt: float,
         integrate_iter: int,
     ) -> tuple[bool, Array | None, Array | None, Array | None]:
-        """Makes learned primitives active, and plans a motion with them.
+        """Makes learned primitives active, and plans a motion with these primitives.
+
+        For the other arguments, see `release_dmp.plan`.
 
         Args:
-            dmp: Response of `learn_dmp`. For the other arguments, see `release_dmp.plan`.
+            dmp: Response of `learn_dmp`.
 
         Returns:
-            Four values: whether the plan ends at the goal, N times [s], N positions, and N velocities, both of shape
-            (dims, N). If a service refused the request, False and three times None.
+            Whether the plan ends at the goal, N times [s], positions of shape (dims, N), and velocities of shape
+            (dims, N). If a service refused the request, False, None, None and None.
         """
         lists = (np.asarray(each, dtype=float).tolist() for each in (pos0, vel0, goal, goal_thresh))
         x_0, x_dot_0, end, near = lists

@@ -1,4 +1,4 @@
-"""`primitives_node.py`: learns movement primitives from demonstrations, plans with them and executes them."""
+"""`primitives_node.py`: learns movement primitives from demonstrations, plans motions and executes motions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ NODE = "primitives_node"
 STATE_HZ = 10.0
 """Rate at which the state is published, in addition to each change of the mode [Hz]."""
 MAX_STEP_S, MAX_TICK_S = 0.01, 0.1
-"""Longest integration step, and longest time by which a motion advances per tick, even if the tick is late [s]."""
+"""Longest integration step, and longest time by which a motion advances in one tick, even if the tick is late [s]."""
 MAX_SAMPLES = 1_000_000
 """Largest number of samples in a recording; later samples are ignored."""
 NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -53,7 +53,7 @@ Answer = tuple[bool, str]
 
 
 class PrimitivesNode:
-    """Offers services that record demonstrations, learn a primitive, plan motions and execute them.
+    """Offers services that record demonstrations, learn a primitive, plan motions and execute motions.
 
     See docs/learning.md.
 
@@ -285,7 +285,7 @@ class PrimitivesNode:
             output(state)
 
     def _end(self, message: str) -> None:
-        """Ends the execution, and sends the last point once more, with velocity 0."""
+        """Ends the execution. Publishes the last point again, with velocity 0."""
         assert self._execution is not None
         last = self._execution.state
         self._execution = None
@@ -320,7 +320,7 @@ class PrimitivesNode:
         """Runs the action of a service, publishes the state, and returns the response.
 
         Args:
-            action: Function that returns the message for success, or raises an error.
+            action: Function that returns the message of a successful response, or raises an error.
         """
         with self._lock:
             try:

@@ -32,13 +32,13 @@ QUEUE_SIZE = 10
 
 
 class Source(Protocol):
-    """Reads points of demonstrations, live from ROS or from a bag."""
+    """Reads points of demonstrations from live ROS data or from a bag."""
 
     def poll(self) -> None:
-        """Records a sample if a new transform is available. The node calls this method at its rate while recording."""
+        """Records a sample if a new transform is available. Called at the node's rate while recording."""
 
     def present(self) -> Array | None:
-        """Returns the present point; None before the first message."""
+        """Returns the newest point; None before the first message."""
 
     def of_bag(self, path: str) -> Demonstration:
         """Reads a demonstration from a bag; raises an InterfaceError if the bag does not contain the signals."""
@@ -71,7 +71,7 @@ class TfSource:
             self._record(found[0].to_sec(), found[1])
 
     def present(self) -> Array | None:
-        """Returns the present point, see `Source`."""
+        """Returns the newest point, see `Source`."""
         found = self._point()
         return None if found is None else found[1]
 
@@ -100,7 +100,7 @@ class JointsSource:
         """Does nothing, since each joint state is recorded when its message arrives."""
 
     def present(self) -> Array | None:
-        """Returns the present point, see `Source`."""
+        """Returns the newest point, see `Source`."""
         return self._present
 
     def of_bag(self, path: str) -> Demonstration:
@@ -110,7 +110,7 @@ class JointsSource:
 
 
 def source_of(config: SourceConfig, tf: TfInterface, record: Record) -> Source:
-    """Makes the source that is configured: TF or joints.
+    """Makes the configured source: TF or joints.
 
     Args:
         config: The configuration.
@@ -128,7 +128,7 @@ Output = Callable[[MotionState], None]
 
 
 def outputs_of(config: OutputConfig, space: Space, tf: TfInterface) -> list[Output]:
-    """Makes the outputs that are configured, see `OutputConfig`."""
+    """Makes the configured outputs, see `OutputConfig`."""
     found: list[Output] = []
     if config.tf is not None:
         found.append(_frame(config.tf, tf))
