@@ -76,7 +76,7 @@ class FigureEight(StartParameters):
         return self.height * math.sin(angle) * math.cos(angle), self.width / 2.0 * math.sin(angle), 0.0
 
     def frame(self, name: str) -> str:
-        """Returns a frame's name with the prefix `tf_ns`."""
+        """Returns a frame's name with the configured prefix `tf_ns`."""
         return "/".join(part for part in (self.tf_ns.strip("/"), name) if part)
 
 
@@ -157,7 +157,7 @@ class Route:
 
 
 def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
-    """Returns the vector x, y [m] and the rotation of at most half a turn [rad] from a pose to a goal."""
+    """Returns the vector x, y [m] from a pose to a goal, and the rotation of at most half a turn [rad]."""
     return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
 
 

@@ -59,8 +59,8 @@ class Balance(Controller):
     """Makes a humanoid stand on both feet and move a hand to a target.
 
     Every `period_ticks` ticks, a quadratic program computes joint efforts. The efforts bring the capture point over the
-    midpoint between the feet, and the hand to its target. The efforts also keep the torso upright, the initial posture,
-    and the initial height of the centre of mass. Constraints prevent the feet from sliding and tipping.
+    midpoint between the feet, and the hand to its target. The efforts also keep the torso upright, and hold the initial
+    posture and the initial height of the centre of mass. Constraints prevent the feet from sliding and tipping.
 
     The input `target` is the desired pose, in the world, of the point `point` on the link `hand`. Until the first
     target arrives, the arm keeps its posture.
@@ -78,7 +78,7 @@ class Balance(Controller):
         self._program = WholeBodyProgram(robot, cone, len(self._soles))
 
     def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> Pose:
-        """Checks that a target's pose is finite, and returns the pose."""
+        """Checks that all numbers of a target's pose are finite, and returns the pose."""
         return check_pose(value.pose if isinstance(value, PoseTarget) else value)
 
     def start(self, state: RobotState, tick: int) -> None:
@@ -96,7 +96,7 @@ class Balance(Controller):
         self._errors: dict[str, float] = {}
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
-        """Returns the efforts of all joints [N m]. Computes new efforts every `period_ticks` ticks."""
+        """Returns the efforts of all joints [N m]. The efforts change only every `period_ticks` ticks."""
         if self._ticks % self.config.period_ticks == 0:
             if self._estimate is not None:
                 position, quat_xyzw = self._estimate.update(state.base, *state.base_twist)

@@ -74,7 +74,7 @@ class WholeBodyProgram:
         Args:
             tasks: Desired accelerations of parts of the robot.
             posture: Desired accelerations of all joints, shape (n - 6,) [rad/s^2].
-            posture_weight: Cost of the squared deviation from `posture`.
+            posture_weight: Factor of the squared deviation from `posture` in the cost.
             feet: Motion of each sole, in the sole's own axes.
         """
         robot, n, matrix = self._robot, self._n, self._matrix
@@ -98,7 +98,7 @@ class WholeBodyProgram:
     def _within_limits(self) -> tuple[Array, Array]:
         """Returns lower and upper bounds of the joint accelerations, each of shape (n - 6,) [rad/s^2].
 
-        The bounds are the accelerations of critically damped springs at the position limits.
+        Each bound is the acceleration with which a critically damped spring would pull the joint to a position limit.
         """
         robot = self._robot
         damping = 2.0 * LIMIT_RATE * robot.velocities[FREE:]

@@ -27,7 +27,7 @@ class AccelerationTask(NamedTuple):
     Attributes:
         jacobian: Shape (k, n), for n accelerations of the robot.
         wanted: Desired acceleration, shape (k,) [m/s^2 or rad/s^2].
-        weight: Cost of the squared deviation from `wanted`.
+        weight: Factor of the squared deviation from `wanted` in the cost.
     """
 
     jacobian: Array
@@ -36,11 +36,11 @@ class AccelerationTask(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """Stiffness and weight of a spring.
+    """Stiffness of a virtual spring, and the weight of the spring's task in the cost.
 
     Attributes:
         stiffness: Stiffness divided by mass [1/s^2].
-        weight: Cost of the squared deviation from the spring's acceleration.
+        weight: Factor of the squared deviation from the spring's acceleration in the cost.
     """
 
     stiffness: float
@@ -54,7 +54,7 @@ def spring(motion: FrameMotion, rows: slice, error: Array, gain: Gain, feed: Arr
         motion: Present motion of the frame.
         rows: The k rows of `motion` on which the spring acts.
         error: Goal minus present value in these rows, shape (k,) [m or rad].
-        gain: Stiffness and weight of the spring.
+        gain: Stiffness of the spring, and the task's weight in the cost.
         feed: Velocity of the goal in these rows, shape (k,) [m/s or rad/s]. Default: a goal at rest.
     """
     wanted = pull(error, feed - motion.velocity[rows], gain)
@@ -67,7 +67,7 @@ def pull(error: Array, velocity: Array, gain: Gain) -> Array:
     Args:
         error: Goal minus present position [m or rad].
         velocity: Velocity of the goal minus present velocity [m/s or rad/s].
-        gain: Stiffness of the spring. The weight is not used.
+        gain: Stiffness of the spring; `weight` is not used.
     """
     acceleration: Array = gain.stiffness * error + 2.0 * np.sqrt(gain.stiffness) * velocity
     return acceleration
@@ -89,7 +89,7 @@ def capture(
         goal: Desired x and y of the capture point, shape (2,) [m].
         height: Height of the centre of mass above the floor [m].
         gain: Distance from the capture point to p, divided by the distance from the goal to the capture point.
-        weight: Cost of the squared deviation from the desired acceleration of the centre of mass.
+        weight: Factor of the squared deviation from the desired acceleration of the centre of mass in the cost.
     """
     w = np.sqrt(GRAVITY / height)
     capture_point = centre[:2] + motion.velocity[:2] / w

@@ -81,7 +81,7 @@ def demo(
 
 
 def _leave(number: int, _: object) -> None:
-    """Raises SystemExit, so that all `with` blocks clean up. Ignores further signals in `ENDINGS`."""
+    """Handles a signal: raises SystemExit, so that all `with` blocks clean up. Ignores further signals in `ENDINGS`."""
     for each in ENDINGS:
         signal.signal(each, signal.SIG_IGN)
     sys.exit(128 + number)

@@ -114,7 +114,7 @@ def _launch_file(name: str, rest: list[str], examples: Mapping[str, Path]) -> tu
         The launch file, and the remaining words.
 
     Raises:
-        UnknownNameError: If `name` is neither a launch file nor an example, and a launch file does not follow.
+        UnknownNameError: If `name` is neither a launch file nor an example, and the next word is not a launch file.
         RLException: If the package does not exist, or does not have the file.
     """
     if name.endswith(".launch") and Path(name).is_file():
@@ -130,7 +130,7 @@ class _Parent(ROSLaunchParent, ProcessListener):
     """A roslaunch parent that records whether a required node has ended with an error.
 
     Args:
-        parents: The new object appends itself to this list.
+        parents: List to which the new `_Parent` appends itself.
     """
 
     def __init__(self, parents: list[_Parent], *arguments: Any, **options: Any) -> None:
@@ -226,8 +226,8 @@ def _make_way(file: Path, options: argparse.Namespace) -> None:
     """Checks that the launch would not stop a running simulator. With `--replace`, stops such a simulator first.
 
     Raises:
-        InterfaceError: If the launch would stop a simulator without `--replace`. Also if `--ns` is given although a
-            node publishes the master's clock.
+        InterfaceError: If the launch would stop a simulator, and `--replace` is not given. Also if `--ns` is given
+            although a node on the same master publishes `/clock`.
     """
     master = master_of(options.port)
     if options.ns is not None and (clock := clocks(master)):

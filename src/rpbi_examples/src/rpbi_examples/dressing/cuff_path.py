@@ -60,7 +60,7 @@ class CuffPath:
         """Returns the direction in which the cuff is pulled at the distance `done` along the path [m].
 
         Returns:
-            Unit vector, shape (3,). In front of the fingertips, it is the direction from the wrist to the elbow.
+            Unit vector, shape (3,). In front of the fingertips, this is the direction from the wrist to the elbow.
         """
         start = math.dist(*self._corners[:2])
         to = self.place(min(max(done, start) + BLEND_M, self.length))

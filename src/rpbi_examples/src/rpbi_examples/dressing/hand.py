@@ -81,7 +81,7 @@ class HandSolver:
         return np.array((ROBOT_BASE @ self._solver.chain.pose(positions) @ in_hand).position)
 
     def solve(self, target: HandTarget, positions: Sequence[float]) -> dict[str, float] | None:
-        """Returns joint positions [rad] indexed by joint name. None if there is no solution near the present positions.
+        """Returns joint positions [rad] indexed by joint name. None if a solution near `positions` was not found.
 
         Args:
             target: Target pose of the hand.

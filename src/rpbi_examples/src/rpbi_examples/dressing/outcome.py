@@ -58,8 +58,8 @@ class ArmForce:
 
     Three forces have limits:
 
-    - A single contact must not exceed the transient limit of its body region.
-    - The mean force on a segment must not exceed the quasi-static limit of its body region.
+    - The force of a single contact must not exceed the transient limit of the contact's body region.
+    - The mean force on a segment must not exceed the quasi-static limit of the segment's body region.
     - The mean force on the whole arm must not exceed `limit_n`, which is chosen for comfort.
 
     Args:

@@ -1,4 +1,4 @@
-"""The telepresence example without ROS: a simulated person holds out an arm, and a robot pulls a sleeve over it."""
+"""The telepresence example without ROS: a robot pulls a sleeve over the arm that a simulated person holds out."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Trial:
 
     Args:
         world: World of the example, possibly with additional objects.
-        person: Simulated person whose motion the avatar follows.
+        person: Simulated person whose motion the human model in the world follows.
         dressing: The controller of the cuff.
         force_limit_n: Limit of the mean force on the whole arm [N].
 
@@ -94,7 +94,7 @@ class Trial:
         return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:
-        """Advances the world by the period between two targets."""
+        """Sends the next targets to the human model and the robot, and advances the world until new targets are due."""
         dt = 1.0 / TARGET_HZ
         pose = self._engagement.step(self._retargeting.pose(self._person.frame(self.time_s)), dt)
         self._world.put("human/pose", Pose(tuple(pose.position.tolist()), tuple(pose.quat_xyzw.tolist())))

@@ -36,8 +36,8 @@ class Progress(NamedTuple):
 
     Attributes:
         actions: Number of training actions so far.
-        score: Mean return in the test episodes. The tested policy has the mean of the distribution as weights.
-        success: Share of test episodes in which this policy succeeded.
+        score: Mean return in the test episodes. The tested policy is the mean of the distribution of policies.
+        success: Share of test episodes in which the tested policy succeeded.
         seconds: Wall time since the start of the training [s].
     """
 

@@ -100,7 +100,7 @@ class Arm:
             raise InterfaceError(f"{subject} is out of reach: {answer.message}")
 
     def require_plan(self, plan: PushPlan) -> None:
-        """Checks that a plan stays within the limits of teleoperation.
+        """Checks that a plan stays within the position limits of teleoperation.
 
         Raises:
             InterfaceError: If the plan exceeds the limits by more than `BEYOND_M`.
@@ -115,7 +115,8 @@ class Arm:
     def follow(self, plan: PushPlan) -> None:
         """Moves the tip's target along a plan, and returns at the end of the plan.
 
-        Publishes velocities on the topic of the person's signals, and ignores the person's signals until the end.
+        Publishes velocities on the topic on which the operator node publishes the person's signals. Until the end, the
+        operator node is switched off.
         """
         call_service("operator_node/toggle", SetBool, False)  # signals of the person are ignored meanwhile
         try:

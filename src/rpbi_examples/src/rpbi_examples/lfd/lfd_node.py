@@ -53,7 +53,7 @@ POLL_S = 0.05
 
 
 class LfdNode:
-    """Executes the steps that keys or services request, one after the other. Publishes the state on `lfd/state`."""
+    """Executes the steps that keys or services request, one by one. Publishes the node's state on `lfd/state`."""
 
     def __init__(self) -> None:
         self._out = Path(rospy.get_param("~out", "lfd"))

@@ -45,7 +45,7 @@ class BoxError(NamedTuple):
 
         Args:
             position: x, y, z [m].
-            quat_xyzw: Orientation. The angle is about any axis, so a tipped box has a large angle.
+            quat_xyzw: Orientation. The error is the whole rotation angle, so a tipped box has a large error.
         """
         return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
 

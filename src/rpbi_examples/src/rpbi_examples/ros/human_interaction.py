@@ -182,7 +182,7 @@ class Watch:
 
 
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
-    """Returns the value of the latest pair (stamp, value) with a stamp of at most `time_s` [s]. Default: 0."""
+    """Returns the value of the latest pair (stamp, value) with a stamp of at most `time_s` [s]; 0 if there is none."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
 
 

@@ -54,7 +54,7 @@ class RunningNode(NamedTuple):
             time.sleep(_POLL_S)
 
     def _launch_process(self, master: str) -> int | None:
-        """Returns the process id of the `roslaunch` that started the node. None if it does not run on this machine."""
+        """Returns the process id of the `roslaunch` that started the node. None if not found on this machine."""
         _, _, uris = _proxy(master).getParam(_CALLER, "/roslaunch/uris")
         for uri in uris.values() if isinstance(uris, dict) else ():
             host, _ = rosgraph.network.parse_http_host_and_port(uri)
@@ -117,7 +117,10 @@ def clocks(master: str) -> list[RunningNode]:
 
 
 def _state(master: str) -> list[list[tuple[str, list[str]]]]:
-    """Returns publishers, subscribers and services with their nodes. Empty lists if the master does not answer."""
+    """Returns three lists: published topics, subscribed topics, and services, each entry with the names of its nodes.
+
+    If the master does not answer, the lists are empty.
+    """
     try:
         return _proxy(master).getSystemState(_CALLER)[2]
     except MASTER_FAILURES:
@@ -125,7 +128,7 @@ def _state(master: str) -> list[list[tuple[str, list[str]]]]:
 
 
 def _running(names: Iterable[str], master: str) -> list[RunningNode]:
-    """Returns the nodes with the given names that answer, sorted by name."""
+    """Returns those of the named nodes that answer, sorted by name."""
     nodes = [RunningNode(name, _proxy(master).lookupNode(_CALLER, name)[2]) for name in sorted(names)]
     return [node for node in nodes if node.uri and _answers(node.uri)]
 

@@ -152,7 +152,9 @@ def _run(scene: str, seed: int, noise: bool) -> SeedResult:
 
 
 def summary(scene: str, results: Sequence[SeedResult], noise: bool = False) -> dict[str, Any]:
-    """Sums up a scene's results as plain data: number of completed parts, number of all parts, and a row per seed."""
+    """Returns a summary as plain data: one row for each seed, and the number of completed parts and the number of all
+    parts of the task, both summed over all episodes.
+    """
     rows = [each.row() for each in sorted(results, key=lambda each: each.seed)]
     return {
         "scene": scene,

@@ -96,12 +96,12 @@ class Factory(Scene):
         return f"not in the box: {', '.join(missing(self.seen.poses))}"
 
     def figures(self) -> dict[str, float]:
-        """Returns the number of parts in the box, the smallest distance between the arms, and the time per part."""
+        """Returns the number of sorted parts, the smallest distance between the arms, and the time per sorted part."""
         time_s, nearest_mm = self.seen.time_s / max(done := self.score()[0], 1), 1e3 * self._nearest_m
         return {"parts placed": done, "time a part [s]": time_s, "smallest distance of the arms [mm]": nearest_mm}
 
     def _reachable(self, side: str) -> list[str]:
-        """Returns the names of the parts that an arm may take, sorted from the outermost part to the middle."""
+        """Returns the names of the parts that an arm may take, sorted by decreasing distance from the belt's middle."""
         out_m = {part: SIDES[side] * tag.position[1] for part, tag in on_belt(self.sensed.tags).items()}
         mine = [part for part in out_m if 0.0 <= out_m[part] < REACH_M and self._tries[part] < TRIES]
         return sorted((part for part in mine if part not in self._busy.values()), key=lambda part: -out_m[part])
@@ -148,7 +148,7 @@ class Factory(Scene):
         yield from hand.go((x, y, CARRY_Z_M), yaw)
 
     def _put_down(self, side: str, hand: Gripper, part: str) -> Iterator[Pose]:
-        """Moves a part into its compartment, releases the part, and raises the hand above the middle zone."""
+        """Waits until the middle zone is free, and puts a part into its compartment. Then raises the hand."""
         kind, yaw = PARTS[part], SIDES[side] * PLACE_RAD
         while not self._middle.take(side):
             yield hand.target

@@ -70,11 +70,11 @@ class Handover(Scene):
         self.change(self.thing, mass=mass, lateralFriction=friction)
 
     def act(self) -> Iterator[None]:
-        """Makes person and robot act simultaneously. Fails if a body other than person and robot touches the thing."""
+        """Makes person and robot act simultaneously. The episode fails if the thing touches a third body."""
         yield from self._holders.watch(together(self._person_acts(), self._robot_acts()), HANDS)
 
     def beside(self) -> Iterator[None]:
-        """Makes the person act. Fails if a body other than person and robot touches the thing."""
+        """Makes the person act. The episode fails if the thing touches a body other than person and robot."""
         yield from self._holders.watch(self._person_acts(), HANDS)
 
     def _person_acts(self) -> Iterator[None]:

@@ -98,7 +98,7 @@ class InputValue(NamedTuple):
 
 
 class Teleport(NamedTuple):
-    """Moves a body to a pose at once, without velocity."""
+    """Moves a body to a pose in one step, and sets the body's velocity to 0."""
 
     name: str
     pose: Pose
@@ -139,7 +139,7 @@ class Switch(NamedTuple):
 
 
 class GainChange(NamedTuple):
-    """Changes configuration keys of a controller `ROBOT/CONTROLLER`, like the controller's service `set_gains`."""
+    """Changes configuration values of a controller `ROBOT/CONTROLLER`, like the controller's service `set_gains`."""
 
     target: str
     values: Mapping[str, float | Vector]
@@ -256,7 +256,7 @@ class Scene(ABC):
         self._changes.append(InputValue(slot, value))
 
     def place(self, name: str, pose: Pose) -> None:
-        """Moves a body to a pose in the world at once, without velocity."""
+        """Moves a body to a pose in the world in one step, and sets the body's velocity to 0."""
         self._changes.append(Teleport(name, pose))
 
     def shove(self, target: str, force: Vector, duration_s: float) -> None:
@@ -272,7 +272,7 @@ class Scene(ABC):
         self._changes.append(Switch(robot, start, stop))
 
     def tune(self, target: str, **values: float | Vector) -> None:
-        """Changes configuration keys of a controller, such as `force` [N]. An active controller restarts from the
+        """Changes configuration values of a controller, such as `force` [N]. An active controller restarts from the
         robot's present pose.
         """
         self._changes.append(GainChange(target, values))
@@ -291,14 +291,14 @@ class Scene(ABC):
         self.sensed = seen._replace(poses=poses, tags=tags)
 
     def take_changes(self) -> list[WorldChange]:
-        """Returns the changes that were requested since the last call, in order, and clears them."""
+        """Returns the changes that were requested since the last call, in the order of the requests."""
         changes, self._changes = self._changes, []
         return changes
 
     def measure(self) -> Iterator[None]:
-        """With noisy sensors, waits until the poses of resting objects are averaged. Use: `yield from self.measure()`.
+        """If `is_noisy`, waits until the poses of resting objects are averages of many measurements.
 
-        `run_scene` calls this method at the start of every episode.
+        Use: `yield from self.measure()`. `run_scene` calls this method at the start of every episode.
         """
         if self.is_noisy:
             yield from self.wait(MEASURE_S)

@@ -57,7 +57,7 @@ class SensedPoses(Generic[Key]):
 
         Args:
             time_s: Present time [s].
-            poses: True poses in the world.
+            poses: True poses in the world, indexed by body name or tag number.
         """
         self._on_the_way.append((time_s, {key: noisy(poses[key], self._random) for key in sorted(poses)}))
         while len(self._on_the_way) > 1 and self._on_the_way[1][0] <= time_s - DELAY_S + ROUNDING_S:

@@ -55,8 +55,8 @@ class SceneTaskConfig(WorldTaskConfig):
 
 
 class SceneTask(WorldTask):
-    """Task of a Gymnasium environment that runs a scene. Actions move the scene's robots. With the action None, the
-    scene itself moves all robots.
+    """Task of a Gymnasium environment that runs a scene. Actions move the scene's robots. With the action None,
+    `run_scene` moves all robots with `Scene.act` instead.
     """
 
     Config = SceneTaskConfig
@@ -87,7 +87,7 @@ class SceneTask(WorldTask):
         ]
 
     def parts(self) -> Iterator[ObservationPart]:
-        """Yields the parts of the observation. Adds the poses of the scene's bodies, and `goal_numbers` as `goal`."""
+        """Yields the parts of the base class, the poses of the scene's bodies, and `Scene.goal_numbers` as `goal`."""
         yield from super().parts()
         for name in self._kind.watch.bodies:
             yield pose_part(self.world, name, self.config.low, self.config.high)
@@ -95,7 +95,9 @@ class SceneTask(WorldTask):
             yield ObservationPart("goal", (-FARTHEST,) * count, (FARTHEST,) * count, lambda: self.scene.goal_numbers)
 
     def reset(self, random: np.random.Generator) -> None:
-        """Creates a new scene, and prepares its episode. The attribute `seed`, if set, replaces `random`."""
+        """Creates a new scene, and prepares the scene's episode. If `seed` is set, a generator with this seed replaces
+        `random`.
+        """
         self.scene = self._kind(random if self.seed is None else np.random.default_rng(self.seed))
         self._start_tick = self.world.clock.tick
         self._beside, self._has_failed = None, False
@@ -106,13 +108,13 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots that the action controls; `Scene.beside` moves the others. The action None has no effect."""
+        """Moves the robots that the action controls; `Scene.beside` moves the others. None moves no robot."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)
 
     def reward(self) -> float:
-        """Lets the scene observe the world after an action, and returns the share of the task that was completed."""
+        """Lets the scene observe the world after an action, and returns the newly completed share of the task."""
         before, _ = self.scene.score()
         self.scene.look(self._see())
         try:
@@ -220,7 +222,7 @@ def see(world: World, watch: Watched, time_s: float) -> Seen:
 
 
 def _tags(world: World, watch: Watched) -> Iterator[tuple[int, Pose]]:
-    """Yields number and world pose of each detected tag. Only uses cameras with a fixed pose in the world's `poses`."""
+    """Yields number and world pose of each detected tag. Only uses cameras with a pose in `world.config.poses`."""
     frames = {each.tf_id: Pose(*each.pose) for each in world.config.poses}
     for sensor in (sensor for name in world.bodies for sensor in world.sensors_of(name)):
         if isinstance(sensor, AprilTagsSensor) and sensor.topic in watch.tags:

@@ -137,7 +137,7 @@ class Wiping(Scene):
         return arm
 
     def _wipe(self, sponge: Pose) -> None:
-        """Records pose and force of the sponge. If the force is held, removes the stains that the sponge covers."""
+        """Records pose and force of the sponge. Removes covered stains if the force is within the tolerance."""
         board, force = self.seen.poses["board"], self._normal_force()
         self.stamps.append(Stamp.of(board.inverse() @ sponge))
         self.forces.append(force)
@@ -158,7 +158,7 @@ class Wiping(Scene):
         return abs(force - self.force) <= TOLERANCE * self.force
 
     def _held(self) -> float:
-        """Returns the share of the path along which the force was held."""
+        """Returns the share of the path along which the force was within the tolerance."""
         return share_of_way(self.stamps, [self._is_held(force) for force in self.forces])
 
     def _gone(self) -> float:

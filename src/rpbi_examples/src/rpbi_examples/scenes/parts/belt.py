@@ -82,7 +82,7 @@ class Belt:
 
     Args:
         scene: Scene in which the belt moves.
-        slot: Input for the targets of the belt's joint.
+        slot: World input for the targets of the belt's joint.
         joint: Name of the belt's joint.
         way_m: Length of the belt's path [m].
         speed: Speed of the running belt [m/s].
@@ -105,7 +105,7 @@ class Belt:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the belt has stopped for good, since the rest of its path is not longer than the braking distance."""
+        """Whether the belt has stopped near the end of its path and cannot start again."""
         return not self.is_moving and self._at_m + self._braking_m(self._most) >= self._way_m
 
     def act(self) -> None:

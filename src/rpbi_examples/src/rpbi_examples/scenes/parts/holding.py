@@ -75,7 +75,7 @@ class Holders:
             yield
 
     def has_lasted_s(self) -> float:
-        """Returns the time for which the same bodies have touched the thing [s]."""
+        """Returns the time since the set of bodies that touch the thing last changed [s]."""
         return self._scene.seen.time_s - self._since_s
 
     def is_alone(self, name: str, duration_s: float) -> bool:
@@ -146,7 +146,7 @@ class PandaArm(LedArm):
             holders: Record of the bodies that touch the thing.
 
         Raises:
-            SceneFailedError: If the gripper is closed without contact of both fingers.
+            SceneFailedError: If the gripper is fully closed before both fingers touch the thing.
         """
         target_m = self.opening()
         while not FINGER_LINKS <= holders.links():

@@ -67,7 +67,7 @@ class PolarArm(LedArm):
 
         Args:
             end: Target position.
-            speed: Largest mean speed of radius and height together [m/s].
+            speed: Largest mean speed in the plane of radius and height [m/s].
             turn_speed: Largest mean speed of the azimuth [rad/s].
 
         Raises:

@@ -1,4 +1,4 @@
-"""Moves two arms of a robot with a minimum distance, reserves a zone for one arm at a time, and moves grippers."""
+"""Moves two arms of a robot and keeps the arms apart, reserves a zone for one arm at a time, and moves grippers."""
 
 from __future__ import annotations
 
@@ -156,8 +156,8 @@ class Gripper:
         return self._scene.seen.joints[self._robot][self._finger]
 
     def open(self, way_m: float, duration_s: float) -> Iterator[Pose]:
-        """Sends both fingers to a distance from the closed position [m], and waits. At 0, the gripper closes with full
-        force.
+        """Sends both fingers to the distance `way_m` from the closed position [m]; with 0, the gripper closes with full
+        force. Then yields the arm's last target for `duration_s` [s].
         """
         self._scene.put(f"{self._robot}/target", {self._finger: way_m})
         for _ in range(round(duration_s / self._cycle_s)):
