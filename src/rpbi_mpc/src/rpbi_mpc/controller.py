@@ -63,7 +63,7 @@ class ControlPlan:
             command.
         state_step_s: Time between two predicted states [s].
         cost: Cost of the plan.
-        converged: Whether the solver found a solution within its limits.
+        converged: Whether the solver found a solution. If not, the loop does not execute this plan.
         status: Status that the solver reports, or the reason why there is no solution.
         iterations: Number of solver iterations.
         wall_s: Wall time that the solver took [s].

@@ -106,8 +106,8 @@ class CheckContext(NamedTuple):
 class Check(ABC):
     """Base class of checks, each of which decides whether a motion is safe.
 
-    Results do not depend on earlier calls: equal motions and contexts have equal results. One exception: which
-    violation is reported for an unsafe motion with `is_trial` may depend on earlier calls.
+    Results do not depend on earlier calls: equal motions and contexts have equal results. There is one exception: for
+    an unsafe motion with `is_trial`, the choice of the reported violation may depend on earlier calls.
 
     Args:
         config: Options of the check.
@@ -119,7 +119,7 @@ class Check(ABC):
         ConfigError: If the options do not fit the robot.
 
     Attributes:
-        Config: Model of the check's options.
+        Config: Pydantic class of the check's options.
         name: Name of the check in the configuration and in messages.
         is_default: Whether the check is used even without an entry in the configuration.
         watches: Whether the check examines the context instead of the command. Such a check also runs while no targets

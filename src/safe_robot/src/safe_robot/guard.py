@@ -162,7 +162,7 @@ class Guard:
             self._assume_rest()
 
     def wait_for_target(self) -> None:
-        """Ends the motion because targets are late.
+        """Ends the motion because no recent target has arrived.
 
         With the policy `reject`, the guard halts. With `limit`, the robot stops as after a halt, but follows the next
         target.
@@ -213,8 +213,8 @@ class Guard:
     def refuse(self, reason: str) -> Decision:
         """Refuses a target that cannot be checked; `reason` becomes the violation.
 
-        The guard halts with the policy `reject`, or before the first command. Otherwise, it decides on the next command
-        of the braking.
+        The guard halts with the policy `reject`, or before the first command. Otherwise, the decision contains the next
+        command of the braking.
         """
         if self.is_halted:
             return Decision(None, None, True)
@@ -380,7 +380,8 @@ class Guard:
     def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
         """Replaces an unsafe target by a safe command near the target, or by the next braking command if none is found.
 
-        With the policy `reject`, the guard halts. If the failed check examines only the context, the robot brakes.
+        With the policy `reject`, the guard halts instead. With another policy, the robot brakes at once if the failed
+        check examines only the context, since no command could satisfy this check.
         """
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command can satisfy these

@@ -29,7 +29,7 @@ class FrameMotion(NamedTuple):
     Attributes:
         jacobian: Maps the robot's velocities to `velocity`, shape (6, n) or (3, n).
         velocity: Velocity, shape (6,) or (3,).
-        drift: Acceleration at constant velocities of the robot (dJ/dt v), shape (6,) or (3,).
+        drift: Acceleration if the robot's velocities v stay constant (dJ/dt v), shape (6,) or (3,).
     """
 
     jacobian: Array

@@ -26,8 +26,8 @@ class PushingConfig(ConfigModel):
         program: Horizon, cost and solver.
         estimator: Filter of measurements.
         approach: Motion of the pusher to the slider.
-        gap_rate: Ratio of the additional speed towards the slider to the gap between pusher and slider while pushing
-            [1/s].
+        gap_rate: While pushing, `gap_rate` times the gap between pusher and slider is added to the first command's
+            speed towards the slider [1/s].
         max_lag: Largest lead of the reference over the slider, along the path [m]. With a larger lead, the reference
             waits.
         max_off: Distance of the slider from the path beyond which the task fails [m].

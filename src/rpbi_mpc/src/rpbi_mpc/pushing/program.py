@@ -24,17 +24,17 @@ NX, NU = 4, 4
 
 
 class WeightsConfig(ConfigModel):
-    """Weights of the cost, a sum of squares over the horizon.
+    """Weights of the terms of the cost, which is a sum over the horizon. Most terms are squares.
 
     Attributes:
-        position: Distance from the path [1/m^2].
-        yaw: Difference between yaw and the direction of the path [1/rad^2].
+        position: Distance from the reference position [1/m^2].
+        yaw: Difference between yaw and the reference yaw, which is the direction of the path [1/rad^2].
         contact: Distance of the pusher from the middle of the face [1/m^2].
         force: Tangential force, and difference between the normal force and the force that moves the slider along the
             path [s^2/m^2].
         sliding: Speed of sliding along the face [s^2/m^2].
         change: Difference between the force in the first step and the previous force [s^2/m^2].
-        final: Factor for the weights of the last state.
+        final: Factor by which the weights of the last state are multiplied.
         complementarity: Penalty for inputs with which the contact neither sticks nor slides [s^2/m^2].
     """
 

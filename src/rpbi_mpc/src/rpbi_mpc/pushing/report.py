@@ -103,7 +103,7 @@ def _draw_path(file: Path, table: pandas.DataFrame, controller: PushingControlle
 
 
 def _draw_errors(file: Path, table: pandas.DataFrame, cycles: Sequence[Cycle], controller: PushingController) -> None:
-    """Writes a picture of the errors of position, yaw and predicted position along the path."""
+    """Writes a picture with plots of the position, yaw and prediction errors over the distance along the path."""
     figure, axes = _figure(3, 1, (7.0, 6.0))
     along_m = table["path_time_s"].clip(upper=controller.path.duration_s) * controller.config.path.speed
     turned = table["state.yaw"] - table["reference_yaw"]

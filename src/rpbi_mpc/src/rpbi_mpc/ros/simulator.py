@@ -20,7 +20,7 @@ from rpbi.world.forks.prediction import PlannedInput
 class SteppedSimulator:
     """Calls services of the simulator: steps the simulator, sets a robot's targets, and requests predictions.
 
-    The constructor stops the running simulator, and then advances the simulation by two ticks.
+    The constructor pauses a running simulation, and then advances the simulation by two ticks.
 
     Args:
         robot: Name of the robot whose targets are set.

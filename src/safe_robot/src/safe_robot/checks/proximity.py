@@ -26,7 +26,7 @@ class TooNear(NamedTuple):
 
     Attributes:
         pair: Two links, or a link and an obstacle.
-        distance: Distance between the shapes where they are too near [m].
+        distance: Distance between the shapes in the configuration in which they are too near [m].
         is_while_braking: Whether the shapes are too near during the braking; otherwise, at the command.
     """
 
@@ -66,8 +66,8 @@ class Proximity:
         """Returns a pair that comes too near in any row of a motion; None if all pairs keep their distance.
 
         Let d and e be a pair's distances in two rows, and m the length of the pair's relative motion from one row to
-        the other. In all rows between, the pair's distance is at least (d + e - m) / 2. If this bound is too small,
-        every row is checked.
+        the other. In all rows in between, the pair's distance is at least (d + e - m) / 2. If this bound is too
+        small, every row in between is checked.
         """
         if not len(self._pairs):
             return None
@@ -166,8 +166,8 @@ class Proximity:
         bound is a stored bound minus the largest possible change of distance between the stored configuration and `q`.
 
         Args:
-            q: Joint positions for both stored configurations, shape (..., 2, 1, n); or (..., 1, 1, n) if the positions
-                are the same for both.
+            q: Joint positions to compare with each stored configuration, shape (..., 2, 1, n); or (..., 1, 1, n) to
+                compare the same positions with both.
         """
         known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
@@ -189,7 +189,7 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns pair `i` if its distance is below both the margin and the distance at the start; otherwise None.
+        """Returns pair `i` if the pair's distance is below the margin and below its distance at the start; else None.
 
         The caller has moved the robot to the configuration of the row, and has measured `contact` there.
         """

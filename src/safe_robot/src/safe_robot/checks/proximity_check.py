@@ -37,7 +37,7 @@ def shapes_of(robot: RobotModel) -> Shapes:
 
 
 def link_distances(robot: RobotModel, geometry: Geometry = "hulls") -> LinkDistances:
-    """Returns an object that measures distances from and between a robot's links, with the library of `shapes_of`.
+    """Returns an object that measures distances of a robot's links from each other and from obstacles.
 
     Raises:
         ConfigError: If the robot cannot be loaded.

@@ -2,7 +2,7 @@
 
 The safety checks provide linear bounds on positions. The QP solver DAQP finds the command that satisfies these bounds
 and is nearest to the target. The extra `ik` installs DAQP. Without DAQP, the search only tries commands on a line
-between braking and the target.
+from the next braking command towards the target.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class SafeCommandSearch:
     def _detours(self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
         """Yields commands near `wanted` that satisfy the bounds of the checks.
 
-        The first command satisfies the bounds at the end of braking; it is `wanted` if this is impossible. Each further
-        command also satisfies the bounds that the braking after the previous command would violate.
+        The first command satisfies the bounds at the end of braking. If this is impossible, only `wanted` is yielded.
+        Each further command also satisfies the bounds that the braking after the previous command would violate.
         """
         there, after = stop[-1:], StoppingTrajectory(wanted, state, self._braking, self._period_s)
         spread = np.abs(after.of(wanted)[-1] - there[0])
@@ -123,7 +123,7 @@ def can_keep_bounds() -> bool:
 
 
 class StoppingTrajectory:
-    """Predicts positions of n joints at `MOMENTS` instants of braking after a command; linear in this command.
+    """Predicts positions of n joints at `MOMENTS` instants of braking after a command, linearly in the command.
 
     Args:
         command: Commanded positions at which the prediction is exact, shape (n,) [rad or m].

@@ -99,7 +99,7 @@ class GuardStatus:
         self._warn(self._subject, "halted; call robot_safety/start_subscriber to continue")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:
-        """Returns a text about violated margins and the motion that reduces the violations; empty during motions.
+        """Returns a text about violated margins and a motion that reduces the violations; empty while the robot moves.
 
         The text is computed again only after the last command or the obstacles have changed.
         """

@@ -75,7 +75,7 @@ class SceneEstimator:
 
         Args:
             sensed: A complete measurement (x, y, yaw, pusher_x, pusher_y).
-            ahead_s: Plant time for which the scene is predicted [s].
+            ahead_s: Plant time (not a duration) for which the scene is predicted [s].
         """
         measured_s = sensed.time_s - sensed.age_s
         assert sensed.values is not None

@@ -2,13 +2,13 @@
 
 Friction with the table and the force of the pusher are in balance. The limit surface is the set of all loads under
 which a body slides. The ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1 approximates the limit surface, with the
-largest force f and the characteristic length c. The twist is normal to the ellipsoid (K. Lynch, H. Maekawa and K.
-Tanie, IROS 1992). A force is expressed as the speed that this force causes [m/s]. A load (fx, fy, m) then causes the
-twist (fx, fy, m / c^2) in the slider's frame.
+largest friction force f and the characteristic length c. The twist is normal to the ellipsoid (K. Lynch, H. Maekawa
+and K. Tanie, IROS 1992). A force is expressed as the speed that this force causes [m/s]. A load (fx, fy, m) then causes
+the twist (fx, fy, m / c^2) in the slider's frame.
 
-The contact sticks, or slides to one side of the face at the edge of the friction cone (F. Hogan and A. Rodriguez,
-"Feedback control of the pusher-slider system", WAFR 2016, and "Reactive planar non-prehensile manipulation with hybrid
-model predictive control", IJRR 39, 2020).
+The contact sticks, or slides to one side of the face while the force is at the edge of the friction cone (F. Hogan and
+A. Rodriguez, "Feedback control of the pusher-slider system", WAFR 2016, and "Reactive planar non-prehensile
+manipulation with hybrid model predictive control", IJRR 39, 2020).
 
 All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact). x, y and yaw are the
 pose of the slider in the plane [m, m, rad]. `contact` is the position of the pusher along the face at -x, from the
@@ -70,8 +70,8 @@ class SliderConfig(ConfigModel):
     def characteristic_length(self) -> float:
         """Ratio of the largest friction moment about the middle to the largest friction force [m].
 
-        This length is the mean distance of the supporting points from the middle, weighted with the pressure, and the
-        ratio of the half axes of the ellipsoidal limit surface. Sources: S. Goyal, A. Ruina and J.
+        This length is the mean distance of the supporting points from the middle, weighted with the pressure. The
+        length is also the ratio of the half axes of the ellipsoidal limit surface. Sources: S. Goyal, A. Ruina and J.
         Papadopoulos, "Planar sliding with dry friction", Wear 143, 1991; K. Lynch, H. Maekawa and K. Tanie,
         "Manipulation and active sensing by pushing using tactile feedback", IROS 1992.
         """
@@ -121,7 +121,7 @@ def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tup
 
 
 def complementarity(control: Vector, slider: SliderConfig) -> Any:
-    """Returns the amount by which an input violates the contact modes [m^2/s^2]. 0: the contact sticks or slides.
+    """Returns the violation of the contact modes by an input [m^2/s^2]; 0 if the contact correctly sticks or slides.
 
     The contact slides to the left only at the left edge of the friction cone, and to the right only at the right edge.
     Inside the cone, the violation is never negative. `PushingProgram` penalises the violation instead of requiring 0,

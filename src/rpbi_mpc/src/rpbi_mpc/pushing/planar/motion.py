@@ -51,7 +51,7 @@ def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
 
 
 def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
-    """Returns the distance between pusher and face, and the pusher's position along the face to the left [m, m].
+    """Returns the distance between pusher and face, and the pusher's position on the face, positive to the left [m, m].
 
     The distance is measured to the infinite line through the face, and is negative on the slider's side of this line.
     """
@@ -104,7 +104,7 @@ class ApproachConfig(ConfigModel):
 
 
 def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:
-    """Returns whether the pusher is at a position from which it can push the slider.
+    """Returns whether the pusher's position is suitable for pushing the slider.
 
     Args:
         gap: Distance of the pusher from the face [m], negative inside the slider.
