@@ -213,7 +213,7 @@ class Swing:
         lower: Lower limits of the joints [rad or m]; -inf without a limit.
         upper: Upper limits of the joints [rad or m]; inf without a limit.
         middle: Centres of the swings [rad or m], which are clipped to the limits. Default: 0.
-        amplitude: Amplitude of the swings [rad or m]. The limits may reduce it.
+        amplitude: Amplitude of the swings [rad or m]. The limits may reduce the amplitude.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Tests that every check has to pass; packages that define checks may subclass them in their tests."""
+"""Tests that every check has to pass; packages that define checks may subclass `CheckConformance`."""
 
 import math
 from collections.abc import Mapping

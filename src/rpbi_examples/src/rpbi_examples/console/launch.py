@@ -208,7 +208,7 @@ def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iter
 
     Args:
         options: Parsed options.
-        given: Arguments from the command line; they take precedence.
+        given: Arguments from the command line, which take precedence.
         known: Names of the arguments that the launch file declares.
     """
     added = [] if options.port is None else ["-p", str(options.port)]

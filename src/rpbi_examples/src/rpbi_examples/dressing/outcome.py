@@ -162,7 +162,7 @@ def _encloses(ring: Array, point: Array, axis: Array) -> bool:
     Args:
         ring: Corners of the ring, shape (14, 3) [m].
         point: A point of the line, shape (3,) [m].
-        axis: Direction of the line, a unit vector of shape (3,); it must not be vertical.
+        axis: Direction of the line, which must not be vertical; a unit vector of shape (3,).
     """
     across = np.cross(axis, (0.0, 0.0, 1.0))
     across /= np.linalg.norm(across)

@@ -82,7 +82,7 @@ def master_of(port: str | None) -> str:
 def running_simulators(file: str, master: str) -> list[RunningNode]:
     """Returns the running simulators that ROS would stop if a launch file were run, because of equal node names.
 
-    Killed nodes are not returned, although they stay registered with the master.
+    Killed nodes, which stay registered with the master, are not returned.
 
     Args:
         file: The launch file.

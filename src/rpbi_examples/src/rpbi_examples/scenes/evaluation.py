@@ -61,7 +61,7 @@ class SeedResult(NamedTuple):
 
 
 def run_seeds(scene: str, seeds: Sequence[int], jobs: int, noise: bool = False) -> Generator[SeedResult, None, None]:
-    """Runs an episode of a scene with each seed, and yields the results as they arrive.
+    """Runs an episode of a scene with each seed, and yields the results in the order of arrival.
 
     Closing the generator ends its processes. After an error of the world, the episode counts as failed, and the next
     episode runs in a new world.

@@ -108,7 +108,7 @@ class SceneTask(WorldTask):
         super().reset(random)
 
     def act(self, action: np.ndarray | None) -> None:
-        """Moves the robots that the action controls; `Scene.beside` moves the others. None moves no robot."""
+        """Moves the robots in the action; `Scene.beside` moves the others. The action None moves no robot."""
         if action is not None:
             self._beside = self._beside or self.scene.beside()
             super().act(action)

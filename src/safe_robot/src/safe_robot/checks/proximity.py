@@ -26,7 +26,7 @@ class TooNear(NamedTuple):
 
     Attributes:
         pair: Two links, or a link and an obstacle.
-        distance: Distance between the shapes in the configuration in which they are too near [m].
+        distance: Distance between the shapes in the configuration in which the shapes are too near [m].
         is_while_braking: Whether the shapes are too near during the braking; otherwise, at the command.
     """
 
@@ -57,7 +57,7 @@ class Proximity:
         self._known_m = np.full((2, len(pairs)), -np.inf)  # lower bounds of the pairs' distances there
 
     def forget(self, indices: Sequence[int]) -> None:
-        """Discards the stored bounds of the pairs with these indices, whose obstacles have moved or changed."""
+        """Discards the stored bounds of the pairs with the given indices, whose obstacles have moved or changed."""
         self._known_m[:, list(indices)] = -np.inf
         for i in indices:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))

@@ -40,7 +40,7 @@ class SafeCommandSearch:
     Args:
         limits: Limits of the joints.
         braking: Computes the braking of the joints.
-        checks: Checks that commands have to pass; they also provide the linear bounds.
+        checks: Checks that commands have to pass, and that provide the linear bounds.
         period_s: Time between two commands [s].
     """
 

@@ -127,7 +127,7 @@ def ways_along(places: Sequence[Sequence[float]] | np.ndarray) -> np.ndarray:
 def share_of_way(places: Sequence[Sequence[float]], holds: Sequence[bool]) -> float:
     """Returns the share of a path's length along which a condition holds.
 
-    The condition counts as fulfilled along a whole segment if it holds at the segment's last point.
+    A segment counts if the condition holds at the segment's last point.
 
     Args:
         places: Points of the path. The first two values of each point are x and y [m].
